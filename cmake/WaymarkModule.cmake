@@ -1,0 +1,23 @@
+# Warnings for our own code; no fused multiply-add contraction, so that results do not depend on
+# what the compiler chose to fuse.
+add_library(waymark_options INTERFACE)
+target_compile_options(waymark_options INTERFACE -Wall -Wextra -ffp-contract=off)
+target_include_directories(waymark_options INTERFACE "${PROJECT_SOURCE_DIR}/src")
+
+# waymark_module(NAME SOURCES a.cc... [TESTS a_test.cc...] [LINK PUBLIC targets...]
+#                [TEST_LINK targets...])
+# One static library waymark_NAME and, when there are tests, one test program waymark_NAME_test.
+# Modules link the modules above them only, so that an include against the order fails to link.
+function(waymark_module name)
+  cmake_parse_arguments(MODULE "" "" "SOURCES;TESTS;LINK;TEST_LINK" ${ARGN})
+  add_library(waymark_${name} STATIC ${MODULE_SOURCES})
+  add_library(waymark::${name} ALIAS waymark_${name})
+  target_link_libraries(waymark_${name} PUBLIC waymark_options ${MODULE_LINK})
+  if(WAYMARK_BUILD_TESTS AND MODULE_TESTS)
+    add_executable(waymark_${name}_test ${MODULE_TESTS})
+    target_link_libraries(waymark_${name}_test PRIVATE waymark_${name} ${MODULE_TEST_LINK}
+                          GTest::gmock_main)
+    gtest_discover_tests(waymark_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+                         PROPERTIES TIMEOUT 300 LABELS unit)
+  endif()
+endfunction()

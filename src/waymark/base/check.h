@@ -1,0 +1,37 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <stdexcept>
+#include <string>
+
+namespace waymark {
+
+/// Bad input from outside (file, setting, image, argument). The message reads
+/// "WHERE: what is wrong, what was expected" on one line.
+class InputError : public std::runtime_error {
+ public:
+  InputError(const std::string& where, const std::string& what)
+      : std::runtime_error(where + ": " + what) {}
+};
+
+/// The results cannot be written or the work cannot be finished; same form of message.
+class OutputError : public std::runtime_error {
+ public:
+  OutputError(const std::string& where, const std::string& what)
+      : std::runtime_error(where + ": " + what) {}
+};
+
+/// A broken promise of our own code.
+class CheckError : public std::logic_error {
+ public:
+  using std::logic_error::logic_error;
+};
+
+[[noreturn]] void fail_check(const char* condition, const char* file, int line);
+
+}  // namespace waymark
+
+/// Fails with a CheckError that names the condition and the place; active in every build.
+#define WAYMARK_CHECK(condition) \
+  ((condition) ? static_cast<void>(0) : ::waymark::fail_check(#condition, __FILE__, __LINE__))

@@ -1,0 +1,64 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <vector>
+
+namespace waymark {
+
+using Matrix23d = Eigen::Matrix<double, 2, 3>;
+using Matrix23f = Eigen::Matrix<float, 2, 3>;
+
+/// A central camera: maps points of its own frame (x right, y down, z forward, metres) to pixels,
+/// (0, 0) being the centre of the top-left pixel, and pixels to unit bearings. Works on whole
+/// arrays, so that the virtual call is paid once per array. Immutable, hence free to share.
+class Camera {
+ public:
+  virtual ~Camera() = default;
+
+  /// Name of the model as in settings files, for example "pinhole".
+  virtual std::string_view model() const = 0;
+
+  int width_px() const { return width_px_; }
+  int height_px() const { return height_px_; }
+
+  /// Projects points (any distance but 0). is_visible is 1 where the point lies in the model's
+  /// field of view and its pixel within the image, else 0 and the pixel is unspecified.
+  virtual void project(std::span<const Eigen::Vector3d> points_in_cam,
+                       std::span<Eigen::Vector2d> pixels,
+                       std::span<std::uint8_t> is_visible) const = 0;
+
+  /// As project, with the derivative of the pixel by the point, 2x3 in px/m.
+  virtual void project_with_jacobian(std::span<const Eigen::Vector3d> points_in_cam,
+                                     std::span<Eigen::Vector2d> pixels,
+                                     std::span<Matrix23d> pixel_from_point,
+                                     std::span<std::uint8_t> is_visible) const = 0;
+
+  /// Unit bearings of pixels; is_valid is 0 where a pixel has none (outside the image circle).
+  virtual void unproject(std::span<const Eigen::Vector2d> pixels,
+                         std::span<Eigen::Vector3d> bearings,
+                         std::span<std::uint8_t> is_valid) const = 0;
+
+  /// Width after which columns repeat (360 degree images), or 0.
+  virtual double wrap_width_px() const { return 0.0; }
+
+  /// Whether a pixel (of pixel centres) lies within the image.
+  bool contains(const Eigen::Vector2d& pixel) const {
+    return pixel.x() >= -0.5 && pixel.y() >= -0.5 && pixel.x() < width_px_ - 0.5 &&
+           pixel.y() < height_px_ - 0.5;
+  }
+
+ protected:
+  Camera(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
+
+ private:
+  int width_px_;
+  int height_px_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,24 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "waymark/camera/camera.h"
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// One camera of a rig. cam_from_rig is fixed; camera 0 is the rig's origin.
+struct RigCamera {
+  std::shared_ptr<const Camera> camera;
+  Rigid3 cam_from_rig;
+};
+
+/// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.
+struct Rig {
+  std::vector<RigCamera> cameras;
+};
+
+}  // namespace waymark
