@@ -1,0 +1,68 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <vector>
+
+#include "waymark/camera/rig.h"
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// One feature that sees one point.
+struct BundleObservation {
+  std::uint32_t pose = 0;                              ///< Index in BundleProblem::rig_from_world.
+  std::uint32_t point = 0;                             ///< Index in BundleProblem::points.
+  std::uint8_t camera = 0;                             ///< Index in the rig.
+  Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();  ///< Measured, unit, in the camera.
+  Matrix23f level_pixel_from_bearing = Matrix23f::Zero();  ///< W of Features.
+  float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
+  float inverse_range_sigma = 0.0f;  ///< 1/m; 0 where there is no measurement.
+};
+
+/// Poses and points in contiguous arrays, in the order of their ids, and what ties them.
+struct BundleProblem {
+  const Rig* rig = nullptr;
+  std::vector<Rigid3> rig_from_world;
+  std::vector<std::uint8_t> is_pose_fixed;      ///< Per pose.
+  std::vector<Eigen::Vector3d> points;          ///< In the world.
+  std::vector<BundleObservation> observations;  ///< Sorted by point.
+};
+
+enum class BundleSolver { kSchur, kCeres };
+
+struct BundleOptions {
+  BundleSolver solver = BundleSolver::kSchur;
+  /// Each round minimises with Huber's loss over the observations that passed the gate after the
+  /// round before (the first: over all), then every observation meets the gate again.
+  int num_rounds = 2;
+  int max_iterations_per_round = 10;
+  double huber_px = 2.0;  ///< Residual length where the loss turns linear; of ranges, in sigmas.
+  double gate_px = 2.45;  ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
+  /// A round ends early when an iteration lowers the cost by less than this part of it.
+  double relative_cost_tolerance = 1e-5;
+};
+
+struct BundleResult {
+  std::vector<std::uint8_t> is_outlier;  ///< Per observation, judged with the result.
+  double initial_cost = 0.0;  ///< Half the robust sum over all observations before the first round.
+  double final_cost = 0.0;    ///< The same over the observations of the last round, after it.
+  int num_iterations = 0;     ///< Of all rounds.
+};
+
+/// Bundle adjustment: moves the free poses and all points to minimise the robust sum of
+/// |W * (normalize(cam_from_rig * rig_from_world * point) - bearing)|^2, in pixels of each
+/// feature's level, and of ((1 / |point_in_cam| - inverse_range) / inverse_range_sigma)^2 where
+/// there is a range (a range is robust on its own and does not make an outlier). Writes poses and
+/// points back.
+///
+/// Gauge: the caller fixes poses; one where stereo or ranges give the scale, two in mono. With
+/// fewer the result is one of the equivalent ones, near the start, because the damping of
+/// Levenberg-Marquardt bounds motion along free directions. Points without observations stay; a
+/// point seen once moves onto its ray at about its distance. Observations that are not finite,
+/// or more than 90 degrees off, are outliers and pull nothing. Repeatable by bits.
+BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options);
+
+}  // namespace waymark
