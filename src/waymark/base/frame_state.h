@@ -1,0 +1,37 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string_view>
+
+namespace waymark {
+
+/// What became of one input frame.
+enum class FrameState {
+  kInitializing,  ///< Seen while the first map was not made yet.
+  kTracked,
+  kFilled,      ///< Got its pose after the fact, for example from before the initialisation.
+  kLost,        ///< No pose.
+  kUnreadable,  ///< The image could not be used.
+  kDropped,     ///< Skipped because it came too late.
+};
+
+/// Why a frame has no pose.
+enum class FrameReason {
+  kNone,
+  kNoFeatures,
+  kTooLittleParallax,
+  kTooFewMatches,
+  kTooFewInliers,
+  kNoCandidate,  ///< Relocalisation found no similar place.
+  kNotVerified,  ///< A similar place was found, but its geometry did not fit.
+  kUnreadableImage,
+  kWrongSize,
+  kLate,
+};
+
+/// Names as written to result files, for example "initializing", "too_few_matches".
+std::string_view to_string(FrameState state);
+std::string_view to_string(FrameReason reason);
+
+}  // namespace waymark
