@@ -1,0 +1,38 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <span>
+#include <vector>
+
+#include "waymark/base/settings.h"
+#include "waymark/image/features.h"
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+struct DepthSettings {
+  double factor = 1000.0;
+
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field(
+        "factor",
+        self.factor,
+        SettingInfo{
+            .low = 1.0, .high = 1e6, .unit = "1/m", .help = "Units of the depth image per metre."});
+  }
+};
+
+/// Range along its bearing of each keypoint, from a depth image that is registered to the camera
+/// (depth along z), and the standard deviation of the inverse range. Both are 0 where the image
+/// has no measurement. A corner at the edge of a surface belongs to the nearer side.
+void sample_depth(DepthView depth,
+                  const DepthSettings& settings,
+                  std::span<const Keypoint> keypoints,
+                  std::span<const Eigen::Vector3f> bearings,
+                  std::vector<float>& range_m,
+                  std::vector<float>& inverse_range_sigma);
+
+}  // namespace waymark

@@ -1,0 +1,57 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/camera/rig.h"
+#include "waymark/camera/tangent.h"
+#include "waymark/image/depth.h"
+#include "waymark/image/extractor.h"
+#include "waymark/image/features.h"
+#include "waymark/image/image.h"
+#include "waymark/image/pyramid.h"
+#include "waymark/image/stereo.h"
+
+namespace waymark {
+
+struct FrameSettings {
+  FeatureSettings features;
+  StereoSettings stereo;
+  DepthSettings depth;
+};
+
+/// The images of one moment. Borrowed for the call only.
+struct FrameImages {
+  ImageView image0;
+  ImageView image1;  ///< Empty unless stereo.
+  DepthView depth;   ///< Registered to image0; empty unless RGB-D.
+  ImageView mask;    ///< Of image0: features where it is not 0; may be empty.
+};
+
+/// What the stages of the last frame took.
+struct FrameTimes {
+  double features_ms = 0.0;  ///< Extraction and bearings of camera 0.
+  double depth_ms = 0.0;     ///< Stereo search with the pyramid of camera 1, or the depth image.
+};
+
+/// Turns images into the immutable data of a frame: extraction, tangents, stereo or depth. Keeps
+/// its buffers; what is new per frame is the result.
+class FrameBuilder {
+ public:
+  FrameBuilder(Rig rig, const FrameSettings& settings);
+
+  /// Throws InputError where the size of an image is not the camera's.
+  std::shared_ptr<const Features> build(const FrameImages& images);
+
+  const FrameTimes& times() const { return times_; }
+
+ private:
+  Rig rig_;
+  FrameSettings settings_;
+  FrameTimes times_;
+};
+
+}  // namespace waymark
