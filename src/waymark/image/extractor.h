@@ -1,0 +1,61 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "waymark/base/settings.h"
+#include "waymark/image/features.h"
+#include "waymark/image/image.h"
+#include "waymark/image/pyramid.h"
+
+namespace waymark {
+
+struct FeatureSettings {
+  int count = 1000;
+  int min_contrast = 7;
+
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field(
+        "count", self.count, SettingInfo{.low = 50, .high = 20000, .help = "Features per image."});
+    field("min_contrast",
+          self.min_contrast,
+          SettingInfo{.low = 1,
+                      .high = 100,
+                      .unit = "grey values",
+                      .help = "Corners with less contrast to their surroundings are ignored."});
+  }
+};
+
+/// Finds features: FAST corners (Rosten & Drummond 2006) on the levels of a pyramid, spread evenly
+/// over the image (Bailo et al. 2018), located to sub-pixel accuracy, oriented and described by
+/// rotated BRIEF (Rublee et al. 2011). Same image, same bits; nothing is carried over from one
+/// image to the next but buffers, so that nothing is allocated after the first image of a size.
+class FeatureExtractor {
+ public:
+  explicit FeatureExtractor(const FeatureSettings& settings);
+  ~FeatureExtractor();
+  FeatureExtractor(FeatureExtractor&&) noexcept;
+  FeatureExtractor& operator=(FeatureExtractor&&) noexcept;
+
+  /// Replaces the contents of keypoints and descriptors, which run in parallel, by the features of
+  /// the image, ordered by level, row and column. There are settings.count of them, fewer only
+  /// where the image has no more corners. The mask is empty or of the size of the image; there are
+  /// no features where it is 0. Throws InputError where the sizes differ.
+  void extract(ImageView image,
+               ImageView mask,
+               std::vector<Keypoint>& keypoints,
+               std::vector<Descriptor>& descriptors);
+
+  /// Levels of the last image.
+  const Pyramid& pyramid() const;
+
+ private:
+  struct Workspace;
+  FeatureSettings settings_;
+  std::unique_ptr<Workspace> workspace_;
+};
+
+}  // namespace waymark
