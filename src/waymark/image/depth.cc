@@ -1,0 +1,144 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/image/depth.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <optional>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// Structured light measures disparity with constant precision, so that the inverse depth has a
+/// constant standard deviation (1/m): equation 10 and section 5 of Khoshelham and Elberink 2012.
+constexpr double kSensorSigma = 1.43e-3;
+
+/// Depth images of structured light are jagged at edges by about this much.
+constexpr int kRadiusPx = 2;
+constexpr std::size_t kMaxSamples = (2 * kRadiusPx + 1) * (2 * kRadiusPx + 1);
+
+/// Fewer pixels than that are no surface but stray values.
+constexpr std::size_t kMinSurfacePixels = 3;
+
+/// Between neighbours on one surface the depth changes by less than this share, up to a slant of
+/// about 80 degrees at the resolution of usual sensors; by more where one surface ends.
+constexpr double kMaxRelativeStep = 0.02;
+
+/// Standard deviation of the position of a corner; turns slant into uncertainty.
+constexpr double kCornerSigmaPx = 0.5;
+
+struct Sample {
+  double inverse_depth;
+  double dx_px;  ///< From the keypoint.
+  double dy_px;
+};
+
+struct Neighbourhood {
+  std::array<Sample, kMaxSamples> samples;
+  std::size_t count = 0;
+};
+
+struct InverseDepth {
+  double value;
+  double sigma;
+};
+
+/// Measured pixels around the keypoint, the nearest surface first.
+Neighbourhood look_around(DepthView depth, double factor, const Keypoint& keypoint) {
+  Neighbourhood around;
+  const int center_x = static_cast<int>(std::lround(keypoint.x_px));
+  const int center_y = static_cast<int>(std::lround(keypoint.y_px));
+  const int last_y = std::min(center_y + kRadiusPx, depth.height_px - 1);
+  const int last_x = std::min(center_x + kRadiusPx, depth.width_px - 1);
+  for (int y = std::max(center_y - kRadiusPx, 0); y <= last_y; ++y) {
+    const std::uint16_t* row = depth.row(y);
+    for (int x = std::max(center_x - kRadiusPx, 0); x <= last_x; ++x) {
+      if (row[x] == 0) continue;
+      around.samples[around.count++] = {
+          factor / static_cast<double>(row[x]), x - keypoint.x_px, y - keypoint.y_px};
+    }
+  }
+  // Row-major order breaks ties, hence stable.
+  std::stable_sort(
+      around.samples.begin(),
+      around.samples.begin() + static_cast<std::ptrdiff_t>(around.count),
+      [](const Sample& a, const Sample& b) { return a.inverse_depth > b.inverse_depth; });
+  return around;
+}
+
+/// The samples of the nearest surface: from the nearest on, up to the first gap.
+std::span<const Sample> nearest_surface(const Neighbourhood& around) {
+  std::size_t begin = 0;
+  for (std::size_t i = 1; i <= around.count; ++i) {
+    const double nearer = around.samples[i - 1].inverse_depth;
+    const bool ends = i == around.count || nearer - around.samples[i].inverse_depth >
+                                               kMaxRelativeStep * nearer + 3.0 * kSensorSigma;
+    if (!ends) continue;
+    if (i - begin >= kMinSurfacePixels) return {around.samples.data() + begin, i - begin};
+    begin = i;
+  }
+  return {};
+}
+
+/// Inverse depth at the keypoint. A plane in space is a plane in inverse depth too; its slope times
+/// the uncertainty of the corner, and what the plane leaves over, add to the sensor's noise.
+/// Noise of neighbours is correlated, so that it does not average out.
+InverseDepth fit_surface(std::span<const Sample> surface, double quantum_m) {
+  const double count = static_cast<double>(surface.size());
+  Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+  for (const Sample& s : surface) mean += Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_depth);
+  mean /= count;
+  Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
+  for (const Sample& s : surface) {
+    const Eigen::Vector3d d = Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_depth) - mean;
+    scatter += d * d.transpose() / count;
+  }
+  // The prior keeps the slope of a surface seen along a line or by a few pixels only at zero.
+  constexpr double kPrior = 0.05;
+  const Eigen::Matrix2d normal =
+      scatter.topLeftCorner<2, 2>() + kPrior * Eigen::Matrix2d::Identity();
+  const Eigen::Vector2d slope = normal.ldlt().solve(scatter.topRightCorner<2, 1>());
+  const double left_over = std::max(0.0, scatter(2, 2) - slope.dot(scatter.topRightCorner<2, 1>()));
+
+  const double value = mean.z() - slope.dot(mean.head<2>());
+  const double quantum_sigma = quantum_m * value * value / std::sqrt(12.0);
+  const double variance = kSensorSigma * kSensorSigma + quantum_sigma * quantum_sigma + left_over +
+                          slope.squaredNorm() * kCornerSigmaPx * kCornerSigmaPx;
+  return {value, std::sqrt(variance)};
+}
+
+std::optional<InverseDepth> measure(DepthView depth, double factor, const Keypoint& keypoint) {
+  const Neighbourhood around = look_around(depth, factor, keypoint);
+  const std::span<const Sample> surface = nearest_surface(around);
+  if (surface.empty()) return std::nullopt;
+  const InverseDepth fitted = fit_surface(surface, 1.0 / factor);
+  if (!(fitted.value > 0.0)) return std::nullopt;
+  return fitted;
+}
+
+}  // namespace
+
+void sample_depth(DepthView depth,
+                  const DepthSettings& settings,
+                  std::span<const Keypoint> keypoints,
+                  std::span<const Eigen::Vector3f> bearings,
+                  std::vector<float>& range_m,
+                  std::vector<float>& inverse_range_sigma) {
+  WAYMARK_CHECK(bearings.size() == keypoints.size());
+  range_m.assign(keypoints.size(), 0.0f);
+  inverse_range_sigma.assign(keypoints.size(), 0.0f);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const double z_per_range = bearings[i].z();
+    if (z_per_range <= 0.0) continue;
+    const std::optional<InverseDepth> inverse = measure(depth, settings.factor, keypoints[i]);
+    if (!inverse) continue;
+    range_m[i] = static_cast<float>(1.0 / (inverse->value * z_per_range));
+    inverse_range_sigma[i] = static_cast<float>(inverse->sigma * z_per_range);
+  }
+}
+
+}  // namespace waymark
