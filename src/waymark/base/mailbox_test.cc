@@ -1,0 +1,74 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/base/mailbox.h"
+
+#include <gmock/gmock.h>
+
+#include <memory>
+#include <thread>
+#include <vector>
+
+namespace waymark {
+namespace {
+
+TEST(Mailbox, KeepsTheOrder) {
+  Mailbox<std::unique_ptr<int>> mailbox(3);
+  for (int i = 0; i < 3; ++i) EXPECT_TRUE(mailbox.push(std::make_unique<int>(i)));
+  EXPECT_EQ(mailbox.size(), 3u);
+  for (int i = 0; i < 3; ++i) EXPECT_EQ(**mailbox.pop(), i);
+  EXPECT_EQ(mailbox.size(), 0u);
+}
+
+TEST(Mailbox, DrainsAfterClosing) {
+  Mailbox<int> mailbox(2);
+  mailbox.push(1);
+  mailbox.close();
+  EXPECT_FALSE(mailbox.push(2));
+  EXPECT_EQ(mailbox.pop(), 1);
+  EXPECT_EQ(mailbox.pop(), std::nullopt);
+}
+
+TEST(Mailbox, ClosingFreesAWaitingWriterAndReader) {
+  Mailbox<int> full(1), empty(1);
+  full.push(1);
+  bool was_accepted = true;
+  std::optional<int> received = 1;
+  std::jthread writer([&] { was_accepted = full.push(2); });
+  std::jthread reader([&] { received = empty.pop(); });
+  full.close();
+  empty.close();
+  writer.join();
+  reader.join();
+  EXPECT_FALSE(was_accepted);
+  EXPECT_EQ(received, std::nullopt);
+}
+
+TEST(Mailbox, NoMessageIsLostOrDoubledBetweenThreads) {
+  constexpr int kNumWriters = 3, kNumMessages = 500;
+  Mailbox<int> mailbox(4);
+  std::vector<std::vector<int>> received(2);
+  std::vector<std::jthread> readers, writers;
+  for (std::vector<int>& mine : received) {
+    readers.emplace_back([&mailbox, &mine] {
+      while (const std::optional<int> message = mailbox.pop()) mine.push_back(*message);
+    });
+  }
+  for (int writer = 0; writer < kNumWriters; ++writer) {
+    writers.emplace_back([&mailbox, writer] {
+      for (int i = 0; i < kNumMessages; ++i) mailbox.push(writer * kNumMessages + i);
+    });
+  }
+  writers.clear();
+  mailbox.close();
+  readers.clear();
+  std::vector<int> all = received[0];
+  all.insert(all.end(), received[1].begin(), received[1].end());
+  std::sort(all.begin(), all.end());
+  ASSERT_EQ(all.size(), static_cast<std::size_t>(kNumWriters * kNumMessages));
+  for (std::size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all[i], static_cast<int>(i));
+}
+
+TEST(Mailbox, NeedsRoom) { EXPECT_THROW(Mailbox<int>(0), CheckError); }
+
+}  // namespace
+}  // namespace waymark
