@@ -1,0 +1,28 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+
+namespace CLI {
+class App;
+}
+
+namespace waymark {
+
+/// What a parsed command line is to do; returns the exit status.
+using Command = std::function<int()>;
+
+/// Each adds one subcommand with its options and, once parsed, leaves in command what to do.
+void add_run_command(CLI::App& program, Command& command);
+void add_eval_command(CLI::App& program, Command& command);
+void add_simulate_command(CLI::App& program, Command& command);
+void add_config_command(CLI::App& program, Command& command);
+
+/// Exit status of the program.
+inline constexpr int kDone = 0;
+inline constexpr int kCouldNotFinish = 1;  ///< Internal failure, or output cannot be written.
+inline constexpr int kBadInput = 2;        ///< Bad usage, settings or input.
+inline constexpr int kNoPose = 3;          ///< Ran, but found no pose at all.
+
+}  // namespace waymark

@@ -1,0 +1,35 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "interrupt.h"
+
+#include <signal.h>
+#include <unistd.h>
+
+namespace waymark {
+namespace {
+
+constexpr int kInterruptedStatus = 130;
+
+// The only global of the program: a signal handler can reach nothing else.
+volatile sig_atomic_t interrupted = 0;
+
+extern "C" void handle_interrupt(int) {
+  if (interrupted) _exit(kInterruptedStatus);
+  interrupted = 1;
+}
+
+}  // namespace
+
+void catch_interrupts() {
+  struct sigaction action = {};
+  action.sa_handler = handle_interrupt;
+  action.sa_flags = SA_RESTART;
+  sigaction(SIGINT, &action, nullptr);
+  sigaction(SIGTERM, &action, nullptr);
+  // Without this a file size limit would kill the program; with it the write fails and is reported.
+  signal(SIGXFSZ, SIG_IGN);
+}
+
+bool is_interrupted() { return interrupted != 0; }
+
+}  // namespace waymark

@@ -1,0 +1,64 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// The command line: one program, a subcommand per task. Exit status and form of errors are the same
+// for all of them.
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+#include <string>
+
+#include "commands.h"
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// One line, whatever the message holds.
+int fail(int status, std::string message) {
+  std::replace(message.begin(), message.end(), '\n', ' ');
+  fmt::print(stderr, "error: {}\n", message);
+  return status;
+}
+
+int run_program(int argc, char** argv) {
+  CLI::App program("Waymark: visual SLAM for any camera.", "waymark");
+  program.require_subcommand(1);
+  program.set_version_flag("--version", std::string("waymark ") + WAYMARK_VERSION);
+  program.get_formatter()->column_width(34);
+
+  Command command;
+  add_run_command(program, command);
+  add_eval_command(program, command);
+  add_simulate_command(program, command);
+  add_config_command(program, command);
+
+  try {
+    program.parse(argc, argv);
+  } catch (const CLI::Success& help_or_version) {
+    return program.exit(help_or_version);
+  } catch (const CLI::ParseError& error) {
+    return fail(kBadInput, fmt::format("command line: {}, see waymark --help", error.what()));
+  }
+  return command();
+}
+
+}  // namespace
+}  // namespace waymark
+
+int main(int argc, char** argv) {
+  try {
+    return waymark::run_program(argc, argv);
+  } catch (const waymark::InputError& error) {
+    return waymark::fail(waymark::kBadInput, error.what());
+  } catch (const waymark::OutputError& error) {
+    return waymark::fail(waymark::kCouldNotFinish, error.what());
+  } catch (const std::bad_alloc&) {
+    return waymark::fail(waymark::kCouldNotFinish, "waymark: out of memory");
+  } catch (const std::exception& error) {
+    return waymark::fail(waymark::kCouldNotFinish, fmt::format("waymark: internal failure: {}", error.what()));
+  }
+}

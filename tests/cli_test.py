@@ -1,0 +1,240 @@
+#!/usr/bin/python3
+# Copyright the Waymark authors.
+# SPDX-License-Identifier: Apache-2.0
+"""The contract of the command line: inputs, outputs, exit status, one-line errors."""
+import resource
+import shutil
+import signal
+import subprocess
+import time
+import unittest
+
+from cli_support import NUM_FRAMES, PROGRAM, CliTest, png_size, truncate, waymark, write_png
+
+
+class Usage(CliTest):
+    def test_help_is_complete(self):
+        top = waymark("--help")
+        self.assertEqual(top.returncode, 0)
+        for command in ("run", "eval", "simulate", "config"):
+            self.assertIn(command, top.stdout)
+            self.assertEqual(waymark(command, "--help").returncode, 0)
+        text = waymark("run", "--help").stdout
+        for option in ("--config", "--set", "--setup", "--out", "--timing", "--first", "--frames",
+                       "--every", "--mask", "--seed", "--quiet", "--verbose", "--log", "--format"):
+            self.assertIn(option, text)
+
+    def test_wrong_usage(self):
+        self.assert_fails(waymark(), 2)
+        self.assert_fails(waymark("fly"), 2, "fly")
+        self.assert_fails(waymark("run"), 2, "INPUT")
+        self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
+        self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
+        self.assert_fails(waymark("run", self.folder, "--every", "0"), 2, "--every")
+
+    def test_settings_are_printed_and_checked(self):
+        printed = waymark("config")
+        self.assertEqual(printed.returncode, 0)
+        for words in ("features", "count", "1000"):
+            self.assertIn(words, printed.stdout)
+        # What is printed is itself a valid file.
+        self.assertEqual(waymark("config", self.config(printed.stdout)).returncode, 0)
+        self.assert_fails(waymark("config", self.config("features: {count: -5}\n")), 2, "count")
+        self.assert_fails(waymark("config", self.config("features: {count: many}\n")), 2, "count")
+
+
+class Inputs(CliTest):
+    def assert_maps(self, source, *arguments):
+        done = self.run_on(source, *arguments)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = self.summary()
+        self.assertEqual(summary["frames"], NUM_FRAMES)
+        self.assertGreater(summary["coverage"], 0.5)
+        return summary
+
+    def test_euroc_needs_no_calibration(self):
+        summary = self.assert_maps(self.sequence("stereo"))
+        self.assertEqual(summary["setup"], "stereo")
+
+    def test_one_camera_of_a_pair(self):
+        done = self.run_on(self.sequence("stereo"), "--setup", "mono")
+        self.assertIn(done.returncode, (0, 3), done.stderr)
+        self.assertEqual(self.summary()["setup"], "mono")
+
+    def test_tum(self):
+        source = self.sequence("rgbd")
+        self.assert_fails(self.run_on(source), 2, "-c")
+        summary = self.assert_maps(source, "-c", source / "camchain.yaml")
+        self.assertEqual(summary["setup"], "rgbd")
+
+    def test_image_folder(self):
+        source = self.image_folder()
+        done = self.run_on(source, "-c", self.folder / "camchain.yaml")
+        self.assertIn(done.returncode, (0, 3), done.stderr)
+        self.assertEqual(self.summary()["frames"], NUM_FRAMES)
+
+    def test_video(self):
+        source, video = self.image_folder(), self.folder / "walk.mkv"
+        subprocess.run(["ffmpeg", "-v", "error", "-framerate", "20", "-i", source / "%06d.png",
+                        "-c:v", "ffv1", video], check=True)
+        done = self.run_on(video, "-c", self.folder / "camchain.yaml")
+        self.assertIn(done.returncode, (0, 3), done.stderr)
+        self.assertEqual(self.summary()["frames"], NUM_FRAMES)
+
+    def test_part_of_an_input(self):
+        done = self.run_on(self.sequence("stereo"), "--first", 4, "--frames", 6, "--every", 2)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual([int(f["index"]) for f in self.frames()], [4, 6, 8, 10, 12, 14])
+        self.assertEqual(self.summary()["frames"], 6)
+
+
+class Outputs(CliTest):
+    def test_files_agree(self):
+        self.assertEqual(self.run_on(self.sequence("stereo"), "--seed", 3).returncode, 0)
+        summary, frames = self.summary(), self.frames()
+        lines = (self.out / "trajectory.txt").read_text().strip().split("\n")
+        has_pose = [f for f in frames if f["state"] in ("tracked", "filled")]
+        self.assertEqual(len(frames), NUM_FRAMES)
+        self.assertEqual(summary["tracked"], len(has_pose))
+        self.assertEqual(len(lines), len(has_pose))
+        self.assertAlmostEqual(summary["coverage"], len(lines) / NUM_FRAMES, places=6)
+        for line, frame in zip(lines, has_pose):
+            seconds, *pose = line.split()
+            self.assertEqual(round(float(seconds.split(".")[0]) * 10**9) +
+                             int(seconds.split(".")[1]), int(frame["timestamp_ns"]))
+            self.assertEqual(len(seconds.split(".")[1]), 9)
+            self.assertEqual(len(pose), 7)
+        keyframes = (self.out / "keyframes.txt").read_text().strip().split("\n")
+        self.assertEqual(len(keyframes), summary["keyframes"])
+        self.assertTrue(set(keyframes) <= set(lines))
+        self.assertEqual((summary["seed"], summary["timing"]), (3, "lockstep"))
+        for key in ("filled", "unreadable", "dropped", "initialized_at", "lost_count", "landmarks",
+                    "submaps", "loops", "relocalizations", "wall_s", "cpu_s", "peak_rss_mb",
+                    "tracking_ms", "mapping_ms", "stages_ms", "setup", "version"):
+            self.assertIn(key, summary)
+        self.assertEqual(set(summary["tracking_ms"]), {"mean", "median", "p95", "max"})
+
+    def test_eval_reads_what_run_wrote(self):
+        source, plot = self.sequence("stereo"), self.folder / "plot.svg"
+        self.assertEqual(self.run_on(source).returncode, 0)
+        done = waymark("eval", self.out / "trajectory.txt", source / "groundtruth.txt",
+                       "--align", "se3", "--json", "--plot", plot)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("ate_rmse_m", done.stdout)
+        self.assertIn("<svg", plot.read_text())
+
+    def test_interrupt_finishes_early_and_saves(self):
+        process = subprocess.Popen([PROGRAM, "run", self.sequence("stereo"), "-o", self.out,
+                                    "--verbose"], stderr=subprocess.PIPE, text=True)
+        for line in process.stderr:  # --verbose has a line per frame.
+            if "frame 3" in line:
+                break
+        process.send_signal(signal.SIGINT)
+        process.stderr.read()
+        self.assertEqual(process.wait(timeout=120), 0)
+        self.assertLess(self.summary()["frames"], NUM_FRAMES)
+        self.assertTrue((self.out / "trajectory.txt").exists())
+
+
+class BadInput(CliTest):
+    def test_missing_folder(self):
+        self.assert_fails(self.run_on(self.folder / "nowhere"), 2, "nowhere")
+
+    def test_folder_without_images(self):
+        empty = self.folder / "empty"
+        empty.mkdir()
+        self.assert_fails(self.run_on(empty), 2, "empty")
+
+    def assert_skips(self, source, index, reason):
+        done = self.run_on(source)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        row = self.frames()[index]
+        self.assertEqual((row["state"], row["reason"]), ("unreadable", reason))
+        self.assertEqual(self.summary()["unreadable"], 1)
+        self.assertEqual(self.summary()["frames"], NUM_FRAMES)
+        self.assertIn("unreadable", done.stderr)
+
+    def test_truncated_image_is_skipped_and_counted(self):
+        source = self.sequence("stereo")
+        truncate(self.images(source)[9])
+        self.assert_skips(source, 9, "unreadable_image")
+
+    def test_image_of_another_size_is_skipped_and_counted(self):
+        source = self.sequence("stereo")
+        write_png(self.images(source)[9], 64, 48)
+        self.assert_skips(source, 9, "wrong_size")
+
+    def test_first_image_contradicts_the_calibration(self):
+        source = self.image_folder()
+        for image in source.glob("*.png"):
+            write_png(image, 64, 48)
+        self.assert_fails(self.run_on(source, "-c", self.folder / "camchain.yaml"), 2, "64")
+
+    def test_resolution_contradicts_the_images(self):
+        source = self.image_folder()
+        width, height = png_size(source / "000000.png")
+        chain = (self.folder / "camchain.yaml").read_text()
+        wrong = chain.replace(str(width), str(width + 2))
+        self.assertNotEqual(wrong, chain)
+        done = self.run_on(source, "-c", self.config(wrong))
+        self.assert_fails(done, 2, width, width + 2)
+
+    def test_unequal_counts_of_a_pair(self):
+        source = self.sequence("stereo")
+        right = source / "mav0/cam1"
+        rows = (right / "data.csv").read_text().rstrip("\n").split("\n")
+        (right / "data.csv").write_text("\n".join(rows[:-3]) + "\n")
+        self.assert_fails(self.run_on(source), 2)
+
+    def test_empty_times(self):
+        source = self.image_folder()
+        (source / "times.txt").write_text("")
+        done = self.run_on(source, "-c", self.folder / "camchain.yaml")
+        self.assert_fails(done, 2, "times.txt")
+
+    def test_nan_in_the_calibration(self):
+        source = self.image_folder()
+        bad = self.config("cam0:\n  camera_model: pinhole\n  intrinsics: [.nan, 458, 367, 248]\n"
+                          "  distortion_model: none\n  resolution: [752, 480]\n")
+        self.assert_fails(self.run_on(source, "-c", bad), 2, "intrinsics")
+
+    def test_unknown_key_names_the_nearest(self):
+        bad = self.config("tracking:\n  minimum_matchs: 3\n")
+        self.assert_fails(self.run_on(self.sequence("stereo"), "-c", bad), 2,
+                          "tracking.minimum_matchs", "tracking.min")
+        self.assert_fails(self.run_on(self.folder / "input_stereo", "--set",
+                                      "features.cuont=900"), 2, "features.cuont", "features.count")
+
+    def test_missing_config(self):
+        done = self.run_on(self.sequence("stereo"), "-c", self.folder / "no.yaml")
+        self.assert_fails(done, 2, "no.yaml")
+
+    def test_no_pose_at_all(self):
+        source = self.image_folder()
+        width, height = png_size(source / "000000.png")
+        for image in source.glob("*.png"):
+            write_png(image, width, height)
+        done = self.run_on(source, "-c", self.folder / "camchain.yaml")
+        self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertEqual(self.summary()["tracked"], 0)
+        self.assertIsNone(self.summary()["initialized_at"])
+        self.assertEqual({f["reason"] for f in self.frames()}, {"no_features"})
+
+
+class BadOutput(CliTest):
+    def test_full_disk(self):
+        def no_room():
+            resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
+        done = self.run_on(self.sequence("stereo"), preexec_fn=no_room)
+        self.assert_fails(done, 1, str(self.out))
+
+    def test_a_file_in_the_way(self):
+        self.out.write_text("")
+        done = self.run_on(self.sequence("stereo"))
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertIn("error: ", done.stderr)
+        self.assertTrue(self.out.is_file())
+
+
+if __name__ == "__main__":
+    unittest.main()
