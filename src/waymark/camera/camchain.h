@@ -1,0 +1,46 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/base/config.h"
+#include "waymark/camera/registry.h"
+#include "waymark/camera/rig.h"
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// A camera of a chain; camera 0 is the rig's origin.
+struct ChainCamera {
+  CameraDescription description;
+  Rigid3 cam_from_rig;
+};
+
+/// The calibration of a rig, as written: cameras are made of it by make_rig().
+struct CameraChain {
+  std::vector<ChainCamera> cameras;
+  std::optional<double> depth_factor;  ///< Units of the depth image per metre.
+  std::vector<std::string> notes;      ///< What was ignored, each with its place.
+};
+
+/// Reads cam0, cam1, ... and depth of a document in the format of Kalibr's camchain files; nothing
+/// if it has no camera. Other keys at the top belong to settings. Throws InputError for what is
+/// malformed, with its line; models and their numbers are checked by make_rig().
+std::optional<CameraChain> read_camchain(const ConfigNode& config);
+
+/// Makes the cameras. Throws InputError for what a model refuses.
+Rig make_rig(const CameraChain& chain,
+             const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
+/// A rigid motion from a 4x4 matrix of a file: InputError at `where` unless the rotation is
+/// orthonormal within 1e-3 (it is then made so exactly) and the last row is 0 0 0 1.
+Rigid3 rigid_from_matrix(const Eigen::Matrix4d& matrix,
+                         const std::string& where,
+                         std::string_view name);
+
+}  // namespace waymark

@@ -1,0 +1,58 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <functional>
+#include <map>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/camera/camera.h"
+
+namespace waymark {
+
+/// A camera in words and numbers, as settings and map files hold it.
+struct CameraDescription {
+  std::string camera_model;        ///< "pinhole" or the name of another registered model.
+  std::vector<double> intrinsics;  ///< For pinhole fu fv pu pv, in pixels.
+  std::string distortion_model = "none";
+  std::vector<double> distortion_coeffs;
+  int width_px = 0;
+  int height_px = 0;
+  std::string where;  ///< Begins error messages, for example "camchain.yaml:3".
+
+  /// InputError at `where`, for factories.
+  [[noreturn]] void fail(const std::string& what) const;
+};
+
+/// Makes the camera that was described, or throws InputError (description.fail()) that says what is
+/// wrong and what was expected.
+using CameraFactory = std::function<std::shared_ptr<const Camera>(const CameraDescription&)>;
+
+/// The camera models that descriptions may name. A value: extend a copy and hand it on.
+class CameraRegistry {
+ public:
+  /// The models of this library: pinhole.
+  static CameraRegistry with_builtin_models();
+
+  /// Adds a model; its name must be new.
+  void add(std::string name, CameraFactory factory);
+
+  /// Checks what all models share (resolution, finite numbers) and calls the model's factory.
+  std::shared_ptr<const Camera> make_camera(const CameraDescription& description) const;
+
+ private:
+  std::map<std::string, CameraFactory, std::less<>> factories_;
+};
+
+/// For factories: InputError unless the numbers of intrinsics and distortion coefficients are
+/// right. `names` lists the intrinsics, for example "fu fv pu pv".
+void expect_intrinsics(const CameraDescription& description, std::string_view names);
+void expect_no_distortion(const CameraDescription& description);
+
+/// For factories: InputError unless almost every pixel of the image has a direction.
+void expect_valid_image(const CameraDescription& description, const Camera& camera);
+
+}  // namespace waymark
