@@ -26,8 +26,6 @@ void catch_interrupts() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
-  // Without this a file size limit would kill the program; with it the write fails and is reported.
-  signal(SIGXFSZ, SIG_IGN);
 }
 
 bool is_interrupted() { return interrupted != 0; }

@@ -4,6 +4,7 @@
 // The command line: one program, a subcommand per task. Exit status and form of errors are the same
 // for all of them.
 #include <fmt/format.h>
+#include <signal.h>
 
 #include <CLI/CLI.hpp>
 #include <algorithm>
@@ -50,6 +51,8 @@ int run_program(int argc, char** argv) {
 }  // namespace waymark
 
 int main(int argc, char** argv) {
+  // A file size limit would end the program; without the signal the write fails and is reported.
+  signal(SIGXFSZ, SIG_IGN);
   try {
     return waymark::run_program(argc, argv);
   } catch (const waymark::InputError& error) {
@@ -59,6 +62,7 @@ int main(int argc, char** argv) {
   } catch (const std::bad_alloc&) {
     return waymark::fail(waymark::kCouldNotFinish, "waymark: out of memory");
   } catch (const std::exception& error) {
-    return waymark::fail(waymark::kCouldNotFinish, fmt::format("waymark: internal failure: {}", error.what()));
+    return waymark::fail(waymark::kCouldNotFinish,
+                         fmt::format("waymark: internal failure: {}", error.what()));
   }
 }

@@ -1,0 +1,50 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <memory>
+#include <vector>
+
+#include "commands.h"
+#include "waymark/base/config.h"
+#include "waymark/camera/camchain.h"
+#include "waymark/system/settings.h"
+
+namespace waymark {
+namespace {
+
+int print_settings() {
+  fmt::print("{}", settings_as_yaml(Settings()));
+  return kDone;
+}
+
+int check_settings(const std::vector<std::filesystem::path>& files) {
+  std::vector<ConfigSource> sources;
+  for (const std::filesystem::path& file : files) sources.push_back(ConfigSource::from_file(file));
+  const ConfigNode config = merge_configs(sources);
+  Settings settings;
+  read_settings(settings, config);
+  std::size_t num_cameras = 0;
+  if (const std::optional<CameraChain> chain = read_camchain(config)) {
+    num_cameras = make_rig(*chain).cameras.size();
+    for (const std::string& note : chain->notes) fmt::print("note: {}\n", note);
+  }
+  fmt::print("valid: {} cameras\n", num_cameras);
+  return kDone;
+}
+
+}  // namespace
+
+void add_config_command(CLI::App& program, Command& command) {
+  const auto files = std::make_shared<std::vector<std::filesystem::path>>();
+  CLI::App& config = *program.add_subcommand(
+      "config", "Check settings files; without FILE print all settings with default, range, help");
+  config.add_option("FILE", *files, "YAML files with cameras and settings, later ones override");
+  config.callback([files, &command] {
+    command = [files] { return files->empty() ? print_settings() : check_settings(*files); };
+  });
+}
+
+}  // namespace waymark

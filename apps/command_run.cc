@@ -1,0 +1,155 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "choice_option.h"
+#include "commands.h"
+#include "interrupt.h"
+#include "reporter.h"
+#include "session.h"
+#include "session_options.h"
+#include "waymark/base/frame_state.h"
+#include "waymark/io/atomic_file.h"
+#include "waymark/io/decode.h"
+
+namespace waymark {
+namespace {
+
+struct RunOptions {
+  SessionOptions session;
+  std::filesystem::path out = "waymark-out";
+  std::filesystem::path log;
+  bool is_quiet = false;
+  bool is_verbose = false;
+
+  Verbosity verbosity() const {
+    if (is_quiet) return Verbosity::kQuiet;
+    return is_verbose ? Verbosity::kVerbose : Verbosity::kNormal;
+  }
+};
+
+FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
+  return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
+             const FrameRecord& frame) mutable {
+    const bool has_reason = frame.reason != FrameReason::kNone;
+    const std::string state = fmt::format("{}{}{}",
+                                          to_string(frame.state),
+                                          has_reason ? ": " : "",
+                                          has_reason ? to_string(frame.reason) : "");
+    if (frame.state == FrameState::kUnreadable) {
+      reporter.warning(fmt::format("frame {}: {}, skipped", frame.index, state));
+    }
+    reporter.detail(fmt::format("frame {}: {}, {} inliers of {} matches",
+                                frame.index,
+                                state,
+                                frame.num_inliers,
+                                frame.num_matches));
+    reporter.progress(++num_done, total, to_string(frame.state));
+  };
+}
+
+void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
+  const RunSummary& summary = results.summary;
+  const FrameCounts& counts = summary.counts;
+  reporter.info(
+      fmt::format("{} of {} frames have a pose ({} unreadable), lost {} times; {} keyframes, "
+                  "{} landmarks, {} sub-maps",
+                  counts.tracked,
+                  counts.frames,
+                  counts.unreadable,
+                  counts.lost_count,
+                  summary.keyframes,
+                  summary.landmarks,
+                  summary.submaps));
+  const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
+  reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
+                            format_duration(summary.wall_s),
+                            1e3 * summary.wall_s / num_frames,
+                            summary.tracking_ms.mean,
+                            options.out.string()));
+}
+
+int run(const RunOptions& options) {
+  silence_image_library();
+  Reporter reporter(options.verbosity(), options.log);
+  Session session = open_session(options.session);
+  for (const std::string& line : session.description) reporter.info(line);
+  make_output_folder(options.out);
+
+  catch_interrupts();
+  SessionResults results = run_session(*session.input,
+                                       *session.system,
+                                       is_interrupted,
+                                       report_frames(reporter, session.input->info()));
+  reporter.finish_progress();
+  results.summary.setup = to_string(session.input->info().setup);
+  results.summary.timing = to_string(options.session.timing);
+  results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
+  results.summary.version = WAYMARK_VERSION;
+  write_results(options.out, results);
+  report_results(reporter, results, options);
+  return results.summary.counts.tracked == 0 ? kNoPose : kDone;
+}
+
+void add_input_options(CLI::App& command, SessionOptions& options) {
+  command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
+      ->required();
+  command
+      .add_option("-c,--config",
+                  options.configs,
+                  "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
+                  "files override")
+      ->allow_extra_args(false);
+  command
+      .add_option(
+          "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500")
+      ->allow_extra_args(false);
+  command
+      .add_option("--format",
+                  options.reading.format,
+                  "Layout of INPUT: euroc, kitti, tum, images or video [recognised]")
+      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video"}));
+  add_choice<std::optional<Setup>>(
+      command,
+      "--setup",
+      options.reading.setup,
+      {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
+      "mono, stereo or rgbd [all that INPUT offers]");
+  command.add_option("--first", options.reading.first, "Index of the first frame to use [0]")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--frames", options.reading.frames, "Use at most so many frames [all]")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--every", options.reading.every, "Use each N-th frame [1]")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--mask",
+                     options.reading.mask,
+                     "Mask image, or a folder with one per frame by name; black is not used");
+}
+
+}  // namespace
+
+void add_run_command(CLI::App& program, Command& command) {
+  const auto options = std::make_shared<RunOptions>();
+  CLI::App& run_command = *program.add_subcommand("run", "Map INPUT; write results to --out");
+  add_input_options(run_command, options->session);
+  run_command.add_option("-o,--out", options->out, "Folder for the results")->capture_default_str();
+  add_choice<Timing>(run_command,
+                     "--timing",
+                     options->session.timing,
+                     {{"inline", Timing::kInline}, {"lockstep", Timing::kLockstep}},
+                     "inline (one thread) or lockstep (threads, same results) [lockstep]");
+  run_command.add_option("--seed", options->session.seed, "Seed of all random numbers [0]")
+      ->check(CLI::Range(0, 1000000000));
+  CLI::Option& quiet = *run_command.add_flag("--quiet", options->is_quiet, "Errors only");
+  run_command.add_flag("--verbose", options->is_verbose, "A line per frame")->excludes(&quiet);
+  run_command.add_option("--log", options->log, "Write all messages to this file, too");
+  run_command.callback([options, &command] { command = [options] { return run(*options); }; });
+}
+
+}  // namespace waymark

@@ -1,0 +1,45 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string_view>
+#include <vector>
+
+#include "waymark/io/input.h"
+#include "waymark/io/results.h"
+#include "waymark/io/trajectory.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// Everything a session leaves behind.
+struct SessionResults {
+  FrameTable table;  ///< A row per input frame, in order.
+  /// One trajectory per sub-map, that with most frames first; world_from_camera0.
+  std::vector<std::vector<StampedPose>> trajectories;
+  std::vector<StampedPose> keyframes;  ///< Those of the first trajectory.
+  RunSummary summary;
+};
+
+/// Hears of each frame once it is done.
+using FrameObserver = std::function<void(const FrameRecord&)>;
+
+/// Feeds an input to a system until it ends or should_stop() says so, finishes the system and
+/// collects the results. Frames with a fault are not fed, but have their row. setup, timing, seed
+/// and version of the summary are left to the caller.
+SessionResults run_session(Input& input,
+                           System& system,
+                           const std::function<bool()>& should_stop,
+                           const FrameObserver& observer);
+
+/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json; throws
+/// OutputError.
+void write_results(const std::filesystem::path& folder, const SessionResults& results);
+
+/// "inline", "lockstep", "realtime".
+std::string_view to_string(Timing timing);
+
+}  // namespace waymark

@@ -1,0 +1,40 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "waymark/base/timing.h"
+#include "waymark/io/input.h"
+#include "waymark/system/settings.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// What the command line says about a session.
+struct SessionOptions {
+  std::filesystem::path input;
+  std::vector<std::filesystem::path> configs;  ///< Cameras and settings, later ones override.
+  std::vector<std::string> assignments;        ///< KEY=VALUE, override the files.
+  InputOptions reading;                        ///< The calibration is filled in.
+  Timing timing = Timing::kLockstep;
+  std::optional<int> seed;  ///< Overrides the settings.
+};
+
+/// An input and the system to feed it to.
+struct Session {
+  std::unique_ptr<Input> input;
+  Settings settings;
+  std::unique_ptr<System> system;
+  std::vector<std::string> description;  ///< What was understood, in words.
+};
+
+/// Reads the configuration, opens the input and makes the system for its cameras. Throws
+/// InputError.
+Session open_session(const SessionOptions& options);
+
+}  // namespace waymark
