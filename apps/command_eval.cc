@@ -53,11 +53,13 @@ void add_eval_command(CLI::App& program, Command& command) {
       ->required();
   eval.add_option("GROUNDTRUTH", options->groundtruth, "True trajectory (same formats)")
       ->required();
-  eval.add_option("--align", options->alignment, "se3, sim3 (free scale, for mono) or none [se3]")
-      ->transform(CLI::CheckedTransformer(
-          std::map<std::string, TrajectoryAlignment>{{"se3", TrajectoryAlignment::kSe3},
-                                                     {"sim3", TrajectoryAlignment::kSim3},
-                                                     {"none", TrajectoryAlignment::kNone}}));
+  add_choice<TrajectoryAlignment>(eval,
+                                  "--align",
+                                  options->alignment,
+                                  {{"se3", TrajectoryAlignment::kSe3},
+                                   {"sim3", TrajectoryAlignment::kSim3},
+                                   {"none", TrajectoryAlignment::kNone}},
+                                  "se3, sim3 (free scale, for mono) or none [se3]");
   eval.add_flag("--json", options->is_json, "Print one JSON object");
   eval.add_option("--plot", options->plot, "Draw both trajectories and the error to an SVG file");
   eval.callback(
