@@ -1,0 +1,98 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <benchmark/benchmark.h>
+
+#include "waymark/optimize/bundle.h"
+#include "waymark/optimize/pose.h"
+#include "waymark/optimize/test_scene.h"
+
+namespace waymark {
+namespace {
+
+/// Arguments: observations, outliers in percent, prediction error in mrad.
+void optimize_pose_of_frame(benchmark::State& state) {
+  const auto scene =
+      testing::make_pose_scene({.num_observations = static_cast<std::size_t>(state.range(0)),
+                                .noise_px = 0.8,
+                                .share_of_outliers = static_cast<double>(state.range(1)) / 100.0},
+                               1);
+  Rng rng(1, 2);
+  const double error = 1e-3 * static_cast<double>(state.range(2));
+  const Rigid3 initial =
+      Rigid3::exp(testing::random_tangent(rng, error, error)) * scene.rig_from_world;
+  PoseWorkspace workspace;
+  int num_iterations = 0;
+  for (auto _ : state) {
+    const auto estimate = optimize_pose(scene.rig, scene.observations, initial, {}, workspace);
+    benchmark::DoNotOptimize(estimate.num_inliers);
+    num_iterations = estimate.num_iterations;
+  }
+  state.counters["iterations"] = num_iterations;
+}
+BENCHMARK(optimize_pose_of_frame)
+    ->Args({1000, 0, 1})
+    ->Args({1000, 20, 5})
+    ->Args({1000, 50, 20})
+    ->Args({300, 20, 5})
+    ->Unit(benchmark::kMicrosecond);
+
+/// A local window: 12 free and 20 fixed poses, 2500 points, 10000 observations, 5 iterations.
+/// Arguments: solver (0 own, 1 Ceres), cameras.
+void adjust_local_bundle(benchmark::State& state) {
+  const auto scene =
+      testing::make_bundle_scene({.num_poses = 32,
+                                  .num_fixed = 20,
+                                  .num_points = 2500,
+                                  .num_cameras = static_cast<std::size_t>(state.range(1)),
+                                  .share_of_outliers = 0.03},
+                                 1);
+  BundleOptions options;
+  options.solver = state.range(0) == 0 ? BundleSolver::kSchur : BundleSolver::kCeres;
+  options.num_rounds = 1;
+  options.max_iterations_per_round = 5;
+  options.relative_cost_tolerance = 0.0;
+  BundleResult result;
+  for (auto _ : state) {
+    state.PauseTiming();
+    BundleProblem problem = scene.problem;
+    problem.rig = &scene.rig;
+    state.ResumeTiming();
+    result = adjust_bundle(problem, options);
+    benchmark::DoNotOptimize(problem.points.data());
+  }
+  state.counters["observations"] = static_cast<double>(scene.problem.observations.size());
+  state.counters["cost"] = result.final_cost;
+  state.counters["iterations"] = result.num_iterations;
+}
+BENCHMARK(adjust_local_bundle)
+    ->Args({0, 1})
+    ->Args({1, 1})
+    ->Args({0, 2})
+    ->Args({1, 2})
+    ->Unit(benchmark::kMillisecond);
+
+/// Many free poses: the reduced system dominates. Arguments: solver, poses.
+void adjust_global_bundle(benchmark::State& state) {
+  const auto num_poses = static_cast<std::size_t>(state.range(1));
+  const auto scene = testing::make_bundle_scene(
+      {.num_poses = num_poses, .num_points = 60 * num_poses, .views_per_point = 5}, 1);
+  BundleOptions options;
+  options.solver = state.range(0) == 0 ? BundleSolver::kSchur : BundleSolver::kCeres;
+  options.num_rounds = 1;
+  options.max_iterations_per_round = 5;
+  options.relative_cost_tolerance = 0.0;
+  for (auto _ : state) {
+    BundleProblem problem = scene.problem;
+    problem.rig = &scene.rig;
+    benchmark::DoNotOptimize(adjust_bundle(problem, options).final_cost);
+  }
+}
+BENCHMARK(adjust_global_bundle)
+    ->Args({0, 50})
+    ->Args({1, 50})
+    ->Args({0, 200})
+    ->Args({1, 200})
+    ->Unit(benchmark::kMillisecond);
+
+}  // namespace
+}  // namespace waymark

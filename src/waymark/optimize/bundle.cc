@@ -1,0 +1,76 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/optimize/bundle.h"
+
+#include "waymark/base/check.h"
+#include "waymark/optimize/ceres_solver.h"
+#include "waymark/optimize/residual.h"
+#include "waymark/optimize/schur_solver.h"
+
+namespace waymark {
+
+namespace {
+
+void check(const BundleProblem& problem) {
+  WAYMARK_CHECK(problem.rig != nullptr);
+  WAYMARK_CHECK(problem.is_pose_fixed.size() == problem.rig_from_world.size());
+  std::uint32_t last_point = 0;
+  for (const BundleObservation& observation : problem.observations) {
+    WAYMARK_CHECK(observation.pose < problem.rig_from_world.size());
+    WAYMARK_CHECK(observation.point < problem.points.size());
+    WAYMARK_CHECK(observation.camera < problem.rig->cameras.size());
+    WAYMARK_CHECK(observation.point >= last_point);
+    last_point = observation.point;
+  }
+}
+
+/// Squared length of the residual of the bearing, px^2; not finite where an input is not.
+double squared_residual(const BundleProblem& problem, const BundleObservation& observation) {
+  const Rigid3& cam_from_rig = problem.rig->cameras[observation.camera].cam_from_rig;
+  const Rigid3& rig_from_world = problem.rig_from_world[observation.pose];
+  const Sighting sighting =
+      sight(cam_from_rig * (rig_from_world * problem.points[observation.point]));
+  const double squared =
+      bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing)
+          .squaredNorm();
+  if (!std::isfinite(squared)) return squared;
+  return is_ahead(sighting, observation.bearing) ? squared : kGrossSquaredResidual;
+}
+
+bool has_usable_range(const BundleObservation& observation) {
+  return !(observation.inverse_range_sigma > 0.0f) ||
+         (std::isfinite(observation.inverse_range) &&
+          std::isfinite(observation.inverse_range_sigma));
+}
+
+}  // namespace
+
+BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options) {
+  check(problem);
+  const std::size_t num_observations = problem.observations.size();
+  std::vector<std::uint8_t> is_used(num_observations);
+  for (std::size_t i = 0; i < num_observations; ++i) {
+    const BundleObservation& observation = problem.observations[i];
+    is_used[i] =
+        std::isfinite(squared_residual(problem, observation)) && has_usable_range(observation);
+  }
+  BundleResult result;
+  const double gate = options.gate_px * options.gate_px;
+  for (int round = 0; round < options.num_rounds; ++round) {
+    const BundleRound done = options.solver == BundleSolver::kSchur
+                                 ? minimize_with_schur(problem, is_used, options)
+                                 : minimize_with_ceres(problem, is_used, options);
+    if (round == 0) result.initial_cost = done.initial_cost;
+    result.final_cost = done.final_cost;
+    result.num_iterations += done.num_iterations;
+    for (std::size_t i = 0; i < num_observations; ++i) {
+      const BundleObservation& observation = problem.observations[i];
+      is_used[i] = squared_residual(problem, observation) <= gate && has_usable_range(observation);
+    }
+  }
+  result.is_outlier.resize(num_observations);
+  for (std::size_t i = 0; i < num_observations; ++i) result.is_outlier[i] = !is_used[i];
+  return result;
+}
+
+}  // namespace waymark

@@ -1,0 +1,226 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/optimize/bundle.h"
+
+#include <gtest/gtest.h>
+
+#include <limits>
+
+#include "waymark/base/check.h"
+#include "waymark/optimize/test_scene.h"
+
+namespace waymark {
+namespace {
+
+using testing::BundleScene;
+using testing::BundleSceneOptions;
+using testing::make_bundle_scene;
+
+BundleProblem problem_of(const BundleScene& scene) {
+  BundleProblem problem = scene.problem;
+  problem.rig = &scene.rig;
+  return problem;
+}
+
+double worst_pose_error(const BundleProblem& problem, const BundleScene& scene) {
+  double worst = 0.0;
+  for (std::size_t i = 0; i < scene.rig_from_world.size(); ++i) {
+    const Rigid3 error = problem.rig_from_world[i] * scene.rig_from_world[i].inverse();
+    worst = std::max(worst, error.log().norm());
+  }
+  return worst;
+}
+
+double median_point_error(const BundleProblem& problem, const BundleScene& scene) {
+  std::vector<double> errors;
+  for (std::size_t i = 0; i < scene.points.size(); ++i) {
+    errors.push_back((problem.points[i] - scene.points[i]).norm());
+  }
+  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+  return errors[errors.size() / 2];
+}
+
+void expect_finite(const BundleProblem& problem, const BundleResult& result) {
+  for (const Rigid3& pose : problem.rig_from_world) {
+    EXPECT_TRUE(pose.translation.allFinite());
+    EXPECT_TRUE(pose.rotation.coeffs().allFinite());
+  }
+  for (const Eigen::Vector3d& point : problem.points) EXPECT_TRUE(point.allFinite());
+  EXPECT_TRUE(std::isfinite(result.initial_cost));
+  EXPECT_TRUE(std::isfinite(result.final_cost));
+}
+
+class Bundle : public ::testing::TestWithParam<BundleSolver> {};
+
+TEST_P(Bundle, FindsTheTruthWithoutNoise) {
+  const BundleSceneOptions kinds[] = {{.noise_px = 0.0},
+                                      {.num_fixed = 1, .num_cameras = 2, .noise_px = 0.0},
+                                      {.num_fixed = 1, .noise_px = 0.0, .range_sigma = 1e-4}};
+  for (const BundleSceneOptions& kind : kinds) {
+    const BundleScene scene = make_bundle_scene(kind, 1);
+    BundleProblem problem = problem_of(scene);
+    const BundleResult result = adjust_bundle(
+        problem,
+        {.solver = GetParam(), .max_iterations_per_round = 50, .relative_cost_tolerance = 1e-10});
+    EXPECT_LT(worst_pose_error(problem, scene), 3e-3);
+    EXPECT_LT(result.final_cost, 1e-2 * result.initial_cost);
+    EXPECT_LT(median_point_error(problem, scene), 3e-3);
+  }
+}
+
+TEST_P(Bundle, ConvergesDespiteOutliersAndNamesThem) {
+  for (const std::size_t num_cameras : {1u, 2u}) {
+    const BundleScene scene = make_bundle_scene(
+        {.num_cameras = num_cameras, .noise_px = 0.5, .share_of_outliers = 0.05}, num_cameras);
+    BundleProblem problem = problem_of(scene);
+    const BundleResult result = adjust_bundle(
+        problem, {.solver = GetParam(), .num_rounds = 3, .max_iterations_per_round = 20});
+    std::size_t num_wrong = 0;
+    for (std::size_t i = 0; i < scene.is_outlier.size(); ++i) {
+      num_wrong += scene.is_outlier[i] != result.is_outlier[i];
+    }
+    EXPECT_LT(static_cast<double>(num_wrong), 0.03 * static_cast<double>(scene.is_outlier.size()));
+    // In mono the baseline of the two fixed poses, 0.4 m, carries the scale of all.
+    EXPECT_LT(worst_pose_error(problem, scene), num_cameras == 1 ? 0.1 : 0.03);
+    EXPECT_LT(median_point_error(problem, scene), num_cameras == 1 ? 0.08 : 0.04);
+  }
+}
+
+TEST_P(Bundle, FixedPosesStay) {
+  const BundleScene scene = make_bundle_scene({.num_fixed = 3}, 2);
+  BundleProblem problem = problem_of(scene);
+  problem.is_pose_fixed.back() = 1;
+  adjust_bundle(problem, {.solver = GetParam()});
+  for (const std::size_t i : {std::size_t{0}, std::size_t{2}, scene.rig_from_world.size() - 1}) {
+    EXPECT_EQ(problem.rig_from_world[i].translation, scene.problem.rig_from_world[i].translation);
+    EXPECT_EQ(problem.rig_from_world[i].rotation.coeffs(),
+              scene.problem.rig_from_world[i].rotation.coeffs());
+  }
+}
+
+TEST_P(Bundle, SameInputSameBits) {
+  const BundleScene scene = make_bundle_scene({.num_cameras = 2, .share_of_outliers = 0.1}, 3);
+  BundleProblem first = problem_of(scene);
+  BundleProblem second = problem_of(scene);
+  const BundleResult first_result = adjust_bundle(first, {.solver = GetParam()});
+  const BundleResult second_result = adjust_bundle(second, {.solver = GetParam()});
+  EXPECT_EQ(first.points, second.points);
+  for (std::size_t i = 0; i < first.rig_from_world.size(); ++i) {
+    EXPECT_EQ(first.rig_from_world[i].translation, second.rig_from_world[i].translation);
+    EXPECT_EQ(first.rig_from_world[i].rotation.coeffs(),
+              second.rig_from_world[i].rotation.coeffs());
+  }
+  EXPECT_EQ(first_result.final_cost, second_result.final_cost);
+  EXPECT_EQ(first_result.is_outlier, second_result.is_outlier);
+}
+
+TEST_P(Bundle, FreeGaugeStaysNearTheStart) {
+  const BundleScene scene = make_bundle_scene({.num_fixed = 0, .noise_px = 0.3}, 4);
+  BundleProblem problem = problem_of(scene);
+  const BundleResult result = adjust_bundle(problem, {.solver = GetParam()});
+  expect_finite(problem, result);
+  EXPECT_LT(result.final_cost, result.initial_cost);
+  EXPECT_LT(worst_pose_error(problem, scene), 0.5);
+}
+
+TEST_P(Bundle, DegenerateInputStaysFinite) {
+  const BundleOptions options = {.solver = GetParam()};
+  const BundleScene scene = make_bundle_scene({.num_points = 30}, 5);
+  BundleProblem nothing = problem_of(scene);
+  nothing.observations.clear();
+  expect_finite(nothing, adjust_bundle(nothing, options));
+  EXPECT_EQ(nothing.points, scene.problem.points);
+
+  BundleProblem seen_once = problem_of(scene);
+  std::vector<BundleObservation> first_only;
+  for (const BundleObservation& observation : seen_once.observations) {
+    if (first_only.empty() || first_only.back().point != observation.point) {
+      first_only.push_back(observation);
+    }
+  }
+  seen_once.observations = first_only;
+  expect_finite(seen_once, adjust_bundle(seen_once, options));
+
+  BundleProblem one_place = problem_of(scene);
+  for (auto& point : one_place.points) point = scene.points[0];
+  expect_finite(one_place, adjust_bundle(one_place, options));
+
+  BundleProblem at_centre = problem_of(scene);
+  for (auto& point : at_centre.points) point = scene.rig_from_world[0].origin_in_source();
+  expect_finite(at_centre, adjust_bundle(at_centre, options));
+
+  BundleProblem only_points = problem_of(scene);
+  only_points.is_pose_fixed.assign(only_points.rig_from_world.size(), 1);
+  expect_finite(only_points, adjust_bundle(only_points, options));
+
+  BundleProblem empty;
+  empty.rig = &scene.rig;
+  EXPECT_TRUE(adjust_bundle(empty, options).is_outlier.empty());
+}
+
+TEST_P(Bundle, HostileObservationsAreOutliersAndPullNothing) {
+  const BundleScene scene = make_bundle_scene({.noise_px = 0.3, .range_sigma = 0.01}, 6);
+  BundleProblem clean = problem_of(scene);
+  BundleProblem dirty = clean;
+  const float nan = std::numeric_limits<float>::quiet_NaN();
+  dirty.observations[0].bearing.x() = nan;
+  dirty.observations[9].level_pixel_from_bearing(1, 1) = nan;
+  dirty.observations[17].bearing *= -1.0f;
+  dirty.observations[25].inverse_range = nan;
+  for (const std::size_t i : {25u, 17u, 9u, 0u}) {
+    clean.observations.erase(clean.observations.begin() + i);
+  }
+  const BundleOptions options = {
+      .solver = GetParam(), .max_iterations_per_round = 50, .relative_cost_tolerance = 1e-12};
+  adjust_bundle(clean, options);
+  const BundleResult result = adjust_bundle(dirty, options);
+  expect_finite(dirty, result);
+  for (const std::size_t i : {0u, 9u, 17u, 25u}) EXPECT_TRUE(result.is_outlier[i]) << i;
+  for (std::size_t i = 0; i < clean.points.size(); ++i) {
+    EXPECT_LT((clean.points[i] - dirty.points[i]).norm(), 1e-4);
+  }
+}
+
+TEST_P(Bundle, BrokenPromisesAreNamed) {
+  const BundleScene scene = make_bundle_scene({}, 7);
+  BundleProblem unsorted = problem_of(scene);
+  std::swap(unsorted.observations.front(), unsorted.observations.back());
+  EXPECT_THROW(adjust_bundle(unsorted, {.solver = GetParam()}), CheckError);
+  BundleProblem foreign = problem_of(scene);
+  foreign.observations.back().camera = 4;
+  EXPECT_THROW(adjust_bundle(foreign, {.solver = GetParam()}), CheckError);
+}
+
+INSTANTIATE_TEST_SUITE_P(Solvers,
+                         Bundle,
+                         ::testing::Values(BundleSolver::kSchur, BundleSolver::kCeres),
+                         [](const auto& info) {
+                           return info.param == BundleSolver::kSchur ? "Schur" : "Ceres";
+                         });
+
+TEST(BundleSolvers, AgreeOnTheMinimum) {
+  const BundleSceneOptions kinds[] = {
+      {},
+      {.num_cameras = 2, .share_of_outliers = 0.05},
+      {.num_fixed = 1, .range_sigma = 0.01},
+      {.num_poses = 12, .num_fixed = 4, .num_points = 150, .views_per_point = 6},
+      {.num_fixed = 1, .num_cameras = 2, .share_of_outliers = 0.02, .range_sigma = 0.02}};
+  for (std::uint64_t seed = 0; seed < 10; ++seed) {
+    const BundleScene scene = make_bundle_scene(kinds[seed % 5], 10 + seed);
+    BundleOptions options;
+    options.num_rounds = 1;
+    options.max_iterations_per_round = 200;
+    options.relative_cost_tolerance = 1e-13;
+    BundleProblem own = problem_of(scene);
+    BundleProblem other = problem_of(scene);
+    const BundleResult own_result = adjust_bundle(own, options);
+    options.solver = BundleSolver::kCeres;
+    const BundleResult other_result = adjust_bundle(other, options);
+    EXPECT_NEAR(own_result.initial_cost, other_result.initial_cost, 1e-9 * own_result.initial_cost);
+    EXPECT_NEAR(own_result.final_cost, other_result.final_cost, 1e-6 * other_result.final_cost)
+        << seed;
+  }
+}
+
+}  // namespace
+}  // namespace waymark

@@ -1,0 +1,81 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "waymark/geometry/rigid3.h"
+#include "waymark/optimize/pose.h"
+
+namespace waymark {
+
+/// Observations are summed in kPoseLanes interleaved partial sums whatever the width of the
+/// vectors, without fused multiply-add, so that every instruction set gives the same bits.
+inline constexpr std::size_t kPoseLanes = 8;
+
+/// The observations of one camera: entries [begin, end) of the arrays, a multiple of kPoseLanes.
+struct PoseSegment {
+  std::size_t camera = 0;
+  std::size_t begin = 0;
+  std::size_t end = 0;
+};
+
+/// Columns of PoseWorkspace::Arrays.
+enum PoseField : std::size_t {
+  kPointX,
+  kPointY,
+  kPointZ,
+  kBearingX,
+  kBearingY,
+  kBearingZ,
+  kW00,
+  kW01,
+  kW02,
+  kW10,
+  kW11,
+  kW12,
+  kInverseRange,
+  kInverseRangeScale,  // 1 / sigma in units of the pixel noise; 0 without a measurement.
+  kWeight,             // 0 takes the observation out.
+  kNumPoseFields
+};
+
+/// The observations column by column, grouped by camera and padded with entries of weight 0. All
+/// values are finite.
+struct PoseWorkspace::Arrays {
+  std::array<std::vector<double>, kNumPoseFields> fields;
+  std::vector<double> squared_residual;    // px^2; kGrossSquaredResidual behind the bearing.
+  std::vector<std::uint32_t> observation;  // Index given by the caller, UINT32_MAX in padding.
+  std::vector<PoseSegment> segments;
+  std::vector<double> scratch;
+  std::vector<std::uint8_t> is_inlier;  // In the caller's order.
+};
+
+enum class PoseLoss { kGemanMcClure, kHuber };
+
+/// The loss of the bearing residuals; ranges always take Geman and McClure's.
+struct PoseRobust {
+  PoseLoss loss = PoseLoss::kGemanMcClure;
+  double scale_px = 1.0;
+};
+
+/// Normal equations by a left perturbation of the pose: the upper triangle of the Hessian
+/// approximation row by row (21), the gradient (6) and the robust cost, all without the factor 2
+/// of the derivative of a square.
+inline constexpr std::size_t kNumPoseSums = 28;
+using PoseSums = std::array<double, kNumPoseSums>;
+
+PoseSums sum_normal_equations(const PoseWorkspace::Arrays& arrays,
+                              const PoseSegment& segment,
+                              const Rigid3& cam_from_world,
+                              const PoseRobust& robust);
+
+/// Fills arrays.squared_residual of the segment, whatever the weights.
+void compute_squared_residuals(PoseWorkspace::Arrays& arrays,
+                               const PoseSegment& segment,
+                               const Rigid3& cam_from_world);
+
+}  // namespace waymark

@@ -1,0 +1,392 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/optimize/schur_solver.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "waymark/optimize/residual.h"
+#include "waymark/optimize/robust_loss.h"
+
+namespace waymark {
+
+namespace {
+
+using Matrix63d = Eigen::Matrix<double, 6, 3>;
+
+constexpr std::uint32_t kFixed = UINT32_MAX;
+constexpr double kInitialDamping = 1e-4;
+constexpr double kMaxDamping = 1e12;
+/// Bounds of the diagonal that the damping scales, so that directions nobody measures stay put.
+constexpr double kMinDiagonal = 1e-6;
+constexpr double kMaxDiagonal = 1e32;
+
+/// Which observations meet where. A link is a point together with a free pose that sees it, by
+/// one camera or more; links run by point, then by pose.
+struct Plan {
+  std::vector<std::uint32_t> slot_of_pose;  // Position in the reduced system, or kFixed.
+  std::size_t num_slots = 0;
+  std::vector<std::uint32_t> observations;         // The used ones.
+  std::vector<std::uint32_t> link_of_observation;  // Parallel to it; kFixed if none.
+  std::vector<std::uint32_t> points;               // Those with observations.
+  std::vector<std::uint32_t> first_observation;    // Per entry of points, and one past the end.
+  std::vector<std::uint32_t> first_link;           // Likewise.
+  std::vector<std::uint32_t> slot_of_link;
+};
+
+/// Appends the links of the point whose observations start at begin.
+void link_point(const BundleProblem& problem, std::size_t begin, Plan& plan) {
+  const auto first = static_cast<std::ptrdiff_t>(plan.slot_of_link.size());
+  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
+    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
+    if (slot != kFixed) plan.slot_of_link.push_back(slot);
+  }
+  auto& slots = plan.slot_of_link;
+  std::sort(slots.begin() + first, slots.end());
+  slots.erase(std::unique(slots.begin() + first, slots.end()), slots.end());
+  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
+    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
+    const auto link = std::lower_bound(slots.begin() + first, slots.end(), slot) - slots.begin();
+    plan.link_of_observation.push_back(slot == kFixed ? kFixed : static_cast<std::uint32_t>(link));
+  }
+  plan.first_observation.push_back(static_cast<std::uint32_t>(plan.observations.size()));
+  plan.first_link.push_back(static_cast<std::uint32_t>(slots.size()));
+}
+
+Plan make_plan(const BundleProblem& problem, std::span<const std::uint8_t> is_used) {
+  Plan plan;
+  for (const std::uint8_t is_fixed : problem.is_pose_fixed) {
+    plan.slot_of_pose.push_back(is_fixed ? kFixed : static_cast<std::uint32_t>(plan.num_slots));
+    plan.num_slots += is_fixed ? 0 : 1;
+  }
+  plan.observations.reserve(problem.observations.size());
+  plan.link_of_observation.reserve(problem.observations.size());
+  plan.slot_of_link.reserve(problem.observations.size());
+  plan.first_observation.push_back(0);
+  plan.first_link.push_back(0);
+  for (std::size_t i = 0; i < problem.observations.size();) {
+    const std::uint32_t point = problem.observations[i].point;
+    const std::size_t begin = plan.observations.size();
+    for (; i < problem.observations.size() && problem.observations[i].point == point; ++i) {
+      if (is_used[i]) plan.observations.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (plan.observations.size() == begin) continue;
+    plan.points.push_back(point);
+    link_point(problem, begin, plan);
+  }
+  return plan;
+}
+
+/// Rotation matrices ready for use.
+struct Frame {
+  Eigen::Matrix3d rotation;
+  Eigen::Vector3d translation;
+};
+
+Frame frame_of(const Rigid3& pose) { return {pose.rotation_matrix(), pose.translation}; }
+
+/// What the solver moves.
+struct State {
+  std::vector<Rigid3> rig_from_world;
+  std::vector<Frame> frames;  // The same.
+  std::vector<Eigen::Vector3d> points;
+};
+
+/// Blocks of the normal equations H * step = -gradient.
+struct NormalBlocks {
+  std::vector<Matrix6d> poses;          // Per slot.
+  std::vector<Vector6d> pose_gradient;  // Per slot.
+  std::vector<Eigen::Matrix3d> points;  // Per entry of Plan::points.
+  std::vector<Eigen::Vector3d> point_gradient;
+  std::vector<Matrix63d> links;  // Pose by point.
+};
+
+/// Residual rows of one observation (bearing, bearing, range) times the root of their weight.
+template <int kRows>
+struct Rows {
+  Eigen::Matrix<double, kRows, 1> residual;
+  Eigen::Matrix<double, kRows, 3> by_point_in_cam;
+};
+
+double clamp_diagonal(double value) { return std::clamp(value, kMinDiagonal, kMaxDiagonal); }
+
+class SchurSolver {
+ public:
+  SchurSolver(const BundleProblem& problem,
+              std::span<const std::uint8_t> is_used,
+              const BundleOptions& options)
+      : problem_(problem), options_(options), plan_(make_plan(problem, is_used)) {
+    state_.rig_from_world = problem.rig_from_world;
+    state_.points = problem.points;
+    for (const Rigid3& pose : state_.rig_from_world) state_.frames.push_back(frame_of(pose));
+    for (const RigCamera& camera : problem.rig->cameras) {
+      cameras_.push_back(frame_of(camera.cam_from_rig));
+    }
+    candidate_ = state_;
+    allocate();
+  }
+
+  BundleRound minimize();
+  const State& state() const { return state_; }
+
+ private:
+  void allocate();
+  Sighting sight_in(const State& state,
+                    const BundleObservation& observation,
+                    Eigen::Vector3d& point_in_rig) const;
+  double cost(const State& state) const;
+  void linearize();
+  template <int kRows>
+  void accumulate(const Rows<kRows>& rows,
+                  std::size_t entry,
+                  std::size_t k,
+                  const Eigen::Vector3d& point_in_rig);
+  void linearize_observation(std::size_t entry, std::size_t k);
+  void eliminate_points(double damping);
+  void eliminate_point(std::size_t entry, double damping);
+  double substitute_back(double damping);
+
+  const BundleProblem& problem_;
+  const BundleOptions& options_;
+  const Plan plan_;
+  std::vector<Frame> cameras_;
+  State state_;
+  State candidate_;
+  NormalBlocks blocks_;
+  std::vector<Eigen::Matrix3d> half_inverses_;  // M with M^T * M = inverse of the damped block.
+  std::vector<Matrix63d> eliminated_;           // Links of one point times M^T.
+  Eigen::MatrixXd reduced_;                     // Lower triangle.
+  Eigen::VectorXd reduced_gradient_;
+};
+
+void SchurSolver::allocate() {
+  blocks_.poses.resize(plan_.num_slots);
+  blocks_.pose_gradient.resize(plan_.num_slots);
+  blocks_.points.resize(plan_.points.size());
+  blocks_.point_gradient.resize(plan_.points.size());
+  blocks_.links.resize(plan_.slot_of_link.size());
+  half_inverses_.resize(plan_.points.size());
+  eliminated_.resize(plan_.num_slots);
+  const auto size = static_cast<Eigen::Index>(6 * plan_.num_slots);
+  reduced_.resize(size, size);
+  reduced_gradient_.resize(size);
+}
+
+Sighting SchurSolver::sight_in(const State& state,
+                               const BundleObservation& observation,
+                               Eigen::Vector3d& point_in_rig) const {
+  const Frame& frame = state.frames[observation.pose];
+  const Frame& camera = cameras_[observation.camera];
+  point_in_rig.noalias() = frame.rotation * state.points[observation.point];
+  point_in_rig += frame.translation;
+  Eigen::Vector3d point_in_cam = camera.translation;
+  point_in_cam.noalias() += camera.rotation * point_in_rig;
+  return sight(point_in_cam);
+}
+
+double SchurSolver::cost(const State& state) const {
+  double sum = 0.0;
+  for (const std::uint32_t i : plan_.observations) {
+    const BundleObservation& observation = problem_.observations[i];
+    Eigen::Vector3d point_in_rig;
+    const Sighting sighting = sight_in(state, observation, point_in_rig);
+    if (!is_ahead(sighting, observation.bearing)) {
+      sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
+      continue;
+    }
+    const Eigen::Vector2d residual =
+        bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);
+    sum += huber(residual.squaredNorm(), options_.huber_px).loss;
+    if (observation.inverse_range_sigma > 0.0f) {
+      const double range =
+          range_residual(sighting, observation.inverse_range, observation.inverse_range_sigma);
+      sum += huber(range * range, options_.huber_px).loss;
+    }
+  }
+  return 0.5 * sum;
+}
+
+template <int kRows>
+void SchurSolver::accumulate(const Rows<kRows>& rows,
+                             std::size_t entry,
+                             std::size_t k,
+                             const Eigen::Vector3d& point_in_rig) {
+  using Rows3 = Eigen::Matrix<double, kRows, 3>;
+  const BundleObservation& observation = problem_.observations[plan_.observations[k]];
+  const Rows3 by_rig = rows.by_point_in_cam * cameras_[observation.camera].rotation;
+  const Rows3 by_point = by_rig * state_.frames[observation.pose].rotation;
+  blocks_.points[entry].noalias() += by_point.transpose() * by_point;
+  blocks_.point_gradient[entry].noalias() += by_point.transpose() * rows.residual;
+  const std::uint32_t link = plan_.link_of_observation[k];
+  if (link == kFixed) return;
+  Eigen::Matrix<double, kRows, 6> by_pose;
+  by_pose.template leftCols<3>() = by_rig;
+  for (int row = 0; row < kRows; ++row) {
+    const Eigen::Vector3d gradient = by_rig.row(row).transpose();
+    by_pose.template block<1, 3>(row, 3) = point_in_rig.cross(gradient).transpose();
+  }
+  const std::uint32_t slot = plan_.slot_of_link[link];
+  blocks_.poses[slot].noalias() += by_pose.transpose() * by_pose;
+  blocks_.pose_gradient[slot].noalias() += by_pose.transpose() * rows.residual;
+  blocks_.links[link].noalias() += by_pose.transpose() * by_point;
+}
+
+void SchurSolver::linearize_observation(std::size_t entry, std::size_t k) {
+  const BundleObservation& observation = problem_.observations[plan_.observations[k]];
+  Eigen::Vector3d point_in_rig;
+  const Sighting sighting = sight_in(state_, observation, point_in_rig);
+  if (!is_ahead(sighting, observation.bearing)) return;
+  const Eigen::Vector2d residual =
+      bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);
+  const double root = std::sqrt(huber(residual.squaredNorm(), options_.huber_px).weight);
+  const Matrix23d by_point =
+      bearing_residual_by_point(sighting, observation.level_pixel_from_bearing);
+  if (!(observation.inverse_range_sigma > 0.0f)) {
+    accumulate<2>({root * residual, root * by_point}, entry, k, point_in_rig);
+    return;
+  }
+  const double sigma = observation.inverse_range_sigma;
+  const double range = range_residual(sighting, observation.inverse_range, sigma);
+  const double range_root = std::sqrt(huber(range * range, options_.huber_px).weight);
+  Rows<3> rows;
+  rows.residual << root * residual, range_root * range;
+  rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(sighting, sigma);
+  accumulate<3>(rows, entry, k, point_in_rig);
+}
+
+void SchurSolver::linearize() {
+  for (Matrix6d& block : blocks_.poses) block.setZero();
+  for (Vector6d& gradient : blocks_.pose_gradient) gradient.setZero();
+  for (Matrix63d& link : blocks_.links) link.setZero();
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
+    blocks_.points[entry].setZero();
+    blocks_.point_gradient[entry].setZero();
+    for (std::size_t k = plan_.first_observation[entry]; k < plan_.first_observation[entry + 1];
+         ++k) {
+      linearize_observation(entry, k);
+    }
+  }
+}
+
+void SchurSolver::eliminate_point(std::size_t entry, double damping) {
+  Eigen::Matrix3d block = blocks_.points[entry];
+  for (int i = 0; i < 3; ++i) block(i, i) += damping * clamp_diagonal(block(i, i));
+  const Eigen::Matrix3d lower = block.llt().matrixL();
+  Eigen::Matrix3d& half = half_inverses_[entry];
+  half = lower.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity());
+  const Eigen::Vector3d gradient = half * blocks_.point_gradient[entry];
+  const std::uint32_t begin = plan_.first_link[entry];
+  const std::uint32_t end = plan_.first_link[entry + 1];
+  for (std::uint32_t a = begin; a < end; ++a) {
+    Matrix63d& eliminated = eliminated_[a - begin];
+    eliminated.noalias() = blocks_.links[a] * half.transpose();
+    const auto row = static_cast<Eigen::Index>(6 * plan_.slot_of_link[a]);
+    reduced_gradient_.segment<6>(row).noalias() -= eliminated * gradient;
+    for (std::uint32_t b = begin; b <= a; ++b) {
+      const auto column = static_cast<Eigen::Index>(6 * plan_.slot_of_link[b]);
+      reduced_.block<6, 6>(row, column).noalias() -=
+          eliminated * eliminated_[b - begin].transpose();
+    }
+  }
+}
+
+/// Builds the reduced system of the damped equations.
+void SchurSolver::eliminate_points(double damping) {
+  reduced_.setZero();
+  for (std::size_t slot = 0; slot < plan_.num_slots; ++slot) {
+    const auto row = static_cast<Eigen::Index>(6 * slot);
+    auto block = reduced_.block<6, 6>(row, row);
+    block = blocks_.poses[slot];
+    for (int i = 0; i < 6; ++i) block(i, i) += damping * clamp_diagonal(block(i, i));
+    reduced_gradient_.segment<6>(row) = blocks_.pose_gradient[slot];
+  }
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
+    eliminate_point(entry, damping);
+  }
+}
+
+/// Takes the step of the poses from reduced_gradient_, moves the candidate, and returns the
+/// decrease of the cost that the linear model promises.
+double SchurSolver::substitute_back(double damping) {
+  double decrease = 0.0;
+  const auto promise = [damping, &decrease](
+                           const auto& step, const auto& gradient, const auto& diagonal) {
+    for (Eigen::Index i = 0; i < step.size(); ++i) {
+      decrease += step[i] * (damping * clamp_diagonal(diagonal[i]) * step[i] - gradient[i]);
+    }
+  };
+  for (std::size_t pose = 0; pose < plan_.slot_of_pose.size(); ++pose) {
+    const std::uint32_t slot = plan_.slot_of_pose[pose];
+    if (slot == kFixed) continue;
+    const Vector6d step = -reduced_gradient_.segment<6>(static_cast<Eigen::Index>(6 * slot));
+    promise(step, blocks_.pose_gradient[slot], blocks_.poses[slot].diagonal());
+    candidate_.rig_from_world[pose] = Rigid3::exp(step) * state_.rig_from_world[pose];
+    candidate_.frames[pose] = frame_of(candidate_.rig_from_world[pose]);
+  }
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
+    Eigen::Vector3d gradient = blocks_.point_gradient[entry];
+    for (std::uint32_t link = plan_.first_link[entry]; link < plan_.first_link[entry + 1]; ++link) {
+      const auto row = static_cast<Eigen::Index>(6 * plan_.slot_of_link[link]);
+      gradient.noalias() -= blocks_.links[link].transpose() * reduced_gradient_.segment<6>(row);
+    }
+    const Eigen::Matrix3d& half = half_inverses_[entry];
+    const Eigen::Vector3d step = -(half.transpose() * (half * gradient));
+    promise(step, blocks_.point_gradient[entry], blocks_.points[entry].diagonal());
+    candidate_.points[plan_.points[entry]] = state_.points[plan_.points[entry]] + step;
+  }
+  return 0.5 * decrease;
+}
+
+/// Damping after Madsen, Nielsen & Tingleff 2004, 3.2, relative to the diagonal (Marquardt 1963).
+BundleRound SchurSolver::minimize() {
+  BundleRound round;
+  round.initial_cost = round.final_cost = cost(state_);
+  double damping = kInitialDamping;
+  double growth = 2.0;
+  bool is_linearized = false;
+  while (round.num_iterations < options_.max_iterations_per_round && damping < kMaxDamping) {
+    if (!is_linearized) linearize();
+    is_linearized = true;
+    ++round.num_iterations;
+    eliminate_points(damping);
+    Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> factor(reduced_);
+    double gain = -1.0;
+    double candidate_cost = round.final_cost;
+    if (factor.info() == Eigen::Success) {
+      factor.solveInPlace(reduced_gradient_);
+      const double promised = substitute_back(damping);
+      if (!(promised > 1e-3 * options_.relative_cost_tolerance * round.final_cost)) break;
+      candidate_cost = cost(candidate_);
+      gain = (round.final_cost - candidate_cost) / promised;
+    }
+    if (!(gain > 0.0)) {
+      damping *= growth;
+      growth *= 2.0;
+      continue;
+    }
+    std::swap(state_, candidate_);
+    const double decrease = round.final_cost - candidate_cost;
+    round.final_cost = candidate_cost;
+    if (decrease < options_.relative_cost_tolerance * candidate_cost) break;
+    damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
+    growth = 2.0;
+    is_linearized = false;
+  }
+  return round;
+}
+
+}  // namespace
+
+BundleRound minimize_with_schur(BundleProblem& problem,
+                                std::span<const std::uint8_t> is_used,
+                                const BundleOptions& options) {
+  SchurSolver solver(problem, is_used, options);
+  const BundleRound round = solver.minimize();
+  problem.rig_from_world = solver.state().rig_from_world;
+  problem.points = solver.state().points;
+  return round;
+}
+
+}  // namespace waymark
