@@ -1,0 +1,71 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string_view>
+#include <vector>
+
+#include "waymark/evaluate/segments.h"
+#include "waymark/geometry/sim3.h"
+#include "waymark/io/trajectory.h"
+
+namespace waymark {
+
+/// How the estimate is moved onto the ground truth before comparing.
+enum class TrajectoryAlignment { kNone, kSe3, kSim3 };
+
+/// "none", "se3", "sim3".
+std::string_view to_string(TrajectoryAlignment alignment);
+
+struct EvaluationOptions {
+  TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
+  std::int64_t max_difference_ns = 20'000'000;  ///< Between a pose and its true one.
+  /// Input frames of the run; with it the coverage counts poses, without it time.
+  std::optional<std::size_t> num_frames;
+};
+
+/// Of the distances between estimated and true positions.
+struct ErrorStatistics {
+  double rmse = 0.0;
+  double mean = 0.0;
+  double median = 0.0;
+  double max = 0.0;
+};
+
+/// Distance between an estimated position, aligned, and the true one.
+struct PositionError {
+  std::int64_t timestamp_ns = 0;
+  double error_m = 0.0;
+};
+
+struct Evaluation {
+  TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
+  Sim3 groundtruth_from_estimate;
+  std::size_t num_estimate_poses = 0;
+  std::size_t num_pairs = 0;
+  /// Estimated poses per input frame when their number is known, else covered_part().
+  double coverage = 0.0;
+  double path_length_m = 0.0;             ///< Of the true path through the pairs.
+  ErrorStatistics ate_m;                  ///< Absolute trajectory error (Sturm et al. 2012).
+  std::optional<double> ate_percent;      ///< 100 rmse / path length, unless that is 0.
+  double rpe_m = 0.0;                     ///< Root mean square of the relative error of
+  double rpe_deg = 0.0;                   ///< consecutive pairs, after scaling.
+  std::optional<SegmentErrors> segments;  ///< For paths beyond 100 m.
+  std::vector<PositionError> errors;      ///< Per pair.
+};
+
+/// Compares two trajectories, each sorted by time. Alignment after Umeyama (1991); measures as
+/// discussed by Zhang and Scaramuzza (2018). Throws InputError when fewer than 3 poses pair or the
+/// positions leave the alignment undefined.
+Evaluation evaluate(std::span<const StampedPose> estimate,
+                    std::span<const StampedPose> groundtruth,
+                    const EvaluationOptions& options);
+
+/// A pose of the estimate in the frame and scale of the ground truth.
+Rigid3 aligned_pose(const Sim3& groundtruth_from_estimate, const Rigid3& world_from_camera);
+
+}  // namespace waymark

@@ -1,0 +1,23 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+/// Decodes an image file to 8-bit grey: colour is converted, 16 bit scaled down, transparency
+/// dropped, orientation tags ignored. Nothing when the file is missing, truncated or no image.
+std::optional<Image> read_grey_image(const std::filesystem::path& path);
+
+/// Decodes a single-channel 16-bit image, otherwise nothing.
+std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
+
+/// Keeps OpenCV and its video library from printing to standard error; errors reach the user as
+/// faults of frames. For the whole process, done once.
+void silence_image_library();
+
+}  // namespace waymark

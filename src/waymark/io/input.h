@@ -1,0 +1,78 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/camera/camchain.h"
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+/// Which images of a moment are used together.
+enum class Setup { kMono, kStereo, kRgbd };
+
+/// "mono", "stereo", "rgbd".
+std::string_view to_string(Setup setup);
+
+/// Why the images of a frame cannot be used.
+enum class FrameFault { kNone, kUnreadable, kWrongSize };
+
+/// The images of one moment. With a fault there are none.
+struct InputFrame {
+  std::size_t index = 0;  ///< In the whole INPUT, before --first, --every.
+  std::int64_t timestamp_ns = 0;
+  std::vector<Image> images;        ///< Grey, one per camera of the setup.
+  std::optional<DepthImage> depth;  ///< Of camera 0; nothing where the moment has no depth image.
+  std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
+  FrameFault fault = FrameFault::kNone;
+};
+
+struct InputOptions {
+  std::string format;          ///< "euroc", "kitti", "tum", "images", "video"; empty: recognised.
+  std::optional<Setup> setup;  ///< Nothing: all that the input offers.
+  std::size_t first = 0;       ///< Index of the first frame used.
+  std::optional<std::size_t> frames;  ///< At most so many frames.
+  std::size_t every = 1;              ///< Of the frames from first on, each n-th one.
+  std::filesystem::path mask;  ///< One image, or a folder with one per frame by name; empty: none.
+  /// Calibration from settings; takes the place of the one the data set carries.
+  std::optional<CameraChain> calibration;
+};
+
+/// What was understood of an input.
+struct InputInfo {
+  std::string format;          ///< As in InputOptions.
+  Setup setup = Setup::kMono;  ///< In use.
+  /// Frames that next() will give; nothing when a video does not say.
+  std::optional<std::size_t> num_frames;
+  /// One camera per image of a frame: from the options, else from the data set, else nothing.
+  std::optional<CameraChain> calibration;
+  int width_px = 0;  ///< Of the images of camera 0.
+  int height_px = 0;
+  std::vector<std::string> lines;  ///< The same in words, for people.
+};
+
+/// A recorded input, read frame after frame. For one thread.
+class Input {
+ public:
+  virtual ~Input() = default;
+  virtual const InputInfo& info() const = 0;
+  /// The next frame, or nothing at the end. A bad image is a fault of its frame, never an
+  /// exception.
+  virtual std::optional<InputFrame> next() = 0;
+};
+
+/// Recognises what path holds and opens it: a folder in the layout of EuRoC / TUM-VI, KITTI
+/// odometry or TUM RGB-D, a folder of images, a video file, or a folder that holds one video or
+/// images/. Reads the first image. Throws InputError that names the file (and line) for what is
+/// missing or malformed, and for a first image that contradicts the calibration.
+std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options);
+
+}  // namespace waymark
