@@ -1,0 +1,67 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// Images in, trajectory out, against the exact truth: each set-up on simulated images, and recorded
+// sequences where WAYMARK_DATA has them.
+#include <gtest/gtest.h>
+
+#include "recorded_run.h"
+#include "simulated_run.h"
+
+namespace waymark {
+namespace {
+
+TEST(Accuracy, Stereo) {
+  const Recording recording = simulate(small_sequence(Setup::kStereo, 60));
+  const SessionResults results = map_recording(recording, Timing::kLockstep);
+  EXPECT_EQ(coverage(results), 1.0);
+  EXPECT_LT(evaluate_results(results, recording).ate_m.rmse, 0.01);
+}
+
+TEST(Accuracy, Rgbd) {
+  const Recording recording = simulate(small_sequence(Setup::kRgbd, 60));
+  const SessionResults results = map_recording(recording, Timing::kLockstep);
+  EXPECT_EQ(coverage(results), 1.0);
+  EXPECT_LT(evaluate_results(results, recording).ate_m.rmse, 0.01);
+}
+
+TEST(Accuracy, Mono) {
+  const Recording recording = simulate(small_sequence(Setup::kMono, 60));
+  const SessionResults results = map_recording(recording, Timing::kLockstep);
+  EXPECT_GE(coverage(results), 0.9);
+  EXPECT_LT(evaluate_results(results, recording).ate_m.rmse, 0.015);
+}
+
+/// The gates of recorded sequences are those of the project's accuracy table, with the tolerance
+/// that a single seed has there.
+struct RecordedCase {
+  const char* name;
+  Setup setup;
+  double min_coverage;
+  double max_ate_m;
+};
+
+class Recorded : public testing::TestWithParam<RecordedCase> {};
+
+TEST_P(Recorded, IsAsAccurateAsStated) {
+  const RecordedCase& expected = GetParam();
+  const auto folder = recorded_sequence(expected.name);
+  if (!folder) GTEST_SKIP() << "WAYMARK_DATA has no " << expected.name;
+  const RecordedResults results = map_recorded(*folder, expected.setup, Timing::kLockstep);
+  EXPECT_GE(coverage(results.session), expected.min_coverage);
+  EXPECT_LT(results.evaluation.ate_m.rmse, 1.3 * expected.max_ate_m);
+}
+
+INSTANTIATE_TEST_SUITE_P(
+    Sequences,
+    Recorded,
+    testing::Values(RecordedCase{"euroc_mh01_stereo", Setup::kStereo, 1.0, 0.0045},
+                    RecordedCase{"euroc_mh01_stereo", Setup::kMono, 0.98, 0.0085},
+                    RecordedCase{"kitti_00_stereo", Setup::kStereo, 1.0, 0.28},
+                    RecordedCase{"tum_fr1_rpy_rgbd", Setup::kRgbd, 1.0, 0.026}),
+    [](const testing::TestParamInfo<RecordedCase>& info) {
+      return std::string(info.param.name) + "_" + std::string(to_string(info.param.setup));
+    });
+
+}  // namespace
+}  // namespace waymark

@@ -1,0 +1,46 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "recorded_run.h"
+
+#include <cstdlib>
+
+#include "session_options.h"
+#include "waymark/io/trajectory.h"
+
+namespace waymark {
+
+std::optional<std::filesystem::path> recorded_sequence(const std::string& name) {
+  const char* data = std::getenv("WAYMARK_DATA");
+  if (data == nullptr) return std::nullopt;
+  const std::filesystem::path folder = std::filesystem::path(data) / name;
+  if (!std::filesystem::exists(folder / "groundtruth.txt")) return std::nullopt;
+  return folder;
+}
+
+RecordedResults map_recorded(const std::filesystem::path& folder,
+                             Setup setup,
+                             Timing timing,
+                             std::optional<std::size_t> num_frames) {
+  SessionOptions options;
+  options.input = folder;
+  options.timing = timing;
+  options.reading.setup = setup;
+  options.reading.frames = num_frames;
+  if (setup == Setup::kRgbd) options.configs = {folder / "camchain.yaml"};
+  Session session = open_session(options);
+
+  RecordedResults results;
+  results.session = run_session(
+      *session.input, *session.system, [] { return false; }, [](const FrameRecord&) {});
+  EvaluationOptions evaluation;
+  evaluation.alignment =
+      setup == Setup::kMono ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSe3;
+  if (!results.session.trajectories.empty()) {
+    results.evaluation = evaluate(results.session.trajectories.front(),
+                                  read_trajectory(folder / "groundtruth.txt"),
+                                  evaluation);
+  }
+  return results;
+}
+
+}  // namespace waymark

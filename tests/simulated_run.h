@@ -1,0 +1,46 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "session.h"
+#include "waymark/camera/rig.h"
+#include "waymark/evaluate/evaluation.h"
+#include "waymark/io/input.h"
+#include "waymark/io/trajectory.h"
+#include "waymark/simulate/sequence.h"
+#include "waymark/system/settings.h"
+
+namespace waymark {
+
+/// A sequence held in memory, with its truth.
+struct Recording {
+  Rig rig;
+  Setup setup = Setup::kMono;
+  Settings settings;
+  std::vector<InputFrame> frames;
+  std::vector<StampedPose> groundtruth;
+};
+
+/// A short hand-held sequence in a room with a small distorted camera, or two that are neither
+/// rectified nor quite parallel, or one with depth.
+SequenceSpec small_sequence(Setup setup, int num_frames);
+
+Recording simulate(const SequenceSpec& spec);
+
+/// Feeds the whole recording to a new System.
+SessionResults map_recording(const Recording& recording, Timing timing);
+
+/// Part of the frames that are in the largest trajectory.
+double coverage(const SessionResults& results);
+
+/// Against the truth of the recording; Sim(3) in mono, else SE(3).
+Evaluation evaluate_results(const SessionResults& results, const Recording& recording);
+
+/// Changes when any bit of any pose of the results changes.
+std::uint64_t hash_of(const SessionResults& results);
+
+}  // namespace waymark
