@@ -1,0 +1,49 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "waymark/base/id.h"
+#include "waymark/camera/rig.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/image/features.h"
+
+namespace waymark {
+
+/// A frame that stays in the map.
+struct Keyframe {
+  FrameId frame;
+  std::int64_t timestamp_ns = 0;
+  SubmapId submap;
+  Rigid3 rig_from_world;
+  KeyframeId parent;  ///< In the spanning tree; invalid for the root of a sub-map.
+  /// Product of the scale corrections applied to this keyframe's surroundings; poses stored
+  /// relative to it are rescaled by how much it changed since.
+  double applied_scale = 1.0;
+  std::shared_ptr<const Rig> rig;
+  std::shared_ptr<const Features> features;
+  std::vector<LandmarkId> landmarks;  ///< One per feature, invalid where none.
+};
+
+/// How many landmarks two keyframes share.
+struct CovisibilityEdge {
+  KeyframeId keyframe;
+  std::uint32_t num_shared = 0;
+};
+
+/// Edges of one keyframe, ascending by id.
+struct Covisibility {
+  std::vector<CovisibilityEdge> edges;
+};
+
+/// Where an erased keyframe went: poses relative to it are read relative to its heir.
+struct KeyframeForwarding {
+  KeyframeId heir;          ///< Invalid while the keyframe lives.
+  Rigid3 rig_from_heir;     ///< The erased keyframe's rig from the heir's.
+  double heir_scale = 1.0;  ///< applied_scale of the heir at that time.
+};
+
+}  // namespace waymark

@@ -1,0 +1,52 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+#include "waymark/base/id.h"
+#include "waymark/image/features.h"
+
+namespace waymark {
+
+/// A feature of a keyframe that sees a landmark.
+struct Observation {
+  KeyframeId keyframe;
+  std::uint32_t feature = kNoFeature;
+  friend constexpr auto operator<=>(const Observation&, const Observation&) = default;
+};
+
+/// What a landmark looks like and from where; a pure function of its observations.
+struct Appearance {
+  Descriptor descriptor{};
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Mean unit vector towards its observers.
+  /// Extent in metres of one pixel of the level it was seen at: distance times size_rad.
+  double size_m = 0.0;
+};
+
+/// A point of the map.
+struct Landmark {
+  SubmapId submap;
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
+  KeyframeId reference;                   ///< The keyframe it was made from; moves with it.
+  std::vector<Observation> observations;  ///< Ascending.
+  Appearance appearance;
+  std::uint32_t num_visible = 0;  ///< Frames in which it should have been seen.
+  std::uint32_t num_found = 0;    ///< Frames in which it was.
+};
+
+/// Number of distinct keyframes among observations in ascending order.
+inline std::size_t num_observers(const Landmark& landmark) {
+  std::size_t count = 0;
+  KeyframeId last;
+  for (const Observation& observation : landmark.observations) {
+    count += observation.keyframe != last;
+    last = observation.keyframe;
+  }
+  return count;
+}
+
+}  // namespace waymark

@@ -1,0 +1,205 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/map/map.h"
+
+#include <algorithm>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// Distinct keyframes of ascending observations, without one.
+std::vector<KeyframeId> observers_except(const Landmark& landmark, KeyframeId except) {
+  std::vector<KeyframeId> observers;
+  for (const Observation& observation : landmark.observations) {
+    const KeyframeId id = observation.keyframe;
+    if (id != except && (observers.empty() || observers.back() != id)) observers.push_back(id);
+  }
+  return observers;
+}
+
+bool is_observed_by(const Landmark& landmark, KeyframeId keyframe) {
+  const auto first = std::lower_bound(
+      landmark.observations.begin(), landmark.observations.end(), Observation{keyframe, 0});
+  return first != landmark.observations.end() && first->keyframe == keyframe;
+}
+
+}  // namespace
+
+std::shared_ptr<const Map> Map::freeze() {
+  auto frozen = std::make_shared<Map>();
+  frozen->keyframes_ = keyframes_.freeze();
+  frozen->landmarks_ = landmarks_.freeze();
+  frozen->covisibility_ = covisibility_.freeze();
+  frozen->keyframe_forwarding_ = keyframe_forwarding_.freeze();
+  frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
+  frozen->submaps_ = submaps_;
+  last_frozen_ = frozen;
+  return frozen;
+}
+
+LandmarkId Map::resolve(LandmarkId id) const {
+  while (id.is_valid() && !landmarks_.find(id)) id = landmark_forwarding_.at(id);
+  return id;
+}
+
+KeyframeId Map::resolve(KeyframeId id) const {
+  while (!keyframes_.find(id)) id = keyframe_forwarding_.at(id).heir;
+  return id;
+}
+
+Rigid3 Map::rig_from_world(KeyframeId reference,
+                           const Rigid3& rig_from_keyframe,
+                           double scale_then) const {
+  const Keyframe* keyframe = keyframes_.find(reference);
+  Rigid3 rig_from_reference = rig_from_keyframe;
+  while (!keyframe) {
+    const KeyframeForwarding& forwarding = keyframe_forwarding_.at(reference);
+    rig_from_reference = rig_from_reference * forwarding.rig_from_heir;
+    scale_then = forwarding.heir_scale;
+    reference = forwarding.heir;
+    keyframe = keyframes_.find(reference);
+  }
+  rig_from_reference.translation *= keyframe->applied_scale / scale_then;
+  return rig_from_reference * keyframe->rig_from_world;
+}
+
+SubmapId Map::add_submap(bool is_metric) {
+  submaps_.push_back({is_metric, {}});
+  return SubmapId{static_cast<std::uint32_t>(submaps_.size() - 1)};
+}
+
+KeyframeId Map::add_keyframe(Keyframe keyframe) {
+  WAYMARK_CHECK(keyframe.features && keyframe.rig && keyframe.submap.value < submaps_.size());
+  WAYMARK_CHECK(!keyframe.parent.is_valid() || keyframes_.find(keyframe.parent));
+  keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
+  Submap& submap = submaps_[keyframe.submap.value];
+  const bool is_root = !submap.root.is_valid();
+  WAYMARK_CHECK(is_root != keyframe.parent.is_valid());
+  const KeyframeId id = keyframes_.insert(std::move(keyframe));
+  covisibility_.insert({});
+  keyframe_forwarding_.insert({});
+  if (is_root) submap.root = id;
+  return id;
+}
+
+LandmarkId Map::add_landmark(SubmapId submap,
+                             const Eigen::Vector3d& position_in_world,
+                             KeyframeId reference) {
+  Landmark landmark;
+  landmark.submap = submap;
+  landmark.position_in_world = position_in_world;
+  landmark.reference = reference;
+  landmark_forwarding_.insert({});
+  return landmarks_.insert(std::move(landmark));
+}
+
+void Map::observe(KeyframeId keyframe, std::uint32_t feature, LandmarkId landmark) {
+  WAYMARK_CHECK(!keyframes_.at(keyframe).landmarks.at(feature).is_valid());
+  if (!is_observed_by(landmarks_.at(landmark), keyframe)) {
+    for (KeyframeId other : observers_except(landmarks_.at(landmark), keyframe)) {
+      change_covisibility(keyframe, other, 1);
+    }
+  }
+  keyframes_.edit(keyframe).landmarks[feature] = landmark;
+  auto& observations = landmarks_.edit(landmark).observations;
+  const Observation observation{keyframe, feature};
+  observations.insert(std::lower_bound(observations.begin(), observations.end(), observation),
+                      observation);
+}
+
+void Map::forget(KeyframeId keyframe, std::uint32_t feature) {
+  const LandmarkId id = keyframes_.at(keyframe).landmarks.at(feature);
+  WAYMARK_CHECK(id.is_valid());
+  keyframes_.edit(keyframe).landmarks[feature] = LandmarkId{};
+  Landmark& landmark = landmarks_.edit(id);
+  std::erase(landmark.observations, Observation{keyframe, feature});
+  if (is_observed_by(landmark, keyframe)) return;
+  const std::vector<KeyframeId> others = observers_except(landmark, keyframe);
+  if (landmark.reference == keyframe && !others.empty()) landmark.reference = others.front();
+  for (KeyframeId other : others) change_covisibility(keyframe, other, -1);
+}
+
+void Map::merge_landmarks(LandmarkId survivor, LandmarkId absorbed) {
+  WAYMARK_CHECK(survivor != absorbed);
+  const Landmark old = landmarks_.at(absorbed);
+  erase_landmark(absorbed);
+  KeyframeId last_moved;
+  for (const Observation& observation : old.observations) {
+    const bool is_moving = observation.keyframe == last_moved;
+    if (!is_moving && is_observed_by(landmarks_.at(survivor), observation.keyframe)) continue;
+    observe(observation.keyframe, observation.feature, survivor);
+    last_moved = observation.keyframe;
+  }
+  Landmark& merged = landmarks_.edit(survivor);
+  merged.num_visible += old.num_visible;
+  merged.num_found += old.num_found;
+  landmark_forwarding_.edit(absorbed) = survivor;
+}
+
+void Map::erase_landmark(LandmarkId id) {
+  const std::vector<Observation> observations = landmarks_.at(id).observations;
+  for (const Observation& observation : observations) {
+    forget(observation.keyframe, observation.feature);
+  }
+  landmarks_.erase(id);
+}
+
+void Map::erase_keyframe(KeyframeId id) {
+  const Keyframe old = keyframes_.at(id);
+  WAYMARK_CHECK(old.parent.is_valid());
+  for (std::uint32_t feature = 0; feature < old.landmarks.size(); ++feature) {
+    const LandmarkId landmark = old.landmarks[feature];
+    if (!landmark.is_valid() || !landmarks_.find(landmark)) continue;
+    forget(id, feature);
+    if (landmarks_.at(landmark).observations.empty()) erase_landmark(landmark);
+  }
+  std::vector<KeyframeId> children;
+  keyframes_.for_each([&](KeyframeId other, const Keyframe& keyframe) {
+    if (keyframe.parent == id) children.push_back(other);
+  });
+  for (KeyframeId child : children) keyframes_.edit(child).parent = old.parent;
+  const Keyframe& heir = keyframes_.at(old.parent);
+  keyframe_forwarding_.edit(id) = {
+      old.parent, old.rig_from_world * heir.rig_from_world.inverse(), heir.applied_scale};
+  keyframes_.erase(id);
+  covisibility_.erase(id);
+}
+
+void Map::move_keyframe(KeyframeId id, const Rigid3& rig_from_world) {
+  keyframes_.edit(id).rig_from_world = rig_from_world;
+}
+
+void Map::move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world) {
+  landmarks_.edit(id).position_in_world = position_in_world;
+}
+
+void Map::set_appearance(LandmarkId id, const Appearance& appearance) {
+  landmarks_.edit(id).appearance = appearance;
+}
+
+void Map::count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found) {
+  Landmark& landmark = landmarks_.edit(id);
+  landmark.num_visible += num_visible;
+  landmark.num_found += num_found;
+}
+
+void Map::change_covisibility(KeyframeId a, KeyframeId b, int change) {
+  for (int side = 0; side < 2; ++side, std::swap(a, b)) {
+    auto& edges = covisibility_.edit(a).edges;
+    const auto at = std::lower_bound(
+        edges.begin(), edges.end(), b, [](const CovisibilityEdge& edge, KeyframeId id) {
+          return edge.keyframe < id;
+        });
+    if (at == edges.end() || at->keyframe != b) {
+      WAYMARK_CHECK(change > 0);
+      edges.insert(at, CovisibilityEdge{b, static_cast<std::uint32_t>(change)});
+    } else {
+      at->num_shared += static_cast<std::uint32_t>(change);
+      if (at->num_shared == 0) edges.erase(at);
+    }
+  }
+}
+
+}  // namespace waymark

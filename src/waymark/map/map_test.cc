@@ -1,0 +1,161 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/map/map.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/base/rng.h"
+
+namespace waymark {
+namespace {
+
+Keyframe make_keyframe(std::size_t num_features, SubmapId submap, KeyframeId parent) {
+  auto features = std::make_shared<Features>();
+  features->keypoints.resize(num_features);
+  features->num_primary = num_features;
+  Keyframe keyframe;
+  keyframe.submap = submap;
+  keyframe.parent = parent;
+  keyframe.rig = std::make_shared<Rig>();
+  keyframe.features = features;
+  return keyframe;
+}
+
+template <class Id, class T>
+std::vector<Id> ids_of(const CowTable<Id, T>& table) {
+  std::vector<Id> ids;
+  table.for_each([&](Id id, const T&) { ids.push_back(id); });
+  return ids;
+}
+
+class RandomEdits {
+ public:
+  explicit RandomEdits(Map& map) : map_(map), submap_(map.add_submap(false)) {
+    map_.add_keyframe(make_keyframe(40, submap_, {}));
+  }
+
+  void step() {
+    const auto keyframes = ids_of(map_.keyframes());
+    const auto landmarks = ids_of(map_.landmarks());
+    const KeyframeId keyframe = keyframes[rng_.below(static_cast<std::uint32_t>(keyframes.size()))];
+    const auto pick = [&] {
+      return landmarks[rng_.below(static_cast<std::uint32_t>(landmarks.size()))];
+    };
+    const std::uint32_t feature = rng_.below(40);
+    const LandmarkId seen = map_.keyframes().at(keyframe).landmarks[feature];
+    switch (rng_.below(12)) {
+      case 0:
+        map_.add_keyframe(make_keyframe(40, submap_, keyframe));
+        break;
+      case 1:
+        if (map_.keyframes().at(keyframe).parent.is_valid() && rng_.below(3) == 0) {
+          map_.erase_keyframe(keyframe);
+        }
+        break;
+      case 2:
+        if (!landmarks.empty()) map_.erase_landmark(pick());
+        break;
+      case 3:
+        if (seen.is_valid()) map_.forget(keyframe, feature);
+        break;
+      case 4:
+        if (landmarks.size() > 1) {
+          const LandmarkId a = pick();
+          const LandmarkId b = pick();
+          if (a != b) map_.merge_landmarks(a, b);
+        }
+        break;
+      case 5:
+      case 6: {
+        if (seen.is_valid()) break;
+        const LandmarkId id = map_.add_landmark(submap_, Eigen::Vector3d::Ones(), keyframe);
+        map_.observe(keyframe, feature, id);
+        break;
+      }
+      default:
+        if (!seen.is_valid() && !landmarks.empty()) map_.observe(keyframe, feature, pick());
+    }
+  }
+
+ private:
+  Map& map_;
+  SubmapId submap_;
+  Rng rng_{1, 0};
+};
+
+TEST(Map, StaysSoundUnderRandomEdits) {
+  Map map;
+  RandomEdits edits(map);
+  for (int step = 0; step < 3000; ++step) {
+    edits.step();
+    ASSERT_EQ(map.broken_invariants(), "") << "after step " << step;
+  }
+  EXPECT_GT(map.landmarks().size(), 10u);
+}
+
+TEST(Map, FrozenCopiesNeverChange) {
+  Map map;
+  RandomEdits edits(map);
+  for (int step = 0; step < 300; ++step) edits.step();
+  const auto frozen = map.freeze();
+  std::vector<std::vector<Observation>> before;
+  frozen->landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { before.push_back(landmark.observations); });
+  for (int step = 0; step < 300; ++step) edits.step();
+  std::vector<std::vector<Observation>> after;
+  frozen->landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { after.push_back(landmark.observations); });
+  EXPECT_EQ(before, after);
+  EXPECT_EQ(frozen->broken_invariants(), "");
+}
+
+TEST(Map, CountsDistinctKeyframesNotFeatures) {
+  Map map;
+  const SubmapId submap = map.add_submap(true);
+  const KeyframeId a = map.add_keyframe(make_keyframe(4, submap, {}));
+  const KeyframeId b = map.add_keyframe(make_keyframe(4, submap, a));
+  const LandmarkId landmark = map.add_landmark(submap, Eigen::Vector3d::Ones(), a);
+  map.observe(a, 0, landmark);
+  map.observe(a, 2, landmark);
+  map.observe(b, 1, landmark);
+  map.observe(b, 3, landmark);
+  EXPECT_EQ(num_observers(map.landmarks().at(landmark)), 2u);
+  ASSERT_EQ(map.covisible(a).size(), 1u);
+  EXPECT_EQ(map.covisible(a)[0].num_shared, 1u);
+  map.forget(b, 1);
+  EXPECT_EQ(map.covisible(a)[0].num_shared, 1u);
+  map.forget(b, 3);
+  EXPECT_TRUE(map.covisible(a).empty());
+}
+
+TEST(Map, PosesRelativeToAnErasedKeyframeFollowItsHeirWithScale) {
+  Map map;
+  const SubmapId submap = map.add_submap(false);
+  const Rigid3 step(Eigen::Quaterniond::Identity(), {0.0, 0.0, -1.0});
+  const KeyframeId root = map.add_keyframe(make_keyframe(1, submap, {}));
+  Keyframe second = make_keyframe(1, submap, root);
+  second.rig_from_world = step;
+  const KeyframeId erased = map.add_keyframe(second);
+  map.erase_keyframe(erased);
+  EXPECT_EQ(map.resolve(erased), root);
+  const Rigid3 rig_from_world = map.rig_from_world(erased, step, 1.0);
+  EXPECT_NEAR(rig_from_world.translation.z(), -2.0, 1e-12);
+}
+
+TEST(Map, MergedIdsResolveToTheSurvivor) {
+  Map map;
+  const SubmapId submap = map.add_submap(false);
+  const KeyframeId a = map.add_keyframe(make_keyframe(4, submap, {}));
+  const LandmarkId first = map.add_landmark(submap, Eigen::Vector3d::Ones(), a);
+  const LandmarkId second = map.add_landmark(submap, Eigen::Vector3d::Ones(), a);
+  map.observe(a, 0, first);
+  map.observe(a, 1, second);
+  map.merge_landmarks(first, second);
+  EXPECT_EQ(map.resolve(second), first);
+  EXPECT_FALSE(map.keyframes().at(a).landmarks[1].is_valid());
+  map.erase_landmark(first);
+  EXPECT_FALSE(map.resolve(second).is_valid());
+}
+
+}  // namespace
+}  // namespace waymark

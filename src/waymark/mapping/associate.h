@@ -1,0 +1,45 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+#include <set>
+#include <vector>
+
+#include "waymark/map/map.h"
+#include "waymark/track/messages.h"
+
+namespace waymark {
+
+/// Squared residual, in pixels of the feature's level, of a world point in a feature of a keyframe;
+/// nothing if it lies behind the bearing. Above kMaxSquaredResidual it is not the same point.
+std::optional<double> squared_residual(const Keyframe& keyframe,
+                                       std::uint32_t feature,
+                                       const Eigen::Vector3d& point_in_world);
+inline constexpr double kMaxSquaredResidual = 5.991;  ///< 95 % of chi-square, 2 degrees of freedom.
+
+/// Whether a point fits a feature.
+bool agrees(const Keyframe& keyframe, std::uint32_t feature, const Eigen::Vector3d& point_in_world);
+
+/// Associates a primary feature with a landmark, and its partner where that agrees.
+void observe_with_partner(Map& map,
+                          KeyframeId keyframe,
+                          std::uint32_t feature,
+                          LandmarkId landmark);
+
+/// Removes an observation; that of a primary feature takes its partner's with it.
+void forget_with_partner(Map& map, KeyframeId keyframe, std::uint32_t feature);
+
+/// Landmarks changed since their appearance was last computed, in order.
+using DirtyLandmarks = std::set<LandmarkId>;
+
+/// Landmarks for the features of a keyframe that have a reliable range and no landmark yet.
+/// Returns how many.
+int add_landmarks_from_range(Map& map, KeyframeId keyframe, DirtyLandmarks& dirty);
+
+/// Keyframes most covisible with one, at most max_count, most shared first.
+std::vector<KeyframeId> strongest_neighbours(const Map& map,
+                                             KeyframeId keyframe,
+                                             std::size_t max_count);
+
+}  // namespace waymark

@@ -1,0 +1,206 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/bundle_window.h"
+
+#include <algorithm>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// Keyframes that hold the window in place; those that share most with it.
+constexpr std::size_t kMaxFixed = 25;
+
+template <class Id>
+std::size_t index_of(const std::vector<Id>& sorted, Id id) {
+  const auto at = std::lower_bound(sorted.begin(), sorted.end(), id);
+  return at != sorted.end() && *at == id ? static_cast<std::size_t>(at - sorted.begin())
+                                         : sorted.size();
+}
+
+template <class Id>
+void sort_unique(std::vector<Id>& ids) {
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+}
+
+std::vector<LandmarkId> seen_by(const Map& map, const std::vector<KeyframeId>& keyframes) {
+  std::vector<LandmarkId> ids;
+  for (KeyframeId keyframe : keyframes) {
+    for (LandmarkId id : map.keyframes().at(keyframe).landmarks) {
+      if (id.is_valid()) ids.push_back(id);
+    }
+  }
+  sort_unique(ids);
+  return ids;
+}
+
+/// Keyframes outside the window that see its landmarks, those that see most, ascending.
+std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window) {
+  std::vector<KeyframeId> seers;
+  for (LandmarkId id : window.landmarks) {
+    KeyframeId last;
+    for (const Observation& observation : map.landmarks().at(id).observations) {
+      if (observation.keyframe != last) seers.push_back(observation.keyframe);
+      last = observation.keyframe;
+    }
+  }
+  std::sort(seers.begin(), seers.end());
+  std::vector<std::pair<std::size_t, KeyframeId>> counts;
+  for (auto begin = seers.begin(); begin != seers.end();) {
+    const auto end = std::upper_bound(begin, seers.end(), *begin);
+    if (index_of(window.moving, *begin) == window.moving.size()) {
+      counts.push_back({static_cast<std::size_t>(end - begin), *begin});
+    }
+    begin = end;
+  }
+  std::sort(counts.rbegin(), counts.rend());
+  if (counts.size() > kMaxFixed) counts.resize(kMaxFixed);
+  std::vector<KeyframeId> fixed;
+  for (const auto& [count, id] : counts) fixed.push_back(id);
+  std::sort(fixed.begin(), fixed.end());
+  return fixed;
+}
+
+/// Holds the gauge: without anchors the oldest keyframe is fixed, in mono the next one too, which
+/// fixes the scale.
+void fix_gauge(const Map& map, BundleWindow& window) {
+  const bool is_metric =
+      map.submaps()[map.keyframes().at(window.moving.front()).submap.value].is_metric;
+  const std::size_t num_needed = is_metric ? 1 : 2;
+  while (window.fixed.size() < num_needed && window.moving.size() > 1) {
+    window.fixed.push_back(window.moving.front());
+    window.moving.erase(window.moving.begin());
+  }
+  std::sort(window.fixed.begin(), window.fixed.end());
+}
+
+struct WindowProblem {
+  BundleProblem problem;
+  std::vector<Observation> observations;  ///< Parallel to problem.observations.
+};
+
+BundleObservation measure(const Keyframe& keyframe, std::uint32_t feature) {
+  const Features& features = *keyframe.features;
+  BundleObservation measured;
+  measured.camera = features.keypoints[feature].camera;
+  measured.bearing = features.bearings[feature];
+  measured.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
+  if (feature < features.num_primary && features.inverse_range_sigma[feature] > 0.0f) {
+    measured.inverse_range = 1.0f / features.range_m[feature];
+    measured.inverse_range_sigma = features.inverse_range_sigma[feature];
+  }
+  return measured;
+}
+
+WindowProblem make_problem(const Map& map, const BundleWindow& window) {
+  WindowProblem result;
+  BundleProblem& problem = result.problem;
+  std::vector<KeyframeId> keyframes = window.moving;
+  keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
+  std::sort(keyframes.begin(), keyframes.end());
+  problem.rig = map.keyframes().at(keyframes.front()).rig.get();
+  for (KeyframeId id : keyframes) {
+    problem.rig_from_world.push_back(map.keyframes().at(id).rig_from_world);
+    problem.is_pose_fixed.push_back(index_of(window.moving, id) == window.moving.size());
+  }
+  for (LandmarkId id : window.landmarks) {
+    const Landmark& landmark = map.landmarks().at(id);
+    const auto point = static_cast<std::uint32_t>(problem.points.size());
+    problem.points.push_back(landmark.position_in_world);
+    for (const Observation& observation : landmark.observations) {
+      const std::size_t pose = index_of(keyframes, observation.keyframe);
+      if (pose == keyframes.size()) continue;
+      BundleObservation measured =
+          measure(map.keyframes().at(observation.keyframe), observation.feature);
+      measured.pose = static_cast<std::uint32_t>(pose);
+      measured.point = point;
+      problem.observations.push_back(measured);
+      result.observations.push_back(observation);
+    }
+  }
+  return result;
+}
+
+void write_back(Map& map, const BundleWindow& window, const BundleProblem& problem) {
+  std::size_t pose = 0;
+  std::vector<KeyframeId> keyframes = window.moving;
+  keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
+  std::sort(keyframes.begin(), keyframes.end());
+  for (KeyframeId id : keyframes) {
+    if (!problem.is_pose_fixed[pose]) map.move_keyframe(id, problem.rig_from_world[pose]);
+    ++pose;
+  }
+  for (std::size_t i = 0; i < window.landmarks.size(); ++i) {
+    map.move_landmark(window.landmarks[i], problem.points[i]);
+  }
+}
+
+}  // namespace
+
+BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_keyframes) {
+  BundleWindow window;
+  window.moving = strongest_neighbours(map, centre, num_keyframes - 1);
+  window.moving.push_back(centre);
+  std::sort(window.moving.begin(), window.moving.end());
+  window.landmarks = seen_by(map, window.moving);
+  window.fixed = anchors(map, window);
+  const KeyframeId root = map.submaps()[map.keyframes().at(centre).submap.value].root;
+  if (std::erase(window.moving, root) > 0) window.fixed.push_back(root);
+  if (!window.moving.empty()) fix_gauge(map, window);
+  std::sort(window.fixed.begin(), window.fixed.end());
+  return window;
+}
+
+BundleWindow whole_submap(const Map& map, SubmapId submap) {
+  BundleWindow window;
+  const KeyframeId root = map.submaps().at(submap.value).root;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.submap != submap) return;
+    (id == root ? window.fixed : window.moving).push_back(id);
+  });
+  map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+    if (landmark.submap == submap) window.landmarks.push_back(id);
+  });
+  if (!window.moving.empty()) fix_gauge(map, window);
+  return window;
+}
+
+bool is_supported(const Map& map, const Landmark& landmark) {
+  if (num_observers(landmark) >= 2) return true;
+  for (const Observation& observation : landmark.observations) {
+    const Features& features = *map.keyframes().at(observation.keyframe).features;
+    if (observation.feature >= features.num_primary) return true;
+    if (features.inverse_range_sigma[observation.feature] > 0.0f) return true;
+  }
+  return false;
+}
+
+std::vector<LandmarkId> adjust_window(Map& map,
+                                      const BundleWindow& window,
+                                      const BundleOptions& options,
+                                      DirtyLandmarks& dirty) {
+  std::vector<LandmarkId> erased;
+  if (window.moving.empty() || window.landmarks.empty()) return erased;
+  WindowProblem window_problem = make_problem(map, window);
+  const BundleResult result = adjust_bundle(window_problem.problem, options);
+  write_back(map, window, window_problem.problem);
+  dirty.insert(window.landmarks.begin(), window.landmarks.end());
+  for (std::size_t i = 0; i < window_problem.observations.size(); ++i) {
+    if (!result.is_outlier[i]) continue;
+    const auto& [keyframe, feature] = window_problem.observations[i];
+    // A partner may have gone with its primary feature already.
+    if (!map.keyframes().at(keyframe).landmarks[feature].is_valid()) continue;
+    forget_with_partner(map, keyframe, feature);
+  }
+  for (LandmarkId id : window.landmarks) {
+    if (is_supported(map, map.landmarks().at(id))) continue;
+    map.erase_landmark(id);
+    dirty.erase(id);
+    erased.push_back(id);
+  }
+  return erased;
+}
+
+}  // namespace waymark

@@ -1,0 +1,39 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "waymark/map/map.h"
+#include "waymark/mapping/associate.h"
+#include "waymark/optimize/bundle.h"
+
+namespace waymark {
+
+/// Part of a map to be adjusted together: keyframes that move, keyframes that hold it in place,
+/// landmarks, each ascending by id.
+struct BundleWindow {
+  std::vector<KeyframeId> moving;
+  std::vector<KeyframeId> fixed;
+  std::vector<LandmarkId> landmarks;
+};
+
+/// The keyframes most covisible with one, what they see, and who else sees that.
+BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_keyframes);
+
+/// A whole sub-map; its root is fixed.
+BundleWindow whole_submap(const Map& map, SubmapId submap);
+
+/// Adjusts a window, writes it back and drops the observations that turned out wrong, with the
+/// landmarks that lose their support. Returns the erased landmarks.
+std::vector<LandmarkId> adjust_window(Map& map,
+                                      const BundleWindow& window,
+                                      const BundleOptions& options,
+                                      DirtyLandmarks& dirty);
+
+/// Whether what is left of a landmark's observations fixes its position: two keyframes, or a
+/// partner feature or range in one.
+bool is_supported(const Map& map, const Landmark& landmark);
+
+}  // namespace waymark

@@ -1,0 +1,45 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "waymark/map/map.h"
+#include "waymark/mapping/associate.h"
+#include "waymark/mapping/cull.h"
+#include "waymark/mapping/settings.h"
+#include "waymark/match/epipolar.h"
+#include "waymark/match/projection.h"
+#include "waymark/track/messages.h"
+
+namespace waymark {
+
+/// Owns the map and is its only writer: turns the tracker's messages into keyframes and landmarks
+/// and keeps the surroundings of the newest keyframe consistent.
+class Mapper {
+ public:
+  Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings);
+
+  void add(const NewSubmap& message);
+  void add(const NewKeyframe& message);
+  /// Adjusts every sub-map as a whole.
+  void refine_globally();
+
+  std::shared_ptr<const Map> freeze() { return map_.freeze(); }
+  const Map& map() const { return map_; }
+
+ private:
+  KeyframeId insert(const NewKeyframe& message);
+  void put_on_probation(KeyframeId keyframe);
+  void refresh_appearances();
+
+  const std::shared_ptr<const Rig> rig_;
+  const MappingSettings settings_;
+  Map map_;
+  DirtyLandmarks dirty_;
+  Probation probation_;
+  ProjectionMatcher projection_;
+  EpipolarMatcher epipolar_;
+};
+
+}  // namespace waymark

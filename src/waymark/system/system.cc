@@ -1,0 +1,228 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/system.h"
+
+#include <algorithm>
+#include <chrono>
+#include <thread>
+
+#include "waymark/base/check.h"
+#include "waymark/base/feed.h"
+#include "waymark/base/mailbox.h"
+#include "waymark/image/frame_builder.h"
+#include "waymark/mapping/mapper.h"
+#include "waymark/track/tracker.h"
+
+namespace waymark {
+namespace {
+
+/// What is remembered of a frame for the trajectory.
+struct FrameMemory {
+  std::int64_t timestamp_ns = 0;
+  FrameState state = FrameState::kLost;
+  RelativePose pose;  ///< Where state is kTracked or kFilled.
+};
+
+/// A message and the frame from which on the tracker sees its effect.
+struct Delivery {
+  FrameId visible_from;
+  MapperMessage message;
+};
+
+constexpr std::size_t kInboxCapacity = 8;
+
+bool has_pose(FrameState state) {
+  return state == FrameState::kTracked || state == FrameState::kFilled;
+}
+
+}  // namespace
+
+class System::Impl {
+ public:
+  Impl(Rig rig, const Settings& settings, Timing timing)
+      : rig_(std::make_shared<const Rig>(std::move(rig))),
+        settings_(settings),
+        timing_(timing),
+        builder_(*rig_, {settings.features, settings.stereo, settings.depth}),
+        mapper_(rig_, settings.mapping),
+        feed_(timing, 0),
+        inbox_(kInboxCapacity) {
+    if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run_mapper(); });
+  }
+
+  ~Impl() { stop_mapper(); }
+
+  TrackingResult feed(const FrameInput& input);
+  void finish();
+  std::vector<TrajectoryFrame> trajectory() const;
+  std::vector<FrameState> frame_states() const;
+  std::shared_ptr<const Map> map() const { return visible_map_; }
+  SystemStatistics statistics() const;
+
+ private:
+  void send(FrameId frame, MapperMessage message);
+  void process(Delivery delivery);
+  void run_mapper();
+  void stop_mapper();
+  void remember(const Frame& frame, const TrackOutcome& outcome);
+
+  // Fixed after construction.
+  const std::shared_ptr<const Rig> rig_;
+  const Settings settings_;
+  const Timing timing_;
+
+  // The caller's thread.
+  FrameBuilder builder_;
+  std::optional<Tracker> tracker_;
+  std::vector<FrameMemory> memory_;
+  std::shared_ptr<const Map> visible_map_ = std::make_shared<const Map>();
+  bool is_finished_ = false;
+
+  // The mapper's thread, and the caller's once that has ended.
+  Mapper mapper_;
+  std::vector<double> mapping_ms_;
+
+  // Shared, safe by themselves.
+  Feed<Map> feed_;
+  Mailbox<Delivery> inbox_;
+  std::jthread thread_;
+};
+
+TrackingResult System::Impl::feed(const FrameInput& input) {
+  WAYMARK_CHECK(!is_finished_);
+  if (!memory_.empty() && input.timestamp_ns <= memory_.back().timestamp_ns) {
+    throw InputError("frame " + std::to_string(memory_.size()),
+                     "time stamp is not later than that of the frame before");
+  }
+  TrackingResult result;
+  const auto id = FrameId{static_cast<std::uint32_t>(memory_.size())};
+  Frame frame{id,
+              input.timestamp_ns,
+              builder_.build({input.image0, input.image1, input.depth, input.mask})};
+  result.stages[Stage::kFeatures] = builder_.times().features_ms;
+  result.stages[Stage::kDepth] = builder_.times().depth_ms;
+  if (!tracker_) {
+    const bool has_range = !input.image1.is_empty() || !input.depth.is_empty();
+    tracker_.emplace(
+        rig_, has_range, settings_.tracking, static_cast<std::uint64_t>(settings_.seed));
+  }
+  {
+    StageTimer timer(result.stages, Stage::kWait);
+    if (auto map = feed_.for_frame(id)) visible_map_ = std::move(map);
+  }
+  TrackOutcome outcome = tracker_->track(frame, visible_map_, result.stages);
+  remember(frame, outcome);
+  result.frame = id;
+  result.state = outcome.state;
+  result.reason = outcome.reason;
+  if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
+  result.covariance = outcome.covariance;
+  result.num_matches = outcome.num_matches;
+  result.num_inliers = outcome.num_inliers;
+  result.is_keyframe = outcome.message.has_value();
+  result.submap = SubmapId{0};
+  if (outcome.message) {
+    StageTimer timer(result.stages, timing_ == Timing::kInline ? Stage::kWait : Stage::kKeyframe);
+    send(id, std::move(*outcome.message));
+  }
+  return result;
+}
+
+void System::Impl::remember(const Frame& frame, const TrackOutcome& outcome) {
+  memory_.push_back({frame.timestamp_ns, outcome.state, outcome.pose.value_or(RelativePose{})});
+  for (const FilledPose& filled : outcome.filled) {
+    memory_.at(filled.frame.value).state = FrameState::kFilled;
+    memory_.at(filled.frame.value).pose = filled.pose;
+  }
+}
+
+void System::Impl::send(FrameId frame, MapperMessage message) {
+  // A new sub-map is what the next frame is tracked in; a keyframe shows its effect later.
+  const bool is_submap = std::holds_alternative<NewSubmap>(message);
+  const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
+  Delivery delivery{FrameId{frame.value + latency}, std::move(message)};
+  feed_.expect(delivery.visible_from);
+  if (timing_ == Timing::kInline) {
+    process(std::move(delivery));
+  } else {
+    inbox_.push(std::move(delivery));
+  }
+}
+
+void System::Impl::process(Delivery delivery) {
+  const auto start = std::chrono::steady_clock::now();
+  std::visit([&](const auto& message) { mapper_.add(message); }, delivery.message);
+  mapping_ms_.push_back(
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
+  feed_.publish(delivery.visible_from, mapper_.freeze());
+}
+
+void System::Impl::run_mapper() {
+  try {
+    while (auto delivery = inbox_.pop()) process(std::move(*delivery));
+  } catch (...) {
+    inbox_.close();
+    feed_.fail(std::current_exception());
+  }
+}
+
+void System::Impl::stop_mapper() {
+  inbox_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+void System::Impl::finish() {
+  if (is_finished_) return;
+  is_finished_ = true;
+  stop_mapper();
+  feed_.for_frame(FrameId{UINT32_MAX - 1});  // Rethrows what failed in the mapper's thread.
+  mapper_.refine_globally();
+  visible_map_ = mapper_.freeze();
+}
+
+std::vector<TrajectoryFrame> System::Impl::trajectory() const {
+  std::vector<TrajectoryFrame> frames;
+  for (std::uint32_t i = 0; i < memory_.size(); ++i) {
+    const FrameMemory& memory = memory_[i];
+    const KeyframeId reference = memory.pose.reference;
+    // The newest frames may refer to a keyframe that the visible map does not contain yet.
+    if (!has_pose(memory.state) || reference >= visible_map_->keyframes().end_id()) continue;
+    const Rigid3 rig_from_world = visible_map_->rig_from_world(
+        reference, memory.pose.rig_from_reference, memory.pose.reference_scale);
+    const KeyframeId living = visible_map_->resolve(reference);
+    frames.push_back({FrameId{i},
+                      memory.timestamp_ns,
+                      memory.state,
+                      visible_map_->keyframes().at(living).submap,
+                      rig_from_world.inverse()});
+  }
+  return frames;
+}
+
+std::vector<FrameState> System::Impl::frame_states() const {
+  std::vector<FrameState> states;
+  for (const FrameMemory& memory : memory_) states.push_back(memory.state);
+  return states;
+}
+
+SystemStatistics System::Impl::statistics() const {
+  WAYMARK_CHECK(is_finished_);
+  SystemStatistics statistics;
+  statistics.num_keyframes = static_cast<int>(visible_map_->keyframes().size());
+  statistics.num_landmarks = static_cast<int>(visible_map_->landmarks().size());
+  statistics.num_submaps = static_cast<int>(visible_map_->submaps().size());
+  statistics.mapping_ms = mapping_ms_;
+  return statistics;
+}
+
+System::System(Rig rig, const Settings& settings, Timing timing)
+    : impl_(std::make_unique<Impl>(std::move(rig), settings, timing)) {}
+System::~System() = default;
+TrackingResult System::feed(const FrameInput& input) { return impl_->feed(input); }
+void System::finish() { impl_->finish(); }
+std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
+std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
+std::shared_ptr<const Map> System::map() const { return impl_->map(); }
+SystemStatistics System::statistics() const { return impl_->statistics(); }
+
+}  // namespace waymark

@@ -1,0 +1,97 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/base/frame_state.h"
+#include "waymark/base/timing.h"
+#include "waymark/camera/rig.h"
+#include "waymark/image/image.h"
+#include "waymark/map/map.h"
+#include "waymark/system/settings.h"
+#include "waymark/track/stage_times.h"
+
+namespace waymark {
+
+/// The images of one moment. Views are borrowed for the duration of the call.
+struct FrameInput {
+  std::int64_t timestamp_ns = 0;
+  ImageView image0;  ///< Camera 0, grey, of the size its calibration states.
+  ImageView image1;  ///< Camera 1 of a stereo rig; empty otherwise.
+  DepthView depth;   ///< Depth along z registered to camera 0; empty where there is none.
+  ImageView mask;    ///< Of camera 0; no features where it is 0. Empty: everything is used.
+};
+
+/// What is known of a frame right after it was fed.
+struct TrackingResult {
+  FrameId frame;
+  FrameState state = FrameState::kLost;
+  FrameReason reason = FrameReason::kNone;  ///< Why there is no pose.
+  std::optional<Rigid3> world_from_rig;     ///< The pose, in metres (map units for mono).
+  /// Covariance of the pose for perturbations exp(xi) * rig_from_world, xi = (rho, phi) in (m,
+  /// rad).
+  Matrix6d covariance = Matrix6d::Zero();
+  int num_matches = 0;
+  int num_inliers = 0;
+  bool is_keyframe = false;
+  SubmapId submap;
+  StageTimes stages;
+};
+
+/// A frame in the final trajectory.
+struct TrajectoryFrame {
+  FrameId frame;
+  std::int64_t timestamp_ns = 0;
+  FrameState state = FrameState::kLost;  ///< kTracked or kFilled.
+  SubmapId submap;
+  Rigid3 world_from_rig;
+};
+
+/// Totals of a session.
+struct SystemStatistics {
+  int num_keyframes = 0;
+  int num_landmarks = 0;
+  int num_submaps = 0;
+  int num_loops = 0;
+  int num_relocalizations = 0;
+  std::vector<double> mapping_ms;  ///< One entry per keyframe.
+};
+
+/// Visual SLAM on a stream of frames. One thread feeds; mapping runs beside it unless the timing is
+/// kInline. kInline and kLockstep give the same bits.
+class System {
+ public:
+  /// Throws InputError for a rig or settings that cannot work together.
+  System(Rig rig, const Settings& settings, Timing timing);
+  ~System();
+  System(const System&) = delete;
+  System& operator=(const System&) = delete;
+
+  /// Tracks one frame; timestamps must increase. Rethrows what failed in the mapper's thread.
+  TrackingResult feed(const FrameInput& input);
+
+  /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards;
+  /// statistics() only afterwards.
+  void finish();
+
+  /// Every frame that has a pose, in order, with what is known now. After finish(): final.
+  std::vector<TrajectoryFrame> trajectory() const;
+
+  /// State of every frame fed so far, including those filled in after the fact.
+  std::vector<FrameState> frame_states() const;
+
+  /// The newest finished map, immutable.
+  std::shared_ptr<const Map> map() const;
+
+  SystemStatistics statistics() const;
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,20 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "waymark/base/id.h"
+#include "waymark/image/features.h"
+
+namespace waymark {
+
+/// A frame on its way through the tracker.
+struct Frame {
+  FrameId id;
+  std::int64_t timestamp_ns = 0;
+  std::shared_ptr<const Features> features;
+};
+
+}  // namespace waymark

@@ -1,0 +1,283 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/initializer.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "waymark/geometry/two_view.h"
+#include "waymark/image/range_precision.h"
+#include "waymark/optimize/bundle.h"
+#include "waymark/track/frame_locator.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kMinLandmarks = 80;
+constexpr std::size_t kMaxReferences = 8;
+/// A new reference is kept every so many frames, so that slow and fast motion find a partner.
+constexpr std::uint32_t kReferenceInterval = 3;
+/// Least parallax of a pair, in pixels of the full image: with about one pixel of noise, single
+/// points are then known to a tenth of their depth and the pair to much better.
+constexpr double kMinParallaxPx = 12.0;
+constexpr double kSearchRadiusPx = 60.0;
+/// Points nearer or farther than this, in baselines of the pair, carry little.
+constexpr double kMaxDepthBaselines = 200.0;
+
+std::vector<Eigen::Vector2f> pixels_of(const Features& features) {
+  std::vector<Eigen::Vector2f> pixels;
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    pixels.emplace_back(features.keypoints[i].x_px, features.keypoints[i].y_px);
+  }
+  return pixels;
+}
+
+BundleObservation observation_of(const Features& features,
+                                 std::uint32_t feature,
+                                 std::uint32_t pose,
+                                 std::uint32_t point) {
+  BundleObservation observation;
+  observation.pose = pose;
+  observation.point = point;
+  observation.camera = 0;
+  observation.bearing = features.bearings[feature];
+  observation.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
+  return observation;
+}
+
+/// Median distance of points from the origin.
+double median_distance(const std::vector<Eigen::Vector3d>& points) {
+  std::vector<double> distances;
+  for (const Eigen::Vector3d& point : points) distances.push_back(point.norm());
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+/// Bearings of matched features and their noise, as arrays of their own.
+struct MatchedBearings {
+  std::vector<Eigen::Vector3d> a, b;
+  std::vector<double> sigmas_rad_a, sigmas_rad_b;
+
+  MatchedBearings(const Features& features_a,
+                  const Features& features_b,
+                  std::span<const FeatureMatch> matches) {
+    for (const FeatureMatch& match : matches) {
+      a.push_back(features_a.bearings[match.a].cast<double>());
+      b.push_back(features_b.bearings[match.b].cast<double>());
+      sigmas_rad_a.push_back(features_a.size_rad[match.a]);
+      sigmas_rad_b.push_back(features_b.size_rad[match.b]);
+    }
+  }
+
+  BearingMatches view() const { return {a, b, sigmas_rad_a, sigmas_rad_b}; }
+};
+
+FrameReason reason_of(TwoViewStatus status) {
+  switch (status) {
+    case TwoViewStatus::kTooFewMatches:
+      return FrameReason::kTooFewMatches;
+    case TwoViewStatus::kTooFewInliers:
+      return FrameReason::kTooFewInliers;
+    default:  // Ambiguity ends once there is more parallax.
+      return FrameReason::kTooLittleParallax;
+  }
+}
+
+/// The points of a pair and its motion after adjustment, in units of the first translation.
+struct RefinedPair {
+  Rigid3 b_from_a;
+  std::vector<Eigen::Vector3d> points;
+  std::vector<FeatureMatch> matches;
+};
+
+RefinedPair refine_pair(const Rig& rig,
+                        const Features& a,
+                        const Features& b,
+                        std::span<const FeatureMatch> matches,
+                        const TwoViewGeometry& geometry) {
+  BundleProblem problem;
+  problem.rig = &rig;
+  problem.rig_from_world = {Rigid3{}, geometry.b_from_a};
+  problem.is_pose_fixed = {1, 0};
+  std::vector<FeatureMatch> kept;
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!geometry.has_point[i]) continue;
+    const auto point = static_cast<std::uint32_t>(problem.points.size());
+    problem.points.push_back(geometry.points_in_a[i]);
+    problem.observations.push_back(observation_of(a, matches[i].a, 0, point));
+    problem.observations.push_back(observation_of(b, matches[i].b, 1, point));
+    kept.push_back(matches[i]);
+  }
+  const BundleResult result = adjust_bundle(problem, BundleOptions{});
+  RefinedPair refined;
+  refined.b_from_a = problem.rig_from_world[1];
+  for (std::size_t i = 0; i < kept.size(); ++i) {
+    if (result.is_outlier[2 * i] || result.is_outlier[2 * i + 1]) continue;
+    refined.points.push_back(problem.points[i]);
+    refined.matches.push_back(kept[i]);
+  }
+  return refined;
+}
+
+/// The landmarks of a new sub-map, as its last keyframe sees them.
+LandmarkSet landmark_set(const NewSubmap& submap) {
+  const InitialKeyframe& keyframe = submap.keyframes.back();
+  const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
+  LandmarkSet set;
+  for (const InitialLandmark& initial : submap.landmarks) {
+    const std::uint32_t feature = initial.features.back();
+    const Eigen::Vector3d to_camera = centre - initial.position_in_world;
+    Landmark landmark;
+    landmark.position_in_world = initial.position_in_world;
+    landmark.appearance.descriptor = keyframe.features->descriptors[feature];
+    landmark.appearance.direction = to_camera.normalized();
+    landmark.appearance.size_m = to_camera.norm() * keyframe.features->size_rad[feature];
+    set.add(LandmarkId{}, landmark);
+  }
+  return set;
+}
+
+}  // namespace
+
+Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed)
+    : rig_(rig),
+      has_range_(has_range),
+      seed_(seed),
+      pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
+      projection_(rig) {}
+
+std::optional<Initialization> Initializer::add(const Frame& frame) {
+  if (frame.features->num_primary < kMinLandmarks) {
+    reason_ = FrameReason::kNoFeatures;
+    return std::nullopt;
+  }
+  return has_range_ ? start_from_range(frame) : start_from_two_views(frame);
+}
+
+std::optional<Initialization> Initializer::start_from_range(const Frame& frame) {
+  const Features& features = *frame.features;
+  Initialization start;
+  start.submap.is_metric = true;
+  start.submap.keyframes.push_back({frame.id, frame.timestamp_ns, Rigid3{}, frame.features});
+  const Rigid3 world_from_cam = rig_->cameras[0].cam_from_rig.inverse();
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    if (!has_reliable_range(*rig_, features, i)) continue;
+    const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
+    start.submap.landmarks.push_back({world_from_cam * point, {i}});
+  }
+  if (start.submap.landmarks.size() < kMinLandmarks) {
+    reason_ = FrameReason::kTooFewMatches;
+    return std::nullopt;
+  }
+  reason_ = FrameReason::kNone;
+  return start;
+}
+
+std::optional<Initialization> Initializer::start_from_two_views(const Frame& frame) {
+  reason_ = FrameReason::kTooFewMatches;
+  for (Reference& reference : references_) match(reference, frame);
+  std::erase_if(references_, [](const Reference& reference) {
+    return static_cast<int>(reference.matches.size()) < kMinLandmarks;
+  });
+  for (const Reference& reference : references_) {
+    if (std::optional<Initialization> start = try_pair(reference, frame)) {
+      fill(reference, *start);
+      reason_ = FrameReason::kNone;
+      return start;
+    }
+  }
+  passed_.push_back(frame);
+  if (references_.empty() ||
+      frame.id.value - references_.back().frame.id.value >= kReferenceInterval) {
+    references_.push_back({frame, pixels_of(*frame.features), {}});
+    if (references_.size() > kMaxReferences) references_.erase(references_.begin() + 1);
+  }
+  while (passed_.front().id < references_.front().frame.id) passed_.pop_front();
+  return std::nullopt;
+}
+
+void Initializer::match(Reference& reference, const Frame& frame) {
+  const auto matches = appearance_.match_near(*reference.frame.features,
+                                              reference.expected_pixels,
+                                              kSearchRadiusPx,
+                                              *frame.features,
+                                              {.max_distance = 60, .max_ratio = 0.85});
+  reference.matches.assign(matches.begin(), matches.end());
+  for (const FeatureMatch& match : matches) {
+    const Keypoint& keypoint = frame.features->keypoints[match.b];
+    reference.expected_pixels[match.a] = {keypoint.x_px, keypoint.y_px};
+  }
+}
+
+std::optional<Initialization> Initializer::try_pair(const Reference& reference,
+                                                    const Frame& frame) {
+  const MatchedBearings bearings(*reference.frame.features, *frame.features, reference.matches);
+  TwoViewOptions options;
+  options.seed = seed_;
+  options.stream = frame.id.value;
+  options.min_num_points = kMinLandmarks;
+  options.min_parallax_rad = kMinParallaxPx * pixel_rad_;
+  const TwoViewResult two_view = estimate_two_view(bearings.view(), options);
+  if (!two_view.geometry) {
+    reason_ = reason_of(two_view.status);
+    return std::nullopt;
+  }
+  const RefinedPair pair = refine_pair(
+      *rig_, *reference.frame.features, *frame.features, reference.matches, *two_view.geometry);
+  if (pair.matches.size() < kMinLandmarks) {
+    reason_ = FrameReason::kTooFewInliers;
+    return std::nullopt;
+  }
+  Initialization start;
+  const double scale = 1.0 / median_distance(pair.points);
+  start.rig_from_world = pair.b_from_a;
+  start.rig_from_world.translation *= scale;
+  start.submap.keyframes = {
+      {reference.frame.id, reference.frame.timestamp_ns, Rigid3{}, reference.frame.features},
+      {frame.id, frame.timestamp_ns, start.rig_from_world, frame.features}};
+  for (std::size_t i = 0; i < pair.matches.size(); ++i) {
+    start.submap.landmarks.push_back(
+        {scale * pair.points[i], {pair.matches[i].a, pair.matches[i].b}});
+  }
+  return start;
+}
+
+void Initializer::fill(const Reference& reference, Initialization& start) {
+  const LandmarkSet landmarks = landmark_set(start.submap);
+  start.filled.push_back({reference.frame.id, {KeyframeId{0}, Rigid3{}, 1.0}});
+  const auto middle = std::find_if(passed_.begin(), passed_.end(), [&](const Frame& passed) {
+    return passed.id >= reference.frame.id;
+  });
+  const auto try_fill = [&](const Frame& passed, Rigid3& guess) {
+    const std::optional<Rigid3> rig_from_world = locate(passed, guess, landmarks);
+    if (!rig_from_world) return;
+    guess = *rig_from_world;
+    start.filled.push_back({passed.id, {KeyframeId{0}, *rig_from_world, 1.0}});
+  };
+  Rigid3 guess;
+  for (auto it = middle; it != passed_.end(); ++it) {
+    if (it->id != reference.frame.id) try_fill(*it, guess);
+  }
+  guess = Rigid3{};
+  for (auto it = middle; it != passed_.begin(); --it) try_fill(*std::prev(it), guess);
+}
+
+std::optional<Rigid3> Initializer::locate(const Frame& frame,
+                                          const Rigid3& guess,
+                                          const LandmarkSet& landmarks) {
+  const ProjectionMatches& matches =
+      projection_.match(landmarks, *frame.features, {}, guess, {.radius_px = kSearchRadiusPx / 2});
+  PoseObservations observations;
+  for (std::size_t i = 0; i < landmarks.size(); ++i) {
+    if (matches.features[i] == kNoFeature) continue;
+    append_observation(
+        *frame.features, matches.features[i], landmarks.positions_in_world[i], observations);
+  }
+  const PoseEstimate estimate =
+      optimize_pose(*rig_, observations, guess, PoseOptions{}, pose_workspace_);
+  if (estimate.num_inliers < kMinLandmarks / 3) return std::nullopt;
+  return estimate.rig_from_world;
+}
+
+}  // namespace waymark

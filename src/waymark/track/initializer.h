@@ -1,0 +1,73 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/base/frame_state.h"
+#include "waymark/match/appearance.h"
+#include "waymark/match/projection.h"
+#include "waymark/optimize/pose.h"
+#include "waymark/track/frame.h"
+#include "waymark/track/messages.h"
+
+namespace waymark {
+
+/// A frame that got its pose after the fact.
+struct FilledPose {
+  FrameId frame;
+  RelativePose pose;
+};
+
+/// A new sub-map and what follows from it for the frames seen meanwhile.
+struct Initialization {
+  NewSubmap submap;
+  Rigid3 rig_from_world;           ///< Of the frame that completed it, its last keyframe.
+  std::vector<FilledPose> filled;  ///< References count the keyframes of the sub-map from 0.
+};
+
+/// Starts a map: from the first frame with enough depth, or in mono from two views. In mono several
+/// earlier frames are kept as references; each new frame is matched to all of them, and the first
+/// pair with a well conditioned geometry makes the map. The frames in between are then located in
+/// it.
+class Initializer {
+ public:
+  Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed);
+
+  std::optional<Initialization> add(const Frame& frame);
+  /// Why the last add() gave nothing.
+  FrameReason reason() const { return reason_; }
+
+ private:
+  struct Reference {
+    Frame frame;
+    std::vector<Eigen::Vector2f> expected_pixels;  ///< Where its features were last seen.
+    std::vector<FeatureMatch> matches;             ///< With the newest frame.
+  };
+
+  std::optional<Initialization> start_from_range(const Frame& frame);
+  std::optional<Initialization> start_from_two_views(const Frame& frame);
+  void match(Reference& reference, const Frame& frame);
+  std::optional<Initialization> try_pair(const Reference& reference, const Frame& frame);
+  void fill(const Reference& reference, Initialization& start);
+  std::optional<Rigid3> locate(const Frame& frame,
+                               const Rigid3& guess,
+                               const LandmarkSet& landmarks);
+
+  const std::shared_ptr<const Rig> rig_;
+  const bool has_range_;
+  const std::uint64_t seed_;
+  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
+  FrameReason reason_ = FrameReason::kNone;
+  AppearanceMatcher appearance_;
+  ProjectionMatcher projection_;
+  PoseWorkspace pose_workspace_;
+  std::deque<Reference> references_;
+  std::deque<Frame> passed_;  ///< Frames since the oldest reference.
+};
+
+}  // namespace waymark

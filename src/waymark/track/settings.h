@@ -1,0 +1,34 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "waymark/base/settings.h"
+
+namespace waymark {
+
+struct TrackingSettings {
+  int min_inliers = 20;
+  double keyframe_ratio = 0.8;
+  int max_keyframe_interval = 30;
+
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field("min_inliers",
+          self.min_inliers,
+          SettingInfo{.low = 8, .high = 500, .help = "Landmarks a pose must rest on."});
+    field("keyframe_ratio",
+          self.keyframe_ratio,
+          SettingInfo{.low = 0.1,
+                      .high = 1.0,
+                      .help = "A new keyframe is due when a frame sees less than this part of the "
+                              "landmarks that its reference keyframe sees."});
+    field("max_keyframe_interval",
+          self.max_keyframe_interval,
+          SettingInfo{.low = 1,
+                      .high = 1000,
+                      .unit = "frames",
+                      .help = "Longest time between keyframes while the camera moves."});
+  }
+};
+
+}  // namespace waymark

@@ -1,0 +1,96 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/base/frame_state.h"
+#include "waymark/map/map.h"
+#include "waymark/match/appearance.h"
+#include "waymark/match/projection.h"
+#include "waymark/track/frame.h"
+#include "waymark/track/frame_locator.h"
+#include "waymark/track/initializer.h"
+#include "waymark/track/keyframe_decision.h"
+#include "waymark/track/local_map.h"
+#include "waymark/track/messages.h"
+#include "waymark/track/motion_model.h"
+#include "waymark/track/stage_times.h"
+
+namespace waymark {
+
+/// What tracking a frame gave.
+struct TrackOutcome {
+  FrameState state = FrameState::kLost;
+  FrameReason reason = FrameReason::kNone;
+  std::optional<RelativePose> pose;
+  Rigid3 rig_from_world;  ///< The pose as of now, where there is one.
+  Matrix6d covariance = Matrix6d::Zero();
+  int num_matches = 0;
+  int num_inliers = 0;
+  std::optional<MapperMessage> message;  ///< For the mapper; a frame with a message is a keyframe.
+  std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
+};
+
+/// Follows the camera through the map, frame by frame (Klein and Murray 2007; Mur-Artal et al.
+/// 2015): predict, match to the last frame, match to the local map, decide on a keyframe. Reads
+/// frozen maps, writes messages. The mapper must take the messages in order and give keyframes
+/// consecutive ids from 0.
+class Tracker {
+ public:
+  Tracker(std::shared_ptr<const Rig> rig,
+          bool has_range,
+          const TrackingSettings& settings,
+          std::uint64_t seed);
+
+  /// map: the newest one that this frame may see; null before the first sub-map.
+  TrackOutcome track(const Frame& frame, std::shared_ptr<const Map> map, StageTimes& times);
+
+ private:
+  enum class Mode { kInitializing, kTracking, kLost };
+
+  TrackOutcome initialize(const Frame& frame, StageTimes& times);
+  TrackOutcome follow(const Frame& frame, StageTimes& times);
+  /// Reads the last frame's pose and landmarks in the map of this frame.
+  void carry_over();
+  std::optional<LocatedFrame> locate_from_last(const Frame& frame);
+  std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
+  std::optional<LocatedFrame> recover(const Frame& frame);
+  LocatedFrame locate_in_local_map(const Frame& frame, const LocatedFrame& first);
+  void refresh_local_map(const Frame& frame);
+  void count_sightings(const ProjectionMatches& matches);
+  TrackOutcome accept(const Frame& frame, const LocatedFrame& located);
+  TrackOutcome lose(const Frame& frame, FrameReason reason);
+  KeyframeSituation assess(const Frame& frame, const LocatedFrame& located) const;
+  NewKeyframe make_keyframe(const Frame& frame, const RelativePose& pose);
+  std::vector<Sighting> take_sightings();
+
+  const std::shared_ptr<const Rig> rig_;
+  const bool has_range_;
+  const TrackingSettings settings_;
+  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
+  Initializer initializer_;
+  ProjectionMatcher matcher_;
+  AppearanceMatcher appearance_;
+  FrameLocator locator_;
+
+  Mode mode_ = Mode::kInitializing;
+  std::shared_ptr<const Map> map_;
+  LocalMap local_;
+  std::shared_ptr<const Map> local_map_source_;
+  int local_map_age_ = 0;
+  MotionModel motion_;
+  RelativePose last_pose_;
+  std::shared_ptr<const Features> last_features_;
+  std::vector<LandmarkId> last_landmarks_;  ///< Per feature of the last frame.
+  std::vector<LandmarkId> landmarks_;       ///< Per feature of this frame.
+  std::vector<Sighting> sightings_;
+  FrameId last_keyframe_frame_;
+  std::uint32_t num_sent_ = 0;  ///< Keyframes sent to the mapper.
+  LandmarkSet last_set_;
+  std::vector<std::uint8_t> is_taken_;
+};
+
+}  // namespace waymark
