@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "waymark/image/downscale.h"
 #include "waymark/image/image.h"
 #include "waymark/image/padded_image.h"
 
@@ -44,6 +45,7 @@ class Pyramid {
   }();
 
   std::array<PaddedImage, kNumLevels> levels_;
+  DownscaleWorkspace workspace_;
 };
 
 }  // namespace waymark

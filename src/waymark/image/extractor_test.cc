@@ -1,0 +1,139 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/image/extractor.h"
+
+#include <gmock/gmock.h>
+
+#include "waymark/base/check.h"
+#include "waymark/image/allocation_count.h"
+#include "waymark/image/image_testing.h"
+#include "waymark/image/mask.h"
+
+namespace waymark {
+namespace {
+
+struct Extracted {
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;
+};
+
+Extracted extract(FeatureExtractor& extractor, const PaddedImage& image, ImageView mask = {}) {
+  Extracted result;
+  extractor.extract(image.view(), mask, result.keypoints, result.descriptors);
+  return result;
+}
+
+TEST(FeatureExtractor, ReturnsWhatIsAskedForWithinTheImage) {
+  for (const auto& [width, height] : {std::pair(752, 480), {1241, 376}, {301, 1003}}) {
+    const PaddedImage image = testing::make_texture(width, height, 1);
+    for (int count : {100, 1000, 1500}) {
+      FeatureExtractor extractor({.count = count});
+      const Extracted features = extract(extractor, image);
+      EXPECT_EQ(features.keypoints.size(), static_cast<std::size_t>(count));
+      EXPECT_EQ(features.descriptors.size(), features.keypoints.size());
+      std::array<int, Pyramid::kNumLevels> num_at{};
+      for (const Keypoint& keypoint : features.keypoints) {
+        EXPECT_GT(keypoint.x_px, 18.0f);
+        EXPECT_GT(keypoint.y_px, 18.0f);
+        EXPECT_LT(keypoint.x_px, static_cast<float>(width) - 18.0f);
+        EXPECT_LT(keypoint.y_px, static_cast<float>(height) - 18.0f);
+        ++num_at[keypoint.level];
+      }
+      for (std::size_t i = 1; i < num_at.size(); ++i)
+        EXPECT_NEAR(num_at[i] * 1.2, num_at[i - 1], 2);
+    }
+  }
+}
+
+TEST(FeatureExtractor, DoesNotDependOnWhatItSawBefore) {
+  const PaddedImage image = testing::make_texture(400, 300, 1);
+  FeatureExtractor fresh({.count = 500});
+  const Extracted expected = extract(fresh, image);
+  FeatureExtractor used({.count = 500});
+  extract(used, testing::make_noise(640, 480, 2));
+  extract(used, testing::make_texture(300, 400, 3));
+  const Extracted features = extract(used, image);
+  EXPECT_EQ(features.descriptors, expected.descriptors);
+  ASSERT_EQ(features.keypoints.size(), expected.keypoints.size());
+  for (std::size_t i = 0; i < expected.keypoints.size(); ++i) {
+    EXPECT_EQ(features.keypoints[i].x_px, expected.keypoints[i].x_px);
+    EXPECT_EQ(features.keypoints[i].y_px, expected.keypoints[i].y_px);
+    EXPECT_EQ(features.keypoints[i].angle_rad, expected.keypoints[i].angle_rad);
+    EXPECT_EQ(features.keypoints[i].level, expected.keypoints[i].level);
+  }
+}
+
+TEST(FeatureExtractor, AllocatesNothingAfterTheFirstImage) {
+  const std::array<PaddedImage, 3> images{testing::make_texture(400, 300, 1),
+                                          testing::make_noise(400, 300, 2),
+                                          testing::make_texture(400, 300, 3)};
+  PaddedImage flat;
+  flat.resize(400, 300);
+  FeatureExtractor extractor({.count = 800});
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;
+  extractor.extract(flat.view(), {}, keypoints, descriptors);
+  const long before = testing::num_allocations();
+  for (const PaddedImage& image : images) {
+    extractor.extract(image.view(), {}, keypoints, descriptors);
+    EXPECT_EQ(keypoints.size(), 800u);
+  }
+  EXPECT_EQ(testing::num_allocations() - before, 0);
+}
+
+TEST(FeatureExtractor, HonoursMasks) {
+  const PaddedImage image = testing::make_texture(400, 300, 1);
+  const MaskRectangle left_half{.left = 0.0, .right = 0.5, .top = 0.0, .bottom = 1.0};
+  const Image mask = mask_of_rectangles({&left_half, 1}, 400, 300);
+  FeatureExtractor extractor({.count = 500});
+  const Extracted features = extract(extractor, image, mask.view());
+  EXPECT_EQ(features.keypoints.size(), 500u);
+  for (const Keypoint& keypoint : features.keypoints) {
+    // Up to half a pixel of the coarsest level for the sub-pixel part.
+    EXPECT_GT(keypoint.x_px, 199.0f - 1.8f);
+  }
+}
+
+TEST(FeatureExtractor, FindsNothingWhereThereIsNothing) {
+  PaddedImage flat;
+  flat.resize(400, 300);
+  FeatureExtractor extractor({.count = 500});
+  EXPECT_TRUE(extract(extractor, flat).keypoints.empty());
+  for (int size : {1, 2, 20, 39}) {
+    EXPECT_LE(extract(extractor, testing::make_noise(size, size, 1)).keypoints.size(), 1u);
+  }
+  const MaskRectangle all{.left = 0.0, .right = 1.0, .top = 0.0, .bottom = 1.0};
+  const Image mask = mask_of_rectangles({&all, 1}, 400, 300);
+  EXPECT_TRUE(extract(extractor, testing::make_noise(400, 300, 1), mask.view()).keypoints.empty());
+}
+
+TEST(FeatureExtractor, RejectsBadInput) {
+  const PaddedImage image = testing::make_noise(100, 80, 1);
+  FeatureExtractor extractor({});
+  EXPECT_THROW(extract(extractor, PaddedImage()), InputError);
+  EXPECT_THROW(extract(extractor, image, Image(80, 100).view()), InputError);
+}
+
+TEST(Mask, CoversPixelsWhoseCentresAreWithin) {
+  const std::array<MaskRectangle, 2> parts{
+      MaskRectangle{.left = 0.25, .right = 0.5, .top = 0.0, .bottom = 0.5},
+      MaskRectangle{.left = 0.9, .right = 1.0, .top = 0.9, .bottom = 1.0}};
+  const Image mask = mask_of_rectangles(parts, 8, 4);
+  for (int y = 0; y < 4; ++y) {
+    for (int x = 0; x < 8; ++x) {
+      const bool is_covered = (x == 2 || x == 3) && y < 2;
+      EXPECT_EQ(mask.view().at(x, y), is_covered ? 0 : 255) << x << ", " << y;
+    }
+  }
+}
+
+TEST(Mask, RejectsRectanglesThatAreNone) {
+  for (const MaskRectangle& part : {MaskRectangle{.left = 0.6, .right = 0.5, .bottom = 1.0},
+                                    MaskRectangle{.right = 1.5, .bottom = 1.0},
+                                    MaskRectangle{.right = 1.0, .top = -0.1, .bottom = 1.0}}) {
+    EXPECT_THROW(mask_of_rectangles({&part, 1}, 10, 10), InputError);
+  }
+}
+
+}  // namespace
+}  // namespace waymark
