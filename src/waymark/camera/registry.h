@@ -50,9 +50,7 @@ class CameraRegistry {
 /// For factories: InputError unless the numbers of intrinsics and distortion coefficients are
 /// right. `names` lists the intrinsics, for example "fu fv pu pv".
 void expect_intrinsics(const CameraDescription& description, std::string_view names);
+/// For factories of models without separate distortion.
 void expect_no_distortion(const CameraDescription& description);
-
-/// For factories: InputError unless almost every pixel of the image has a direction.
-void expect_valid_image(const CameraDescription& description, const Camera& camera);
 
 }  // namespace waymark

@@ -1,0 +1,160 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/camera/registry.h"
+
+#include <gmock/gmock.h>
+
+#include <cmath>
+
+#include "waymark/base/check.h"
+#include "waymark/camera/model_camera.h"
+#include "waymark/camera/perspective.h"
+#include "waymark/camera/testing/camera_test.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::AllOf;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+CameraDescription euroc() {
+  CameraDescription description;
+  description.camera_model = "pinhole";
+  description.intrinsics = {458.654, 457.296, 367.215, 248.375};
+  description.distortion_model = "radtan";
+  description.distortion_coeffs = {-0.28340811, 0.07395907, 0.00019359, 1.76187114e-05};
+  description.width_px = 752;
+  description.height_px = 480;
+  description.where = "a.yaml:1: cam0";
+  return description;
+}
+
+std::string error_of(const CameraDescription& description) {
+  try {
+    CameraRegistry::with_builtin_models().make_camera(description);
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "no error";
+}
+
+template <class Change>
+std::string error_after(Change&& change) {
+  CameraDescription description = euroc();
+  change(description);
+  return error_of(description);
+}
+
+TEST(CameraRegistry, MakesAPerspectiveCamera) {
+  const auto camera = CameraRegistry::with_builtin_models().make_camera(euroc());
+  EXPECT_EQ(camera->model(), "pinhole");
+  EXPECT_EQ(camera->width_px(), 752);
+  EXPECT_EQ(camera->height_px(), 480);
+  EXPECT_EQ(camera->wrap_width_px(), 0.0);
+  const auto* perspective = dynamic_cast<const PerspectiveCamera*>(camera.get());
+  ASSERT_NE(perspective, nullptr);
+  EXPECT_EQ(perspective->parameters().focal_px(), Eigen::Vector2d(458.654, 457.296));
+  const CameraTestProjection ahead = project_for_test(*camera, {{0.0, 0.0, 2.0}});
+  EXPECT_EQ(ahead.pixels[0], Eigen::Vector2d(367.215, 248.375));
+}
+
+TEST(CameraRegistry, EachFaultHasItsMessage) {
+  const auto message = [](auto&& change) { return error_after(change); };
+  EXPECT_EQ(message([](auto& d) { d.camera_model = "pinhol"; }),
+            "a.yaml:1: cam0: camera_model is pinhol, expected one of: pinhole");
+  EXPECT_EQ(message([](auto& d) { d.intrinsics.pop_back(); }),
+            "a.yaml:1: cam0: intrinsics has 3 numbers, expected 4: fu fv pu pv");
+  EXPECT_EQ(message([](auto& d) { d.intrinsics[1] = -3.0; }),
+            "a.yaml:1: cam0: focal length fv is -3, expected more than 0");
+  EXPECT_THAT(message([](auto& d) { d.intrinsics[0] = 0.0; }), HasSubstr("focal length fu is 0"));
+  EXPECT_THAT(message([](auto& d) { d.intrinsics[2] = std::nan(""); }),
+              HasSubstr("intrinsics holds nan"));
+  EXPECT_THAT(message([](auto& d) { d.distortion_coeffs[0] = INFINITY; }),
+              HasSubstr("distortion_coeffs holds inf"));
+  EXPECT_THAT(message([](auto& d) { d.distortion_coeffs.resize(6); }),
+              HasSubstr("distortion_coeffs has 6 numbers, expected 4, 5 or 8"));
+  EXPECT_THAT(message([](auto& d) { d.distortion_model = "plumb_bob"; }),
+              HasSubstr("distortion_model is plumb_bob, expected radtan or none"));
+  EXPECT_THAT(message([](auto& d) { d.distortion_model = "none"; }),
+              HasSubstr("distortion_coeffs has 4 numbers, expected none"));
+  EXPECT_THAT(message([](auto& d) { d.width_px = 0; }),
+              HasSubstr("resolution is [0, 480], expected width and height from 16 to 20000"));
+  EXPECT_THAT(message([](auto& d) { d.height_px = 1000000; }), HasSubstr("resolution is"));
+}
+
+TEST(CameraRegistry, DistortionThatFoldsBackInTheImageIsRefused) {
+  EXPECT_THAT(error_after([](auto& d) {
+                d.distortion_coeffs = {-0.9, 0.0, 0.0, 0.0};
+              }),
+              AllOf(StartsWith("a.yaml:1: cam0: distortion_coeffs fold the image back at 18"),
+                    HasSubstr("% of the pixels without a direction")));
+  // The fold of x - 0.2 x^3, at 0.86 of the focal length, is outside of this image.
+  EXPECT_EQ(error_after([](auto& d) {
+              d.distortion_coeffs = {-0.2, 0.0, 0.0, 0.0};
+              d.width_px = 640;
+            }),
+            "no error");
+}
+
+/// A camera model from outside of the library: r = f * angle, in all directions but backwards.
+struct EqualAngleModel {
+  static constexpr std::string_view kName = "equal_angle";
+  double focal_px;
+  Eigen::Vector2d center_px;
+
+  std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p) const {
+    const double radius = p.head<2>().norm();
+    const double angle = std::atan2(radius, p.z());
+    if (!(angle < 2.0)) return std::nullopt;
+    if (radius == 0.0) return center_px;
+    return center_px + focal_px * angle / radius * p.head<2>();
+  }
+  std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const {
+    const Eigen::Vector2d offset = (pixel - center_px) / focal_px;
+    const double angle = offset.norm();
+    if (!(angle < 2.0)) return std::nullopt;
+    if (angle == 0.0) return Eigen::Vector3d(0.0, 0.0, 1.0);
+    const Eigen::Vector2d side = std::sin(angle) / angle * offset;
+    return Eigen::Vector3d(side.x(), side.y(), std::cos(angle));
+  }
+  Matrix23d jacobian(const Eigen::Vector3d& p) const {
+    const double radius = p.head<2>().norm();
+    const double angle = std::atan2(radius, p.z());
+    const Eigen::Vector2d side = p.head<2>() / radius;
+    Matrix23d result;
+    result.leftCols<2>() =
+        focal_px * (p.z() / p.squaredNorm() * side * side.transpose() +
+                    angle / radius * (Eigen::Matrix2d::Identity() - side * side.transpose()));
+    result.col(2) = -focal_px * radius / p.squaredNorm() * side;
+    return result;
+  }
+};
+
+TEST(CameraRegistry, UsersAddModels) {
+  CameraRegistry registry = CameraRegistry::with_builtin_models();
+  registry.add("equal_angle", [](const CameraDescription& description) {
+    expect_intrinsics(description, "fu pu pv");
+    expect_no_distortion(description);
+    const std::vector<double>& values = description.intrinsics;
+    return std::make_shared<const ModelCamera<EqualAngleModel>>(
+        EqualAngleModel{values[0], {values[1], values[2]}},
+        description.width_px,
+        description.height_px);
+  });
+  CameraDescription description;
+  description.camera_model = "equal_angle";
+  description.intrinsics = {150.0, 320.3, 239.8};
+  description.width_px = 640;
+  description.height_px = 480;
+  description.where = "b";
+  const auto camera = registry.make_camera(description);
+  EXPECT_EQ(camera->model(), "equal_angle");
+  expect_camera_is_sound(*camera);
+  description.distortion_model = "radtan";
+  EXPECT_THROW(registry.make_camera(description), InputError);
+  EXPECT_THROW(registry.add("pinhole", [](const auto&) { return nullptr; }), CheckError);
+}
+
+}  // namespace
+}  // namespace waymark
