@@ -13,7 +13,21 @@ import unittest
 import zlib
 
 PROGRAM = os.environ.get("WAYMARK_PROGRAM", "waymark")
-NUM_FRAMES = 24
+NUM_FRAMES = 40
+CAMERA = """cam0:
+  camera_model: pinhole
+  intrinsics: [290, 291, 187, 121]
+  distortion_model: radtan
+  distortion_coeffs: [-0.2, 0.05, 0.0002, -0.0001]
+  resolution: [376, 240]
+cam1:
+  camera_model: pinhole
+  intrinsics: [290, 291, 187, 121]
+  distortion_model: radtan
+  distortion_coeffs: [-0.2, 0.05, 0.0002, -0.0001]
+  resolution: [376, 240]
+  T_cn_cnm1: [[1, 0, 0, -0.11], [0, 1, 0, 0.003], [0, 0, 1, 0], [0, 0, 0, 1]]
+"""
 
 
 def waymark(*arguments, **options):
@@ -61,7 +75,10 @@ class CliTest(unittest.TestCase):
             CliTest._shared = tempfile.TemporaryDirectory(prefix="waymark_sequences_")
         if setup not in CliTest._sequences:
             made = pathlib.Path(CliTest._shared.name) / setup
-            done = waymark("simulate", "room", "--setup", setup, "--frames", NUM_FRAMES, "-o", made)
+            camera = pathlib.Path(CliTest._shared.name) / "camera.yaml"
+            camera.write_text(CAMERA)
+            done = waymark("simulate", "room", "--motion", "slide", "--camera", camera, "--setup",
+                           setup, "--frames", NUM_FRAMES, "-o", made)
             self.assertEqual(done.returncode, 0, done.stderr)
             CliTest._sequences[setup] = made
         copy = self.folder / f"input_{setup}"

@@ -1,0 +1,166 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "choice_option.h"
+#include "commands.h"
+#include "reporter.h"
+#include "waymark/base/check.h"
+#include "waymark/base/config.h"
+#include "waymark/io/atomic_file.h"
+#include "waymark/io/input.h"
+#include "waymark/simulate/dataset.h"
+#include "waymark/simulate/suite.h"
+
+namespace waymark {
+namespace {
+
+constexpr double kDepthFactor = 5000.0;
+
+struct SimulateOptions {
+  std::string name;  ///< Of a world, or of a sequence of the suite.
+  std::filesystem::path out;
+  std::filesystem::path camera;  ///< Camchain file; empty: the cameras below.
+  Setup setup = Setup::kStereo;
+  SequenceSpec spec;
+  bool is_list = false;
+  bool is_quiet = false;
+};
+
+/// A moderately distorted camera; the second of a pair is neither parallel to the first nor like
+/// it.
+CameraDescription default_camera(int index) {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {420.0 + index, 421.0 + index, 317.0 - 3.0 * index, 242.0 + 2.0 * index};
+  camera.distortion_model = "radtan";
+  camera.distortion_coeffs = {-0.2, 0.05, 0.0002, -0.0001};
+  camera.width_px = 640;
+  camera.height_px = 480;
+  camera.where = "default camera";
+  return camera;
+}
+
+Rigid3 default_cam1_from_cam0() {
+  Vector6d motion;
+  motion << -0.11, 0.002, -0.001, 0.008, -0.01, 0.005;
+  return Rigid3::exp(motion);
+}
+
+CameraChain default_chain(Setup setup) {
+  switch (setup) {
+    case Setup::kMono:
+      return mono_chain(default_camera(0));
+    case Setup::kStereo:
+      return stereo_chain(default_camera(0), default_camera(1), default_cam1_from_cam0());
+    case Setup::kRgbd:
+      return rgbd_chain(default_camera(0), kDepthFactor);
+  }
+  return {};
+}
+
+/// The part of a calibration that a setup uses.
+CameraChain chain_from_file(const std::filesystem::path& file, Setup setup) {
+  std::optional<CameraChain> chain = read_camchain(parse_config(ConfigSource::from_file(file)));
+  const std::size_t num_cameras = setup == Setup::kStereo ? 2 : 1;
+  if (!chain || chain->cameras.size() < num_cameras) {
+    throw InputError(file.string(),
+                     fmt::format("describes {} cameras, expected {} for {}",
+                                 chain ? chain->cameras.size() : 0,
+                                 num_cameras,
+                                 to_string(setup)));
+  }
+  chain->cameras.resize(num_cameras);
+  if (setup != Setup::kRgbd) chain->depth_factor.reset();
+  if (setup == Setup::kRgbd && !chain->depth_factor) chain->depth_factor = kDepthFactor;
+  return *chain;
+}
+
+SequenceSpec spec_of(const SimulateOptions& options) {
+  const std::vector<std::string> worlds = world_names();
+  if (std::find(worlds.begin(), worlds.end(), options.name) == worlds.end()) {
+    for (SuiteEntry& entry : simulated_suite()) {
+      if (entry.spec.name == options.name) return entry.spec;
+    }
+    throw InputError(fmt::format("world '{}'", options.name),
+                     "is unknown, expected one that waymark simulate --list names");
+  }
+  SequenceSpec spec = options.spec;
+  spec.name = spec.world = options.name;
+  spec.chain = options.camera.empty() ? default_chain(options.setup)
+                                      : chain_from_file(options.camera, options.setup);
+  return spec;
+}
+
+int list_choices() {
+  for (const std::string& world : world_names()) fmt::print("world {}\n", world);
+  for (const std::string& motion : motion_names()) fmt::print("motion {}\n", motion);
+  for (const SuiteEntry& entry : simulated_suite()) {
+    fmt::print("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
+  }
+  return kDone;
+}
+
+int simulate(const SimulateOptions& options) {
+  if (options.is_list) return list_choices();
+  if (options.name.empty() || options.out.empty()) {
+    throw InputError("command line", "WORLD and --out are missing, expected both or --list");
+  }
+  Reporter reporter(options.is_quiet ? Verbosity::kQuiet : Verbosity::kNormal, {});
+  SimulatedSequence sequence(spec_of(options), std::max(1u, std::thread::hardware_concurrency()));
+  make_output_folder(options.out);
+  const auto num_frames = static_cast<std::size_t>(sequence.num_frames());
+  write_dataset(sequence, options.out, [&](int frame) {
+    reporter.progress(static_cast<std::size_t>(frame) + 1, num_frames, "rendering");
+  });
+  reporter.finish_progress();
+  reporter.info(
+      fmt::format("{} frames of {} in {}", num_frames, options.name, options.out.string()));
+  return kDone;
+}
+
+}  // namespace
+
+void add_simulate_command(CLI::App& program, Command& command) {
+  const auto options = std::make_shared<SimulateOptions>();
+  SequenceSpec& spec = options->spec;
+  spec.effects.noise_sigma = 2.0;
+  CLI::App& simulation =
+      *program.add_subcommand("simulate", "Images with exact ground truth, as a data set");
+  simulation.add_option(
+      "WORLD", options->name, "A world, or a sequence of the evaluation suite; see --list");
+  simulation.add_option("-o,--out", options->out, "Folder for the data set");
+  simulation.add_option(
+      "--camera", options->camera, "Camchain file [640x480 pinhole, a pair 11 cm apart]");
+  add_choice<Setup>(simulation,
+                    "--setup",
+                    options->setup,
+                    {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
+                    "mono, stereo or rgbd [stereo]");
+  simulation.add_option("--motion", spec.motion, "How the camera moves; see --list")
+      ->capture_default_str();
+  simulation.add_option("--frames", spec.num_frames, "Number of frames")
+      ->check(CLI::Range(1, 1000000))
+      ->capture_default_str();
+  simulation.add_option("--rate", spec.rate_hz, "Frames per second")
+      ->check(CLI::Range(0.1, 1000.0))
+      ->capture_default_str();
+  simulation.add_option("--noise", spec.effects.noise_sigma, "Sigma of the grey values")
+      ->check(CLI::Range(0.0, 100.0))
+      ->capture_default_str();
+  simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
+  simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");
+  simulation.add_flag("--quiet", options->is_quiet, "Errors only");
+  simulation.callback([options, &command] { command = [options] { return simulate(*options); }; });
+}
+
+}  // namespace waymark
