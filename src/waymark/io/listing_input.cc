@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -30,6 +31,9 @@ ListingInput::ListingInput(const std::filesystem::path& path,
   info_.num_frames = selection_.count(listing_.frames.size());
   info_.calibration =
       choose_calibration(path, options.calibration, listing_.calibration, info_.setup);
+  std::vector<std::string> stems;
+  for (const ListedFrame& frame : listing_.frames) stems.push_back(stem_of(frame));
+  masks_.expect_one_of(stems);
   check_first_frame(find_first_readable());
   check_first_depth();
   describe(path, options);

@@ -2,6 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/io/mask.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 #include "waymark/base/check.h"
 #include "waymark/io/decode.h"
 #include "waymark/io/listing.h"
@@ -22,6 +26,15 @@ MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
 
 std::filesystem::path MaskSource::path_of(const std::string& stem) const {
   return fixed_ ? path_ : by_name_.at(stem);
+}
+
+void MaskSource::expect_one_of(const std::vector<std::string>& stems) const {
+  if (by_name_.empty()) return;
+  if (std::any_of(stems.begin(), stems.end(), [this](const auto& stem) { return has(stem); }))
+    return;
+  throw InputError(path_.string(),
+                   fmt::format("no mask has the name of a frame, expected {}.png or the like",
+                               stems.empty() ? "NAME" : stems.front()));
 }
 
 bool MaskSource::has(const std::string& stem) const { return fixed_ || by_name_.contains(stem); }

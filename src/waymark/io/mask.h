@@ -6,6 +6,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "waymark/io/input.h"
 
@@ -17,6 +18,10 @@ class MaskSource {
  public:
   /// Path empty: no masks. Throws InputError when it is missing or unreadable.
   explicit MaskSource(const std::filesystem::path& path);
+
+  /// Throws InputError for a folder of masks of which none belongs to a frame with one of these
+  /// names: a wrong name would otherwise go unnoticed.
+  void expect_one_of(const std::vector<std::string>& stems) const;
 
   /// Whether the frame whose image has this name (without extension) has a mask.
   bool has(const std::string& stem) const;

@@ -8,6 +8,7 @@
 #include "waymark/base/rng.h"
 #include "waymark/io/euroc.h"
 #include "waymark/io/kitti.h"
+#include "waymark/io/testing/errors.h"
 #include "waymark/io/testing/temporary_folder.h"
 #include "waymark/io/trajectory.h"
 #include "waymark/io/tum_rgbd.h"
@@ -18,15 +19,6 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using ::testing::Optional;
-
-std::string message_of(const std::function<void()>& action) {
-  try {
-    action();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "no error";
-}
 
 TEST(ParseSeconds, KeepsEveryDigit) {
   EXPECT_THAT(parse_seconds("1305031229.528748"), Optional(1305031229528748000));
@@ -112,12 +104,13 @@ TEST(RowReader, KeepsEmptyFieldsBetweenCommas) {
 TEST(RowReader, SaysWhereAndWhatWasExpected) {
   RowReader rows("\n1.5 abc ../x\n", "f.txt", ' ');
   ASSERT_TRUE(rows.next());
-  EXPECT_EQ(message_of([&] { rows.number(1); }),
+  EXPECT_EQ(testing::input_error_of([&] { rows.number(1); }),
             "f.txt:2: field 2 is 'abc', expected a finite number");
-  EXPECT_THAT(message_of([&] { rows.nanoseconds(0); }),
+  EXPECT_THAT(testing::input_error_of([&] { rows.nanoseconds(0); }),
               HasSubstr("f.txt:2: field 1 is '1.5', expected a time in whole"));
-  EXPECT_THAT(message_of([&] { rows.relative_path(2); }), HasSubstr("expected a file name below"));
-  EXPECT_EQ(message_of([&] { rows.expect_exactly(2, "2: a b"); }),
+  EXPECT_THAT(testing::input_error_of([&] { rows.relative_path(2); }),
+              HasSubstr("expected a file name below"));
+  EXPECT_EQ(testing::input_error_of([&] { rows.expect_exactly(2, "2: a b"); }),
             "f.txt:2: 3 fields, expected 2: a b");
 }
 
@@ -143,12 +136,12 @@ TEST(QuoteForMessage, StaysOneShortLine) {
 
 TEST(ReadTextFile, NamesWhatIsMissing) {
   const testing::TemporaryFolder folder;
-  EXPECT_THAT(message_of([&] { read_text_file(folder / "no.txt", "a list"); }),
+  EXPECT_THAT(testing::input_error_of([&] { read_text_file(folder / "no.txt", "a list"); }),
               HasSubstr("no.txt: missing, expected a list"));
-  EXPECT_THAT(message_of([&] { read_text_file(folder.path(), "a list"); }),
+  EXPECT_THAT(testing::input_error_of([&] { read_text_file(folder.path(), "a list"); }),
               HasSubstr("no regular file"));
   folder.write("big.txt", std::string(100, 'x'));
-  EXPECT_THAT(message_of([&] { read_text_file(folder / "big.txt", "a list", 99); }),
+  EXPECT_THAT(testing::input_error_of([&] { read_text_file(folder / "big.txt", "a list", 99); }),
               HasSubstr("larger than"));
   EXPECT_EQ(read_text_file(folder / "big.txt", "a list", 100).size(), 100u);
 }

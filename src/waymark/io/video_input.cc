@@ -107,7 +107,10 @@ class VideoInput : public Input {
     const std::optional<std::size_t> num_frames =
         times_ns_.empty() ? reader_.num_frames() : std::optional(times_ns_.size());
     selection_ = select_frames(path, options, num_frames);
-    if (num_frames) info_.num_frames = selection_.count(*num_frames);
+    if (num_frames) {
+      info_.num_frames = selection_.count(*num_frames);
+      expect_masks(*num_frames);
+    }
     info_.calibration = choose_calibration(path, options.calibration, std::nullopt, info_.setup);
     start(path);
     describe(path, options, num_frames);
@@ -126,6 +129,12 @@ class VideoInput : public Input {
     if (!std::filesystem::exists(times_path)) return;
     times_ns_ = parse_times(read_text_file(times_path, "one time in seconds per frame"),
                             times_path.string());
+  }
+
+  void expect_masks(std::size_t num_frames) const {
+    std::vector<std::string> stems;
+    for (std::size_t i = 0; i < num_frames; ++i) stems.push_back(mask_name(i));
+    masks_.expect_one_of(stems);
   }
 
   /// The next selected frame of any kind, or nothing at the end of video, times or selection.
@@ -156,7 +165,7 @@ class VideoInput : public Input {
       return;
     }
     frame.images.push_back(std::move(*image));
-    masks_.attach(stem_of(frame), frame);
+    masks_.attach(mask_name(frame.index), frame);
   }
 
   void start(const std::filesystem::path& path) {
@@ -164,7 +173,7 @@ class VideoInput : public Input {
     if (!first_)
       throw InputError(path.string(),
                        "ends before the first frame asked for, expected a longer video");
-    masks_.check_first(stem_of(*first_), *first_);
+    masks_.check_first(mask_name(first_->index), *first_);
     if (first_->images.empty()) {
       throw InputError(path.string(),
                        "the first frame cannot be decoded, expected a video of 8 bits per channel");
@@ -193,7 +202,7 @@ class VideoInput : public Input {
   }
 
   /// Masks of a video are named by the index of the frame, six digits.
-  static std::string stem_of(const InputFrame& frame) { return fmt::format("{:06}", frame.index); }
+  static std::string mask_name(std::size_t index) { return fmt::format("{:06}", index); }
 
   VideoReader reader_;
   MaskSource masks_;
