@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -18,17 +19,17 @@
 namespace waymark {
 
 struct FrameSettings {
-  FeatureSettings features;
-  StereoSettings stereo;
-  DepthSettings depth;
+  FeatureSettings features = {};
+  StereoSettings stereo = {};
+  DepthSettings depth = {};
 };
 
 /// The images of one moment. Borrowed for the call only.
 struct FrameImages {
-  ImageView image0;
-  ImageView image1;  ///< Empty unless stereo.
-  DepthView depth;   ///< Registered to image0; empty unless RGB-D.
-  ImageView mask;    ///< Of image0: features where it is not 0; may be empty.
+  ImageView image0 = {};
+  ImageView image1 = {};  ///< Empty unless stereo.
+  DepthView depth = {};   ///< Registered to image0; empty unless RGB-D.
+  ImageView mask = {};    ///< Of image0: features where it is not 0; may be empty.
 };
 
 /// What the stages of the last frame took.
@@ -43,14 +44,32 @@ class FrameBuilder {
  public:
   FrameBuilder(Rig rig, const FrameSettings& settings);
 
-  /// Throws InputError where the size of an image is not the camera's.
+  /// Throws InputError where the size of an image is not the camera's. image1 takes a rig of two
+  /// cameras; a rig of two without image1 gives features without range.
   std::shared_ptr<const Features> build(const FrameImages& images);
 
   const FrameTimes& times() const { return times_; }
 
  private:
+  void extract_primary(const FrameImages& images, Features& features);
+  void add_stereo(ImageView image1, Features& features);
+  const TangentArrays& compute_tangents(const Camera& camera);
+  static void reserve(Features& features, std::size_t count);
+  static void append(Features& features,
+                     const Keypoint& keypoint,
+                     const TangentArrays& tangents,
+                     std::size_t i);
+
   Rig rig_;
   FrameSettings settings_;
+  FeatureExtractor extractor_;
+  std::optional<StereoSearch> stereo_;
+  TangentComputer tangent_computer_;
+  Pyramid pyramid1_;
+  std::vector<Keypoint> keypoints_;
+  std::vector<Descriptor> descriptors_;
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<float> level_scales_;
   FrameTimes times_;
 };
 

@@ -1,0 +1,149 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/image/frame_builder.h"
+
+#include <fmt/format.h>
+
+#include <chrono>
+#include <utility>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+template <class T>
+void check_size(const BasicImageView<T>& image, const Camera& camera, const char* where) {
+  if (image.width_px == camera.width_px() && image.height_px == camera.height_px()) return;
+  throw InputError(where,
+                   fmt::format("{} x {} px, expected {} x {} as calibrated",
+                               image.width_px,
+                               image.height_px,
+                               camera.width_px(),
+                               camera.height_px()));
+}
+
+class Stopwatch {
+ public:
+  double elapsed_ms() const {
+    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
+  }
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  Clock::time_point start_ = Clock::now();
+};
+
+}  // namespace
+
+FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
+    : rig_(std::move(rig)), settings_(settings), extractor_(settings.features) {
+  WAYMARK_CHECK(!rig_.cameras.empty());
+  if (rig_.cameras.size() == 2) stereo_.emplace(rig_, settings.stereo);
+}
+
+std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
+  check_size(images.image0, *rig_.cameras[0].camera, "image");
+  if (!images.image1.is_empty()) {
+    WAYMARK_CHECK(stereo_.has_value());
+    check_size(images.image1, *rig_.cameras[1].camera, "right image");
+  }
+  if (!images.depth.is_empty()) check_size(images.depth, *rig_.cameras[0].camera, "depth image");
+
+  auto features = std::make_shared<Features>();
+  const Stopwatch features_time;
+  extract_primary(images, *features);
+  times_.features_ms = features_time.elapsed_ms();
+  const Stopwatch depth_time;
+  if (!images.image1.is_empty()) {
+    add_stereo(images.image1, *features);
+  } else if (!images.depth.is_empty()) {
+    sample_depth(images.depth,
+                 settings_.depth,
+                 features->keypoints,
+                 features->bearings,
+                 features->range_m,
+                 features->inverse_range_sigma);
+  }
+  times_.depth_ms = depth_time.elapsed_ms();
+  return features;
+}
+
+const TangentArrays& FrameBuilder::compute_tangents(const Camera& camera) {
+  return tangent_computer_.compute(camera, pixels_, level_scales_);
+}
+
+/// Features without a usable bearing are dropped.
+void FrameBuilder::extract_primary(const FrameImages& images, Features& features) {
+  extractor_.extract(images.image0, images.mask, keypoints_, descriptors_);
+  pixels_.clear();
+  level_scales_.clear();
+  for (const Keypoint& keypoint : keypoints_) {
+    pixels_.emplace_back(keypoint.x_px, keypoint.y_px);
+    level_scales_.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
+  }
+  const Camera& camera = *rig_.cameras[0].camera;
+  const TangentArrays& tangents = compute_tangents(camera);
+  reserve(features, (images.image1.is_empty() ? 1 : 2) * keypoints_.size());
+  features.descriptors.reserve(keypoints_.size());
+  for (std::size_t i = 0; i < keypoints_.size(); ++i) {
+    if (!tangents.is_valid[i]) continue;
+    append(features, keypoints_[i], tangents, i);
+    features.descriptors.push_back(descriptors_[i]);
+  }
+  const std::size_t count = features.keypoints.size();
+  features.num_primary = count;
+  features.partner.assign(count, kNoFeature);
+  features.range_m.assign(count, 0.0f);
+  features.inverse_range_sigma.assign(count, 0.0f);
+  features.grid = FeatureGrid(
+      camera.width_px(), camera.height_px(), camera.wrap_width_px(), count, [&](std::size_t i) {
+        return std::pair(features.keypoints[i].x_px, features.keypoints[i].y_px);
+      });
+}
+
+void FrameBuilder::add_stereo(ImageView image1, Features& features) {
+  pyramid1_.build(image1);
+  const std::span<const StereoMatch> matches =
+      stereo_->search(extractor_.pyramid(), pyramid1_, features);
+  pixels_.clear();
+  level_scales_.clear();
+  for (const StereoMatch& match : matches) {
+    pixels_.push_back(match.pixel);
+    level_scales_.push_back(static_cast<float>(Pyramid::scale(match.level)));
+  }
+  const TangentArrays& tangents = compute_tangents(*rig_.cameras[1].camera);
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    if (!tangents.is_valid[i]) continue;
+    const StereoMatch& match = matches[i];
+    Keypoint keypoint = features.keypoints[match.primary];
+    keypoint.x_px = static_cast<float>(match.pixel.x());
+    keypoint.y_px = static_cast<float>(match.pixel.y());
+    keypoint.level = match.level;
+    keypoint.camera = 1;
+    features.partner[match.primary] = static_cast<std::uint32_t>(features.size());
+    features.partner.push_back(match.primary);
+    features.range_m[match.primary] = match.range_m;
+    append(features, keypoint, tangents, i);
+  }
+}
+
+void FrameBuilder::reserve(Features& features, std::size_t count) {
+  features.keypoints.reserve(count);
+  features.bearings.reserve(count);
+  features.level_pixel_from_bearing.reserve(count);
+  features.size_rad.reserve(count);
+  features.partner.reserve(count);
+}
+
+void FrameBuilder::append(Features& features,
+                          const Keypoint& keypoint,
+                          const TangentArrays& tangents,
+                          std::size_t i) {
+  features.keypoints.push_back(keypoint);
+  features.bearings.push_back(tangents.bearings[i]);
+  features.level_pixel_from_bearing.push_back(tangents.level_pixel_from_bearing[i]);
+  features.size_rad.push_back(tangents.size_rad[i]);
+}
+
+}  // namespace waymark
