@@ -11,7 +11,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxTicks = 6;
+constexpr std::size_t kMaxTicks = 8;
 
 double tick_step(double extent, std::size_t max_ticks) {
   const double rough = extent / static_cast<double>(max_ticks);

@@ -16,7 +16,7 @@ namespace waymark {
 namespace {
 
 constexpr std::size_t kMaxPoints = 2000;
-constexpr std::int64_t kGapIntervals = 5;
+constexpr double kGapIntervals = 5.0;
 constexpr double kMargin = 0.05;  // Of the extent, around the data.
 constexpr Chart::Frame kMapFrame{70, 70, 400, 330};
 constexpr Chart::Frame kErrorFrame{570, 70, 400, 330};
@@ -44,18 +44,25 @@ struct Path {
   std::vector<bool> starts_stroke;
 };
 
+double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
+  return 1e-9 * (static_cast<double>(to_ns) - static_cast<double>(from_ns));
+}
+
+/// A longer time between successive poses is drawn as a gap.
+double max_gap_of(std::span<const StampedPose> poses) {
+  return 1e-9 * kGapIntervals * static_cast<double>(median_interval_ns(poses));
+}
+
 /// At most kMaxPoints positions, the last one included; strokes break where poses are missing.
 Path thin_out(std::span<const StampedPose> poses, const Sim3& to_groundtruth) {
   Path path;
   const std::size_t step = poses.size() / kMaxPoints + 1;
-  const double max_gap_ns =
-      static_cast<double>(kGapIntervals) * static_cast<double>(median_interval_ns(poses));
+  const double max_gap_s = max_gap_of(poses);
   bool is_after_gap = false;
   for (std::size_t i = 0; i < poses.size(); ++i) {
     if (i > 0) {
-      const double gap_ns = static_cast<double>(poses[i].timestamp_ns) -
-                            static_cast<double>(poses[i - 1].timestamp_ns);
-      is_after_gap = is_after_gap || gap_ns > max_gap_ns;
+      const double gap_s = seconds_between(poses[i - 1].timestamp_ns, poses[i].timestamp_ns);
+      is_after_gap = is_after_gap || gap_s > max_gap_s;
     }
     if (i % step != 0 && i + 1 != poses.size() && !is_after_gap) continue;
     path.points.push_back(to_groundtruth * poses[i].world_from_camera.translation);
@@ -119,27 +126,30 @@ std::string draw_map(const Path& truth, const Path& estimate) {
   return svg;
 }
 
-/// The largest error of each of at most kMaxPoints stretches, so that no peak is lost.
-std::vector<ChartPoint> error_points(const std::vector<PositionError>& errors) {
+/// The largest error of each of at most kMaxPoints stretches, so that no peak is lost; strokes
+/// break where poses are missing.
+std::vector<ChartPoint> error_points(const std::vector<PositionError>& errors, double max_gap_s) {
   std::vector<ChartPoint> points;
   const std::size_t step = errors.size() / kMaxPoints + 1;
+  std::int64_t last_ns = errors.front().timestamp_ns;
   for (std::size_t begin = 0; begin < errors.size(); begin += step) {
-    const auto first = errors.begin() + static_cast<std::ptrdiff_t>(begin);
-    const auto last =
-        errors.begin() + static_cast<std::ptrdiff_t>(std::min(begin + step, errors.size()));
-    const auto largest =
-        std::max_element(first, last, [](const PositionError& a, const PositionError& b) {
-          return a.error_m < b.error_m;
-        });
+    const std::size_t end = std::min(begin + step, errors.size());
+    std::size_t largest = begin;
+    bool is_after_gap = false;
+    for (std::size_t i = begin; i < end; ++i) {
+      if (errors[i].error_m > errors[largest].error_m) largest = i;
+      is_after_gap = is_after_gap || seconds_between(last_ns, errors[i].timestamp_ns) > max_gap_s;
+      last_ns = errors[i].timestamp_ns;
+    }
     const double time_s =
-        1e-9 * static_cast<double>(largest->timestamp_ns - errors.front().timestamp_ns);
-    points.push_back({time_s, largest->error_m});
+        seconds_between(errors.front().timestamp_ns, errors[largest].timestamp_ns);
+    points.push_back({time_s, errors[largest].error_m, is_after_gap});
   }
   return points;
 }
 
-std::string draw_error(const Evaluation& evaluation) {
-  const std::vector<ChartPoint> points = error_points(evaluation.errors);
+std::string draw_error(const Evaluation& evaluation, double max_gap_s) {
+  const std::vector<ChartPoint> points = error_points(evaluation.errors, max_gap_s);
   const AxisRange time{0.0, std::max(points.back().x, 1e-3)};
   const AxisRange error{0.0, std::max(evaluation.ate_m.max * (1.0 + kMargin), 1e-6)};
   const Chart chart(kErrorFrame, time, error);
@@ -170,7 +180,7 @@ std::string plot_evaluation(const Evaluation& evaluation,
   std::string svg = kHead;
   svg += fmt::format("<text class=\"title\" x=\"70\" y=\"28\">{}</text>\n", escape_xml(title));
   svg += draw_map(truth_path, estimate_path);
-  svg += draw_error(evaluation);
+  svg += draw_error(evaluation, max_gap_of(estimate));
   svg += legend_entry(70, "truth", "ground truth");
   svg += legend_entry(
       190,

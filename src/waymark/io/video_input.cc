@@ -188,9 +188,7 @@ class VideoInput : public Input {
                 const InputOptions& options,
                 std::optional<std::size_t> num_frames) {
     info_.lines.push_back(fmt::format("{}: video ({})", path.string(), to_string(info_.setup)));
-    info_.lines.push_back(
-        num_frames ? fmt::format("{} frames, {:.4g} per second", *num_frames, reader_.rate_hz())
-                   : fmt::format("frames not counted, {:.4g} per second", reader_.rate_hz()));
+    info_.lines.push_back(describe_frames(num_frames));
     info_.lines.push_back(fmt::format("images of {}x{} px", info_.width_px, info_.height_px));
     info_.lines.push_back(times_ns_.empty() ? "times from the video" : "times from times.txt");
     const std::optional<std::size_t> counted = reader_.num_frames();
@@ -199,6 +197,13 @@ class VideoInput : public Input {
           fmt::format("note: {} times for {} frames", times_ns_.size(), *counted));
     }
     info_.lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
+  }
+
+  std::string describe_frames(std::optional<std::size_t> num_frames) const {
+    if (!times_ns_.empty()) return describe_rate(times_ns_);
+    const std::string count =
+        num_frames ? fmt::format("{} frames", *num_frames) : "frames not counted";
+    return fmt::format("{}, {:.4g} per second", count, reader_.rate_hz());
   }
 
   /// Masks of a video are named by the index of the frame, six digits.
