@@ -1,0 +1,200 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/dataset.h"
+
+#include <fmt/format.h>
+
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/io/atomic_file.h"
+#include "waymark/io/trajectory.h"
+
+namespace waymark {
+namespace {
+
+namespace fs = std::filesystem;
+
+enum class Layout { kTumRgbd, kEuroc, kTumVi, kImageFolder };
+
+/// Whether sensor.yaml of EuRoC describes such cameras: pinhole, radial-tangential.
+bool is_perspective(const CameraDescription& camera) {
+  return camera.camera_model == "pinhole" &&
+         (camera.distortion_model == "none" || camera.distortion_model == "radtan");
+}
+
+Layout layout_of(const CameraChain& chain) {
+  if (chain.depth_factor) return Layout::kTumRgbd;
+  bool are_perspective = true;
+  for (const ChainCamera& camera : chain.cameras) {
+    are_perspective = are_perspective && is_perspective(camera.description);
+  }
+  if (are_perspective) return Layout::kEuroc;
+  return chain.cameras.size() > 1 ? Layout::kTumVi : Layout::kImageFolder;
+}
+
+std::string numbers(const std::vector<double>& values) {
+  return fmt::format("[{:.17g}]", fmt::join(values, ", "));
+}
+
+std::string size_of(const CameraDescription& camera) {
+  return fmt::format("[{}, {}]", camera.width_px, camera.height_px);
+}
+
+std::string matrix_row(const Eigen::Matrix4d& matrix, int row) {
+  return numbers({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
+}
+
+std::string format_sensor(const ChainCamera& camera, double rate_hz) {
+  const CameraDescription& description = camera.description;
+  const Eigen::Matrix4d body_from_sensor = camera.cam_from_rig.inverse().matrix();
+  std::vector<double> entries;
+  for (int i = 0; i < 16; ++i) entries.push_back(body_from_sensor(i / 4, i % 4));
+  std::vector<double> coefficients = description.distortion_coeffs;
+  if (coefficients.empty()) coefficients.assign(4, 0.0);
+  std::string text = "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n";
+  text += fmt::format("  data: {}\n", numbers(entries));
+  text += fmt::format("rate_hz: {}\nresolution: {}\n", rate_hz, size_of(description));
+  text += fmt::format("camera_model: pinhole\nintrinsics: {}\n", numbers(description.intrinsics));
+  text += "distortion_model: radial-tangential\n";
+  text += fmt::format("distortion_coefficients: {}\n", numbers(coefficients));
+  return text;
+}
+
+std::string format_seconds(std::int64_t timestamp_ns) {
+  return fmt::format("{}.{:09}", timestamp_ns / 1'000'000'000, timestamp_ns % 1'000'000'000);
+}
+
+template <class T>
+void write_png(const fs::path& path, const BasicImage<T>& image, int type) {
+  // OpenCV wants a pointer to non-const values, but does not write to them.
+  const cv::Mat mat(image.height_px, image.width_px, type, const_cast<T*>(image.values.data()));
+  bool is_written = false;
+  try {
+    is_written = cv::imwrite(path.string(), mat, {cv::IMWRITE_PNG_COMPRESSION, 1});
+  } catch (const cv::Exception& error) {
+    throw OutputError(path.string(), error.err);
+  }
+  if (!is_written) throw OutputError(path.string(), "cannot be written");
+}
+
+/// Writes frames of one layout and gathers its lists.
+class Writer {
+ public:
+  Writer(const SequenceSpec& spec, fs::path folder)
+      : spec_(spec), folder_(std::move(folder)), layout_(layout_of(spec.chain)) {
+    for (const fs::path& sub : image_folders()) make_output_folder(folder_ / sub);
+    if (layout_ == Layout::kTumRgbd) make_output_folder(folder_ / "depth");
+  }
+
+  void add(const SimulatedFrame& frame, const Rigid3& world_from_camera0) {
+    const std::string seconds = format_seconds(frame.timestamp_ns);
+    const bool is_csv = layout_ == Layout::kEuroc || layout_ == Layout::kTumVi;
+    const std::string name = (is_csv ? std::to_string(frame.timestamp_ns) : seconds) + ".png";
+    const std::vector<fs::path> folders = image_folders();
+    for (std::size_t i = 0; i < folders.size(); ++i) {
+      write_png(folder_ / folders[i] / name, frame.images[i], CV_8UC1);
+    }
+    if (layout_ == Layout::kTumRgbd) {
+      write_png(folder_ / "depth" / name, frame.depth, CV_16UC1);
+      list_ += fmt::format("{} rgb/{}\n", seconds, name);
+      depth_list_ += fmt::format("{} depth/{}\n", seconds, name);
+    } else {
+      list_ += is_csv ? fmt::format("{},{}\n", frame.timestamp_ns, name) : seconds + "\n";
+    }
+    truth_.push_back({frame.timestamp_ns, world_from_camera0});
+  }
+
+  void finish() const {
+    switch (layout_) {
+      case Layout::kTumRgbd:
+        write_file_atomically(folder_ / "rgb.txt", "# timestamp filename\n" + list_);
+        write_file_atomically(folder_ / "depth.txt", "# timestamp filename\n" + depth_list_);
+        break;
+      case Layout::kImageFolder:
+        write_file_atomically(folder_ / "times.txt", list_);
+        break;
+      case Layout::kEuroc:
+      case Layout::kTumVi:
+        write_sensors();
+    }
+    if (layout_ == Layout::kTumVi) {
+      make_output_folder(folder_ / "dso");
+      write_file_atomically(folder_ / "dso" / "camchain.yaml", format_camchain(spec_.chain));
+    }
+    write_file_atomically(folder_ / "camchain.yaml", format_camchain(spec_.chain));
+    write_trajectory(folder_ / "groundtruth.txt", truth_, TrajectoryFormat::kTum);
+  }
+
+ private:
+  std::vector<fs::path> image_folders() const {
+    if (layout_ == Layout::kTumRgbd) return {"rgb"};
+    if (layout_ == Layout::kImageFolder) return {"images"};
+    std::vector<fs::path> folders;
+    for (std::size_t i = 0; i < spec_.chain.cameras.size(); ++i) {
+      folders.push_back(fs::path("mav0") / fmt::format("cam{}", i) / "data");
+    }
+    return folders;
+  }
+
+  void write_sensors() const {
+    for (std::size_t i = 0; i < spec_.chain.cameras.size(); ++i) {
+      const fs::path sensor = folder_ / "mav0" / fmt::format("cam{}", i);
+      write_file_atomically(sensor / "data.csv", "#timestamp [ns],filename\n" + list_);
+      if (layout_ != Layout::kEuroc) continue;
+      write_file_atomically(sensor / "sensor.yaml",
+                            format_sensor(spec_.chain.cameras[i], spec_.rate_hz));
+    }
+  }
+
+  const SequenceSpec& spec_;
+  fs::path folder_;
+  Layout layout_;
+  std::string list_;
+  std::string depth_list_;
+  std::vector<StampedPose> truth_;
+};
+
+}  // namespace
+
+std::string format_camchain(const CameraChain& chain) {
+  std::string text;
+  for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
+    const CameraDescription& camera = chain.cameras[i].description;
+    text += fmt::format("cam{}:\n  camera_model: {}\n", i, camera.camera_model);
+    if (!camera.intrinsics.empty()) {
+      text += fmt::format("  intrinsics: {}\n", numbers(camera.intrinsics));
+    }
+    text += fmt::format("  distortion_model: {}\n", camera.distortion_model);
+    if (!camera.distortion_coeffs.empty()) {
+      text += fmt::format("  distortion_coeffs: {}\n", numbers(camera.distortion_coeffs));
+    }
+    text += fmt::format("  resolution: {}\n", size_of(camera));
+    if (i == 0) continue;
+    const Eigen::Matrix4d from_previous =
+        (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
+    text += "  T_cn_cnm1:\n";
+    for (int row = 0; row < 4; ++row) {
+      text += fmt::format("  - {}\n", matrix_row(from_previous, row));
+    }
+  }
+  if (chain.depth_factor) text += fmt::format("depth: {{factor: {:.17g}}}\n", *chain.depth_factor);
+  return text;
+}
+
+void write_dataset(SimulatedSequence& sequence,
+                   const fs::path& folder,
+                   const std::function<void(int frame)>& done) {
+  Writer writer(sequence.spec(), folder);
+  const Rigid3 rig_from_camera0 = sequence.rig().cameras[0].cam_from_rig.inverse();
+  for (int i = 0; i < sequence.num_frames(); ++i) {
+    const SimulatedFrame frame = sequence.frame(i);
+    writer.add(frame, frame.world_from_rig * rig_from_camera0);
+    if (done) done(i);
+  }
+  writer.finish();
+}
+
+}  // namespace waymark

@@ -1,0 +1,27 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+
+/// Writes all frames below the folder, as a data set in a standard layout:
+///   RGB-D           TUM RGB-D: rgb/, depth/, rgb.txt, depth.txt
+///   stereo          EuRoC: mav0/cam0, mav0/cam1 with sensor.yaml (T_BS; the body is the rig); for
+///                   cameras that sensor.yaml cannot describe as TUM-VI: dso/camchain.yaml instead
+///   mono            EuRoC for perspective cameras, else images/ and times.txt
+/// With each: groundtruth.txt (TUM format, world_from_camera0) and camchain.yaml (Kalibr). Calls
+/// done(frame) after each frame, if given. Throws OutputError.
+void write_dataset(SimulatedSequence& sequence,
+                   const std::filesystem::path& folder,
+                   const std::function<void(int frame)>& done = {});
+
+/// The chain as a camchain.yaml file.
+std::string format_camchain(const CameraChain& chain);
+
+}  // namespace waymark

@@ -1,0 +1,160 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/dataset.h"
+
+#include <gtest/gtest.h>
+#include <yaml-cpp/yaml.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <fstream>
+#include <opencv2/imgcodecs.hpp>
+#include <sstream>
+#include <string>
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/io/testing/temporary_folder.h"
+
+namespace waymark {
+namespace {
+
+namespace fs = std::filesystem;
+
+CameraDescription small_camera(double shift) {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {90.0 + shift, 91.0, 59.5 + shift, 44.25};
+  camera.distortion_model = "radtan";
+  camera.distortion_coeffs = {-0.1, 0.01, 0.0002, 0.0001};
+  camera.width_px = 120;
+  camera.height_px = 90;
+  return camera;
+}
+
+const Rigid3 kCam1FromCam0(Eigen::Quaterniond(Eigen::AngleAxisd(0.07, Eigen::Vector3d::UnitY())),
+                           {-0.11, 0.003, 0.001});
+
+SequenceSpec small_spec(CameraChain chain) {
+  SequenceSpec spec;
+  spec.seed = 3;
+  spec.num_frames = 3;
+  spec.chain = std::move(chain);
+  return spec;
+}
+
+/// Rows of words, without comments; commas separate words too.
+std::vector<std::vector<std::string>> rows_of(const fs::path& path) {
+  std::ifstream file(path);
+  EXPECT_TRUE(file.good()) << path;
+  std::vector<std::vector<std::string>> rows;
+  for (std::string line; std::getline(file, line);) {
+    if (line.empty() || line[0] == '#') continue;
+    for (char& c : line) c = c == ',' ? ' ' : c;
+    std::istringstream words(line);
+    rows.emplace_back();
+    for (std::string word; words >> word;) rows.back().push_back(word);
+  }
+  return rows;
+}
+
+void expect_truth(const fs::path& folder, const SimulatedSequence& sequence) {
+  const auto rows = rows_of(folder / "groundtruth.txt");
+  ASSERT_EQ(rows.size(), 3u);
+  for (int i = 0; i < 3; ++i) {
+    const std::vector<std::string>& row = rows[static_cast<std::size_t>(i)];
+    ASSERT_EQ(row.size(), 8u);
+    EXPECT_NEAR(std::stod(row[0]), 1.0 + 0.05 * i, 1e-9);
+    const Rigid3 truth = sequence.world_from_rig(i);
+    const Eigen::Vector3d position(std::stod(row[1]), std::stod(row[2]), std::stod(row[3]));
+    EXPECT_LT((position - truth.translation).norm(), 1e-6);
+    const Eigen::Quaterniond rotation(
+        std::stod(row[7]), std::stod(row[4]), std::stod(row[5]), std::stod(row[6]));
+    EXPECT_LT(rotation.angularDistance(truth.rotation), 1e-6);
+  }
+}
+
+void expect_image(const fs::path& path, const Image& image) {
+  const cv::Mat mat = cv::imread(path.string(), cv::IMREAD_UNCHANGED);
+  ASSERT_FALSE(mat.empty()) << path;
+  ASSERT_EQ(mat.type(), CV_8UC1);
+  ASSERT_TRUE(mat.isContinuous());
+  EXPECT_EQ(std::vector<std::uint8_t>(mat.datastart, mat.dataend), image.values);
+}
+
+Eigen::Matrix4d matrix_of(const YAML::Node& numbers) {
+  Eigen::Matrix4d matrix;
+  for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = numbers[i].as<double>();
+  return matrix;
+}
+
+TEST(Dataset, StereoIsEuroc) {
+  const testing::TemporaryFolder folder;
+  SimulatedSequence sequence(
+      small_spec(stereo_chain(small_camera(0.0), small_camera(3.0), kCam1FromCam0)));
+  std::vector<int> done;
+  write_dataset(sequence, folder.path(), [&](int frame) { done.push_back(frame); });
+  EXPECT_EQ(done, (std::vector<int>{0, 1, 2}));
+  expect_truth(folder.path(), sequence);
+  for (std::size_t camera = 0; camera < 2; ++camera) {
+    const fs::path sensor = folder / "mav0" / ("cam" + std::to_string(camera));
+    const auto rows = rows_of(sensor / "data.csv");
+    ASSERT_EQ(rows.size(), 3u);
+    EXPECT_EQ(rows[1][0], "1050000000");
+    expect_image(sensor / "data" / rows[1][1], sequence.frame(1).images[camera]);
+    const YAML::Node yaml = YAML::LoadFile((sensor / "sensor.yaml").string());
+    EXPECT_EQ(yaml["camera_model"].as<std::string>(), "pinhole");
+    EXPECT_EQ(yaml["distortion_model"].as<std::string>(), "radial-tangential");
+    EXPECT_EQ(yaml["intrinsics"][0].as<double>(), camera == 0 ? 90.0 : 93.0);
+    EXPECT_EQ(yaml["distortion_coefficients"][0].as<double>(), -0.1);
+    EXPECT_EQ(yaml["resolution"][1].as<int>(), 90);
+    const Rigid3 cam_from_rig = camera == 0 ? Rigid3() : kCam1FromCam0;
+    const Eigen::Matrix4d body_from_sensor = matrix_of(yaml["T_BS"]["data"]);
+    EXPECT_LT((body_from_sensor - cam_from_rig.inverse().matrix()).norm(), 1e-12);
+  }
+}
+
+TEST(Dataset, CamchainReadsBack) {
+  CameraChain chain = stereo_chain(small_camera(0.0), small_camera(3.0), kCam1FromCam0);
+  chain.depth_factor = 5000.0;
+  const YAML::Node yaml = YAML::Load(format_camchain(chain));
+  EXPECT_EQ(yaml["cam1"]["intrinsics"][2].as<double>(), 62.5);
+  EXPECT_EQ(yaml["cam0"]["distortion_model"].as<std::string>(), "radtan");
+  EXPECT_EQ(yaml["depth"]["factor"].as<double>(), 5000.0);
+  for (int row = 0; row < 4; ++row) {
+    for (int column = 0; column < 4; ++column) {
+      EXPECT_NEAR(yaml["cam1"]["T_cn_cnm1"][row][column].as<double>(),
+                  kCam1FromCam0.matrix()(row, column),
+                  1e-12);
+    }
+  }
+}
+
+TEST(Dataset, RgbdIsTum) {
+  const testing::TemporaryFolder folder;
+  SimulatedSequence sequence(small_spec(rgbd_chain(small_camera(0.0), 5000.0)));
+  write_dataset(sequence, folder.path());
+  expect_truth(folder.path(), sequence);
+  const auto colour = rows_of(folder / "rgb.txt");
+  const auto depth = rows_of(folder / "depth.txt");
+  ASSERT_EQ(colour.size(), 3u);
+  ASSERT_EQ(depth.size(), 3u);
+  EXPECT_EQ(colour[2][0], "1.100000000");
+  EXPECT_EQ(depth[2][0], colour[2][0]);
+  const SimulatedFrame frame = sequence.frame(2);
+  expect_image(folder / colour[2][1], frame.images[0]);
+  const cv::Mat mat = cv::imread((folder / depth[2][1]).string(), cv::IMREAD_UNCHANGED);
+  ASSERT_EQ(mat.type(), CV_16UC1);
+  EXPECT_TRUE(
+      std::equal(mat.begin<std::uint16_t>(), mat.end<std::uint16_t>(), frame.depth.values.begin()));
+}
+
+TEST(Dataset, UnwritableFoldersAreNamed) {
+  const testing::TemporaryFolder folder;
+  const fs::path file = folder.write("file", "x");
+  SimulatedSequence sequence(small_spec(mono_chain(small_camera(0.0))));
+  EXPECT_THROW(write_dataset(sequence, file / "below"), OutputError);
+}
+
+}  // namespace
+}  // namespace waymark

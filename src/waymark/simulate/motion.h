@@ -1,0 +1,75 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// Where the rig is and looks: yaw 0 looks along +x, 90 along +y; pitch up and roll clockwise are
+/// positive. The world's z axis points up.
+struct MotionKey {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  double yaw_deg = 0.0;
+  double pitch_deg = 0.0;
+  double roll_deg = 0.0;
+};
+
+/// Pose of the rig (axes of camera 0: x right, y down, z forward).
+Rigid3 pose_of(const MotionKey& key);
+
+/// How much a hand or a step shakes the rig: amplitudes of a few sines between 0.4 and 2 Hz.
+struct Sway {
+  double position_m = 0.0;
+  double angle_deg = 0.0;
+  std::uint64_t seed = 0;
+};
+
+/// A camera motion with continuous acceleration: a uniform cubic B-spline (de Boor 1978) whose
+/// control points are the keys, plus sway. Where four keys in a row are equal it stands still; it
+/// never leaves the hull of four neighbours.
+class Motion {
+ public:
+  /// At least four keys.
+  Motion(std::vector<MotionKey> keys, double duration_s, const Sway& sway = {});
+
+  double duration_s() const { return duration_s_; }
+  /// Pose at a time of [0, duration]; times outside are moved to the nearer end.
+  Rigid3 world_from_rig(double seconds) const;
+
+ private:
+  struct Wave {
+    Eigen::Vector3d position_m;
+    Eigen::Vector3d angle_deg;  ///< Yaw, pitch, roll.
+    double frequency_hz;
+    double phase_rad;
+  };
+
+  MotionKey spline(double seconds) const;
+
+  std::vector<MotionKey> keys_;
+  double duration_s_;
+  std::vector<Wave> waves_;
+};
+
+/// Names that make_motion() knows:
+///   loop       once around the path of the world and a bit on, looking along it and around
+///   fast_turn  the same path, with quick turns of the head
+///   inspect    hand-held, around the starting place
+///   slide      to the side and back
+///   forward    ahead and back
+///   rotate     turning on the spot
+///   still      not moving at all
+std::vector<std::string> motion_names();
+
+/// Makes a motion that keeps clear of what stands in the named world (see make_world()). Throws
+/// InputError for an unknown name.
+Motion make_motion(std::string_view world, std::string_view name, double duration_s);
+
+}  // namespace waymark

@@ -1,0 +1,119 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/motion.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+#include "waymark/simulate/world.h"
+
+namespace waymark {
+namespace {
+
+using Eigen::Vector3d;
+
+TEST(Motion, KeysPointWhereTheySay) {
+  const Rigid3 ahead = pose_of({{1.0, 2.0, 3.0}, 0.0, 0.0, 0.0});
+  EXPECT_NEAR((ahead * Vector3d::UnitZ() - Vector3d(2.0, 2.0, 3.0)).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((ahead.rotation * Vector3d::UnitX() + Vector3d::UnitY()).norm(), 0.0, 1e-12);
+  EXPECT_NEAR((ahead.rotation * Vector3d::UnitY() + Vector3d::UnitZ()).norm(), 0.0, 1e-12);
+  const Rigid3 left_up = pose_of({Vector3d::Zero(), 90.0, 30.0, 0.0});
+  const Vector3d forward = left_up.rotation * Vector3d::UnitZ();
+  EXPECT_NEAR((forward - Vector3d(0.0, std::sqrt(0.75), 0.5)).norm(), 0.0, 1e-12);
+  // Rolled clockwise, the right side of the camera points down.
+  const Rigid3 rolled = pose_of({Vector3d::Zero(), 0.0, 0.0, 90.0});
+  EXPECT_NEAR((rolled.rotation * Vector3d::UnitX() + Vector3d::UnitZ()).norm(), 0.0, 1e-12);
+}
+
+struct Bounds {
+  double speed = 0.0;
+  double acceleration = 0.0;
+  double jump = 0.0;  ///< Of the acceleration within a millisecond.
+  double turn_deg_per_s = 0.0;
+};
+
+Bounds measure(const Motion& motion) {
+  constexpr double kStep = 1e-3;
+  Bounds bounds;
+  Vector3d last_acceleration = Vector3d::Zero();
+  for (double t = kStep; t < motion.duration_s() - kStep; t += kStep) {
+    const Rigid3 before = motion.world_from_rig(t - kStep);
+    const Rigid3 now = motion.world_from_rig(t);
+    const Rigid3 after = motion.world_from_rig(t + kStep);
+    const Vector3d velocity = (after.translation - before.translation) / (2.0 * kStep);
+    const Vector3d acceleration =
+        (after.translation - 2.0 * now.translation + before.translation) / (kStep * kStep);
+    const double turn = now.rotation.angularDistance(after.rotation) / kStep;
+    bounds.speed = std::max(bounds.speed, velocity.norm());
+    bounds.acceleration = std::max(bounds.acceleration, acceleration.norm());
+    bounds.turn_deg_per_s = std::max(bounds.turn_deg_per_s, turn * 180.0 / std::numbers::pi);
+    if (t > 1.5 * kStep)
+      bounds.jump = std::max(bounds.jump, (acceleration - last_acceleration).norm());
+    last_acceleration = acceleration;
+  }
+  return bounds;
+}
+
+TEST(Motion, IsSmooth) {
+  for (const std::string& world : world_names()) {
+    const bool is_street = world == "street";
+    for (const std::string& name : motion_names()) {
+      SCOPED_TRACE(world + " " + name);
+      const Bounds bounds = measure(make_motion(world, name, is_street ? 16.0 : 20.0));
+      EXPECT_LT(bounds.speed, is_street ? 12.0 : 3.0);
+      EXPECT_LT(bounds.acceleration, is_street ? 16.0 : 5.0);
+      EXPECT_LT(bounds.jump, 0.1);
+      EXPECT_LT(bounds.turn_deg_per_s, name == "fast_turn" ? 250.0 : 110.0);
+    }
+  }
+}
+
+TEST(Motion, KeepsClearOfThings) {
+  for (const std::string& name : world_names()) {
+    const auto world = make_world(name, 1);
+    for (const std::string& motion_name : motion_names()) {
+      SCOPED_TRACE(name + " " + motion_name);
+      const Motion motion = make_motion(name, motion_name, 20.0);
+      double nearest = std::numeric_limits<double>::infinity();
+      for (double t = 0.0; t < 20.0; t += 0.4) {
+        const Vector3d eye = motion.world_from_rig(t).translation;
+        for (int i = 0; i < 36; ++i) {
+          const double angle = i * std::numbers::pi / 18.0;
+          const Vector3d direction(std::cos(angle), std::sin(angle), -0.2);
+          const auto hit = world->intersect(eye, direction);
+          if (hit) nearest = std::min(nearest, hit->hit.distance);
+        }
+      }
+      EXPECT_GT(nearest, 0.35);
+    }
+  }
+}
+
+TEST(Motion, LoopsComeBack) {
+  for (const char* world : {"room", "apartment", "hall", "street"}) {
+    const Motion motion = make_motion(world, "loop", 20.0);
+    const Vector3d end = motion.world_from_rig(19.9).translation;
+    double nearest = std::numeric_limits<double>::infinity();
+    for (double t = 0.0; t < 5.0; t += 0.02) {
+      nearest = std::min(nearest, (motion.world_from_rig(t).translation - end).norm());
+    }
+    EXPECT_LT(nearest, 0.5) << world;
+  }
+}
+
+TEST(Motion, StillStandsAndRotateTurnsOnTheSpot) {
+  const Motion still = make_motion("room", "still", 3.0);
+  const Motion rotate = make_motion("room", "rotate", 3.0);
+  const Rigid3 start = still.world_from_rig(0.0);
+  for (double t = 0.0; t <= 3.0; t += 0.1) {
+    EXPECT_LT((still.world_from_rig(t).matrix() - start.matrix()).norm(), 1e-12);
+    EXPECT_LT((rotate.world_from_rig(t).translation - start.translation).norm(), 1e-12);
+  }
+  EXPECT_GT(rotate.world_from_rig(1.5).rotation.angularDistance(start.rotation), 2.0);
+}
+
+}  // namespace
+}  // namespace waymark

@@ -1,0 +1,51 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "waymark/base/thread_pool.h"
+#include "waymark/camera/camera.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/image/image.h"
+#include "waymark/simulate/world.h"
+
+namespace waymark {
+
+/// Ray-casts a world for one camera of any model. Bearings are tabulated once. A pixel is the mean
+/// over its square: read from the texture with the pixel's footprint where one surface fills it,
+/// from 3 x 3 rays where an edge runs through. Pixels without bearings at all corners are 0. The
+/// result is the same for any number of threads.
+class Renderer {
+ public:
+  Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Camera> camera);
+
+  /// What the camera sees.
+  Image image(const Rigid3& world_from_cam, ThreadPool& pool) const;
+
+  /// Depth along the camera's z axis, exact at the pixel's centre, in units of 1/units_per_metre,
+  /// rounded; 0 where there is none, or it is behind the camera or above 65535.
+  DepthImage depth(const Rigid3& world_from_cam, double units_per_metre, ThreadPool& pool) const;
+
+  const World& world() const { return *world_; }
+  const Camera& camera() const { return *camera_; }
+
+ private:
+  struct View;
+  struct Tile;
+
+  void shade_tile(const View& view, const Tile& tile, Image& result) const;
+  void measure_tile(const View& view, const Tile& tile, DepthImage& result) const;
+  template <class Body>
+  void for_tiles(ThreadPool& pool, Body body) const;
+
+  std::shared_ptr<const World> world_;
+  std::shared_ptr<const Camera> camera_;
+  std::vector<Eigen::Vector3f> corner_bearings_;  ///< (width + 1) x (height + 1); 0: none.
+  std::vector<Eigen::Vector3d> centre_bearings_;  ///< width x height; 0: none.
+};
+
+}  // namespace waymark

@@ -1,0 +1,117 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/sequence.h"
+
+#include <cmath>
+#include <utility>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// Renderings per exposure that make motion blur.
+constexpr int kSubExposures = 5;
+
+/// Streams of random numbers of a frame: one for each camera's image, one for depth.
+constexpr std::uint64_t kStreamsPerFrame = 64;
+constexpr std::uint64_t kDepthStream = kStreamsPerFrame - 1;
+
+/// Sequences start some time after zero, as stamps of real ones do.
+constexpr std::int64_t kFirstTimestampNs = 1'000'000'000;
+
+CameraChain chain_of(std::vector<ChainCamera> cameras) {
+  CameraChain chain;
+  chain.cameras = std::move(cameras);
+  return chain;
+}
+
+std::uint64_t stream_of(int frame, std::uint64_t stream) {
+  return static_cast<std::uint64_t>(frame) * kStreamsPerFrame + stream;
+}
+
+}  // namespace
+
+CameraChain mono_chain(const CameraDescription& camera) { return chain_of({{camera, Rigid3()}}); }
+
+CameraChain stereo_chain(const CameraDescription& camera0,
+                         const CameraDescription& camera1,
+                         const Rigid3& cam1_from_cam0) {
+  return chain_of({{camera0, Rigid3()}, {camera1, cam1_from_cam0}});
+}
+
+CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor) {
+  CameraChain chain = mono_chain(camera);
+  chain.depth_factor = depth_factor;
+  return chain;
+}
+
+SimulatedSequence::SimulatedSequence(SequenceSpec spec,
+                                     unsigned num_threads,
+                                     const CameraRegistry& registry)
+    : spec_(std::move(spec)),
+      rig_(make_rig(spec_.chain, registry)),
+      world_(make_world(spec_.world, spec_.seed)),
+      motion_(make_motion(spec_.world, spec_.motion, spec_.num_frames / spec_.rate_hz)),
+      pool_(std::make_unique<ThreadPool>(num_threads)) {
+  WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
+  WAYMARK_CHECK(!rig_.cameras.empty() && rig_.cameras.size() < kDepthStream);
+  for (const RigCamera& camera : rig_.cameras) renderers_.emplace_back(world_, camera.camera);
+}
+
+std::int64_t SimulatedSequence::timestamp_ns(int index) const {
+  return kFirstTimestampNs + std::llround(1e9 * seconds(index));
+}
+
+Rigid3 SimulatedSequence::world_from_rig(int index) const {
+  return motion_.world_from_rig(seconds(index));
+}
+
+const ImageEffects& SimulatedSequence::effects_of(int index) const {
+  for (const EffectSpan& span : spec_.spans) {
+    if (index >= span.first_frame && index < span.end_frame) return span.effects;
+  }
+  return spec_.effects;
+}
+
+Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
+  const Renderer& renderer = renderers_[camera];
+  const Rigid3 rig_from_cam = rig_.cameras[camera].cam_from_rig.inverse();
+  if (effects.exposure_s <= 0.0)
+    return renderer.image(world_from_rig(index) * rig_from_cam, *pool_);
+  std::vector<int> sums;
+  Image image;
+  for (int k = 0; k < kSubExposures; ++k) {
+    const double offset = effects.exposure_s * ((k + 0.5) / kSubExposures - 0.5);
+    image = renderer.image(motion_.world_from_rig(seconds(index) + offset) * rig_from_cam, *pool_);
+    sums.resize(image.values.size(), 0);
+    for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += image.values[i];
+  }
+  for (std::size_t i = 0; i < sums.size(); ++i) {
+    image.values[i] = static_cast<std::uint8_t>((sums[i] + kSubExposures / 2) / kSubExposures);
+  }
+  return image;
+}
+
+SimulatedFrame SimulatedSequence::frame(int index) {
+  WAYMARK_CHECK(index >= 0 && index < spec_.num_frames);
+  const ImageEffects& effects = effects_of(index);
+  SimulatedFrame frame;
+  frame.timestamp_ns = timestamp_ns(index);
+  frame.world_from_rig = world_from_rig(index);
+  for (std::size_t camera = 0; camera < rig_.cameras.size(); ++camera) {
+    Image image = expose(camera, index, effects);
+    Rng rng(spec_.seed, stream_of(index, camera));
+    apply_exposure(effects, rng, image);
+    frame.images.push_back(std::move(image));
+  }
+  if (spec_.chain.depth_factor) {
+    const Rigid3 world_from_cam = frame.world_from_rig * rig_.cameras[0].cam_from_rig.inverse();
+    frame.depth = renderers_[0].depth(world_from_cam, *spec_.chain.depth_factor, *pool_);
+    Rng rng(spec_.seed, stream_of(index, kDepthStream));
+    apply_depth_noise(effects, *spec_.chain.depth_factor, rng, frame.depth);
+  }
+  return frame;
+}
+
+}  // namespace waymark

@@ -1,0 +1,85 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "waymark/base/thread_pool.h"
+#include "waymark/camera/camchain.h"
+#include "waymark/simulate/effects.h"
+#include "waymark/simulate/motion.h"
+#include "waymark/simulate/render.h"
+
+namespace waymark {
+
+/// Other effects for the frames [first_frame, end_frame).
+struct EffectSpan {
+  int first_frame = 0;
+  int end_frame = 0;
+  ImageEffects effects;
+};
+
+/// A sequence in words and numbers. The cameras may be of any model the registry knows; with a
+/// depth_factor in the chain, camera 0 also measures depth.
+struct SequenceSpec {
+  std::string name;
+  std::string world = "room";
+  std::string motion = "loop";
+  std::uint64_t seed = 0;
+  CameraChain chain;
+  double rate_hz = 20.0;
+  int num_frames = 200;
+  ImageEffects effects;
+  std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
+};
+
+/// Chains of cameras for sequences.
+CameraChain mono_chain(const CameraDescription& camera);
+CameraChain stereo_chain(const CameraDescription& camera0,
+                         const CameraDescription& camera1,
+                         const Rigid3& cam1_from_cam0);
+CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor);
+
+struct SimulatedFrame {
+  std::int64_t timestamp_ns = 0;
+  std::vector<Image> images;  ///< One per camera of the rig.
+  DepthImage depth;           ///< Registered to camera 0; empty without depth.
+  Rigid3 world_from_rig;      ///< Truth at the middle of the exposure.
+};
+
+/// Renders the frames of a spec, each from (seed, index) alone: in any order, with the same bits
+/// for any number of threads. Not for use by several threads at a time.
+class SimulatedSequence {
+ public:
+  explicit SimulatedSequence(
+      SequenceSpec spec,
+      unsigned num_threads = 1,
+      const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
+  const SequenceSpec& spec() const { return spec_; }
+  const Rig& rig() const { return rig_; }
+  const World& world() const { return *world_; }
+  int num_frames() const { return spec_.num_frames; }
+  std::int64_t timestamp_ns(int index) const;
+  Rigid3 world_from_rig(int index) const;
+  SimulatedFrame frame(int index);
+
+ private:
+  double seconds(int index) const { return index / spec_.rate_hz; }
+  const ImageEffects& effects_of(int index) const;
+  Image expose(std::size_t camera, int index, const ImageEffects& effects);
+
+  SequenceSpec spec_;
+  Rig rig_;
+  std::shared_ptr<const World> world_;
+  Motion motion_;
+  std::vector<Renderer> renderers_;
+  std::unique_ptr<ThreadPool> pool_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,141 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/sequence.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace waymark {
+namespace {
+
+CameraDescription small_camera() {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {100.0, 100.0, 79.5, 59.5};
+  camera.width_px = 160;
+  camera.height_px = 120;
+  return camera;
+}
+
+SequenceSpec small_spec() {
+  SequenceSpec spec;
+  spec.name = "small";
+  spec.seed = 3;
+  spec.num_frames = 20;
+  spec.chain = mono_chain(small_camera());
+  return spec;
+}
+
+TEST(Sequence, FramesDoNotDependOnOrderOrThreads) {
+  SequenceSpec spec = small_spec();
+  spec.effects.noise_sigma = 3.0;
+  spec.effects.exposure_s = 0.02;
+  spec.chain.depth_factor = 1000.0;
+  spec.effects.inverse_depth_sigma = 0.002;
+  SimulatedSequence one(spec, 1);
+  SimulatedSequence three(spec, 3);
+  const SimulatedFrame last = one.frame(7);
+  const SimulatedFrame first = one.frame(2);
+  EXPECT_EQ(first.images[0].values, three.frame(2).images[0].values);
+  EXPECT_EQ(last.images[0].values, three.frame(7).images[0].values);
+  EXPECT_EQ(last.depth.values, three.frame(7).depth.values);
+  EXPECT_NE(first.images[0].values, last.images[0].values);
+  EXPECT_EQ(last.timestamp_ns - first.timestamp_ns, 250'000'000);
+}
+
+TEST(Sequence, NoiseHasTheSigmaAskedFor) {
+  SequenceSpec spec = small_spec();
+  spec.motion = "still";
+  SimulatedSequence clean(spec);
+  spec.effects.noise_sigma = 4.0;
+  SimulatedSequence noisy(spec);
+  const Image a = clean.frame(0).images[0];
+  const Image b = noisy.frame(0).images[0];
+  double sum = 0.0;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    const double error = static_cast<double>(b.values[i]) - a.values[i];
+    sum += error;
+    squares += error * error;
+  }
+  const double count = static_cast<double>(a.values.size());
+  EXPECT_NEAR(sum / count, 0.0, 0.15);
+  EXPECT_NEAR(std::sqrt(squares / count), 4.0, 0.15);
+  EXPECT_NE(b.values, noisy.frame(1).images[0].values);
+}
+
+TEST(Sequence, SpansChangeTheExposure) {
+  SequenceSpec spec = small_spec();
+  spec.motion = "still";
+  ImageEffects bright;
+  bright.gain = 3.0;
+  spec.spans.push_back({5, 7, bright});
+  SimulatedSequence sequence(spec);
+  const Image usual = sequence.frame(4).images[0];
+  const Image changed = sequence.frame(5).images[0];
+  for (std::size_t i = 0; i < usual.values.size(); ++i) {
+    ASSERT_EQ(changed.values[i], std::min(255, 3 * usual.values[i]));
+  }
+  EXPECT_EQ(usual.values, sequence.frame(7).images[0].values);
+}
+
+double sharpness(const Image& image) {
+  double sum = 0.0;
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 1; x < image.width_px; ++x) sum += std::abs(image.row(y)[x] - image.row(y)[x - 1]);
+  }
+  return sum;
+}
+
+TEST(Sequence, MotionBlursAndStandingStillDoesNot) {
+  SequenceSpec spec = small_spec();
+  for (const bool is_moving : {false, true}) {
+    spec.motion = is_moving ? "fast_turn" : "still";
+    spec.effects.exposure_s = 0.0;
+    SimulatedSequence sharp(spec);
+    spec.effects.exposure_s = 0.03;
+    SimulatedSequence blurred(spec);
+    const double ratio =
+        sharpness(blurred.frame(9).images[0]) / sharpness(sharp.frame(9).images[0]);
+    if (is_moving) {
+      EXPECT_LT(ratio, 0.8);
+    } else {
+      EXPECT_EQ(ratio, 1.0);
+    }
+  }
+}
+
+TEST(Sequence, SecondCameraSeesFromItsPlace) {
+  SequenceSpec spec = small_spec();
+  const Rigid3 cam1_from_cam0(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
+                              {-0.3, 0.02, 0.01});
+  spec.chain = stereo_chain(small_camera(), small_camera(), cam1_from_cam0);
+  SimulatedSequence sequence(spec);
+  const SimulatedFrame frame = sequence.frame(3);
+  ASSERT_EQ(frame.images.size(), 2u);
+  ThreadPool pool(1);
+  const Renderer renderer(make_world("room", 3), sequence.rig().cameras[1].camera);
+  const Image expected = renderer.image(frame.world_from_rig * cam1_from_cam0.inverse(), pool);
+  EXPECT_EQ(frame.images[1].values, expected.values);
+}
+
+TEST(Sequence, DepthNoiseIsInInverseDepth) {
+  SequenceSpec spec = small_spec();
+  spec.chain = rgbd_chain(small_camera(), 5000.0);
+  SimulatedSequence clean(spec);
+  spec.effects.inverse_depth_sigma = 0.004;
+  SimulatedSequence noisy(spec);
+  const DepthImage a = clean.frame(1).depth;
+  const DepthImage b = noisy.frame(1).depth;
+  double squares = 0.0;
+  for (std::size_t i = 0; i < a.values.size(); ++i) {
+    ASSERT_GT(a.values[i], 0);
+    squares += std::pow(5000.0 / b.values[i] - 5000.0 / a.values[i], 2);
+  }
+  EXPECT_NEAR(std::sqrt(squares / static_cast<double>(a.values.size())), 0.004, 1e-4);
+}
+
+}  // namespace
+}  // namespace waymark
