@@ -6,9 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "waymark/base/check.h"
+#include "waymark/optimize/pose_arrays.h"
 #include "waymark/optimize/pose_kernel.h"
-#include "waymark/optimize/residual.h"
 
 namespace waymark {
 
@@ -28,92 +27,13 @@ constexpr int kIterationsPerStage = 2;
 constexpr int kIterationsPerRound = 6;
 constexpr int kNumRounds = 2;
 /// Iterations end when the next step would lower the cost by less than this, in units of the
-/// squared noise: a thousandth of the pose's own standard deviation.
-constexpr double kNegligibleDecrease = 1e-6;
+/// squared noise. Its root is the step in units of the pose's own standard deviation.
+constexpr double kCoarseDecrease = 1e-2;
+constexpr double kFineDecrease = 1e-4;
 /// Prior information in 1/m^2 and 1/rad^2 that keeps the covariance finite.
 constexpr double kPriorInformation = 1e-6;
 /// Residual components that the assumed noise counts as when the noise is measured.
 constexpr double kNoisePriorStrength = 8.0;
-
-bool is_usable(const Rig& rig, const PoseObservations& observations, std::size_t i) {
-  return observations.camera[i] < rig.cameras.size() &&
-         observations.point_in_world[i].allFinite() && observations.bearing[i].allFinite() &&
-         observations.level_pixel_from_bearing[i].allFinite();
-}
-
-void check_sizes(const PoseObservations& observations) {
-  const std::size_t size = observations.size();
-  const auto is_optional = [size](std::size_t other) { return other == 0 || other == size; };
-  WAYMARK_CHECK(observations.bearing.size() == size);
-  WAYMARK_CHECK(observations.level_pixel_from_bearing.size() == size);
-  WAYMARK_CHECK(observations.camera.size() == size);
-  WAYMARK_CHECK(is_optional(observations.inverse_range.size()));
-  WAYMARK_CHECK(observations.inverse_range_sigma.size() == observations.inverse_range.size());
-  WAYMARK_CHECK(is_optional(observations.weight.size()));
-}
-
-double weight_of(const PoseObservations& observations, std::size_t i) {
-  if (observations.weight.empty()) return 1.0;
-  const double weight = observations.weight[i];
-  return weight > 0.0 && std::isfinite(weight) ? weight : 0.0;
-}
-
-void append(const PoseObservations& observations, std::size_t i, double noise_px, Arrays& arrays) {
-  auto& fields = arrays.fields;
-  const auto& point = observations.point_in_world[i];
-  const auto& bearing = observations.bearing[i];
-  const auto& w = observations.level_pixel_from_bearing[i];
-  for (int axis = 0; axis < 3; ++axis) {
-    fields[kPointX + axis].push_back(point[axis]);
-    fields[kBearingX + axis].push_back(bearing[axis]);
-    fields[kW00 + axis].push_back(w(0, axis));
-    fields[kW10 + axis].push_back(w(1, axis));
-  }
-  double inverse_range = 0.0;
-  double scale = 0.0;
-  if (!observations.inverse_range.empty() && observations.inverse_range_sigma[i] > 0.0f &&
-      std::isfinite(observations.inverse_range[i])) {
-    inverse_range = observations.inverse_range[i];
-    scale = noise_px / observations.inverse_range_sigma[i];
-  }
-  fields[kInverseRange].push_back(inverse_range);
-  fields[kInverseRangeScale].push_back(scale);
-  fields[kWeight].push_back(weight_of(observations, i));
-  arrays.observation.push_back(static_cast<std::uint32_t>(i));
-}
-
-void pad(Arrays& arrays) {
-  while (arrays.observation.size() % kPoseLanes != 0) {
-    for (auto& field : arrays.fields) field.push_back(0.0);
-    arrays.observation.push_back(UINT32_MAX);
-  }
-}
-
-/// Returns the number of observations that can be used.
-std::size_t gather(const Rig& rig,
-                   const PoseObservations& observations,
-                   double noise_px,
-                   Arrays& arrays) {
-  for (auto& field : arrays.fields) field.clear();
-  arrays.observation.clear();
-  arrays.segments.clear();
-  arrays.is_inlier.assign(observations.size(), 0);
-  std::size_t num_usable = 0;
-  for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
-    const std::size_t begin = arrays.observation.size();
-    for (std::size_t i = 0; i < observations.size(); ++i) {
-      if (observations.camera[i] != camera || !is_usable(rig, observations, i)) continue;
-      append(observations, i, noise_px, arrays);
-      ++num_usable;
-    }
-    pad(arrays);
-    if (arrays.observation.size() > begin) {
-      arrays.segments.push_back({camera, begin, arrays.observation.size()});
-    }
-  }
-  arrays.squared_residual.assign(arrays.observation.size(), 0.0);
-  return num_usable;
-}
 
 struct NormalEquations {
   Matrix6d hessian = Matrix6d::Zero();
@@ -159,7 +79,7 @@ class PoseSolver {
 
   /// Levenberg-Marquardt with the damping of Madsen, Nielsen & Tingleff 2004, 3.2; returns the
   /// equations at the pose reached.
-  NormalEquations minimize(const PoseRobust& robust, int max_iterations) {
+  NormalEquations minimize(const PoseRobust& robust, int max_iterations, double negligible) {
     NormalEquations equations = linearize(rig_from_world_, robust);
     double damping = 1e-6;
     double growth = 2.0;
@@ -170,7 +90,7 @@ class PoseSolver {
       damped.diagonal().array() += kPriorInformation;
       const Vector6d step = -damped.ldlt().solve(equations.gradient);
       const double decrease = step.dot(damping * scale.cwiseProduct(step) - equations.gradient);
-      if (!(decrease > kNegligibleDecrease * noise_px_ * noise_px_)) break;
+      if (!(decrease > negligible * noise_px_ * noise_px_)) break;
       ++num_iterations_;
       const Rigid3 candidate = Rigid3::exp(step) * rig_from_world_;
       const NormalEquations next = linearize(candidate, robust);
@@ -188,6 +108,18 @@ class PoseSolver {
     return equations;
   }
 
+  /// The part of the Hessian at the pose reached that the bearings contribute.
+  Matrix6d bearing_hessian(const PoseRobust& robust) {
+    for (PoseSegment& segment : arrays_.segments) segment.has_ranges = false;
+    return linearize(rig_from_world_, robust).hessian;
+  }
+
+  bool has_ranges() const {
+    return std::any_of(arrays_.segments.begin(), arrays_.segments.end(), [](const auto& segment) {
+      return segment.has_ranges;
+    });
+  }
+
   void compute_residuals() {
     for (const PoseSegment& segment : arrays_.segments) {
       const Rigid3& cam_from_rig = rig_.cameras[segment.camera].cam_from_rig;
@@ -202,10 +134,10 @@ class PoseSolver {
     const double final_scale = kFinalScale * noise_px_;
     double scale = std::max(final_scale, median_residual());
     while (scale > final_scale) {
-      minimize({PoseLoss::kGemanMcClure, scale}, kIterationsPerStage);
+      minimize({PoseLoss::kGemanMcClure, scale}, kIterationsPerStage, kCoarseDecrease);
       scale *= kAnnealing;
     }
-    minimize({PoseLoss::kGemanMcClure, final_scale}, kIterationsPerRound);
+    minimize({PoseLoss::kGemanMcClure, final_scale}, kIterationsPerRound, kCoarseDecrease);
   }
 
  private:
@@ -226,20 +158,6 @@ class PoseSolver {
   Arrays& arrays_;
   int num_iterations_ = 0;
 };
-
-/// Sets is_inlier by the gate and gives outliers the weight 0; returns the number of inliers.
-std::size_t classify(const PoseObservations& observations, double gate, Arrays& arrays) {
-  std::size_t num_inliers = 0;
-  for (std::size_t i = 0; i < arrays.observation.size(); ++i) {
-    const std::uint32_t observation = arrays.observation[i];
-    if (observation == UINT32_MAX) continue;
-    const bool is_inlier = arrays.squared_residual[i] < gate;
-    arrays.is_inlier[observation] = is_inlier;
-    arrays.fields[kWeight][i] = is_inlier ? weight_of(observations, observation) : 0.0;
-    num_inliers += is_inlier;
-  }
-  return num_inliers;
-}
 
 struct Spread {
   double variance = 0.0;  ///< Of a residual component.
@@ -270,7 +188,8 @@ Spread measure_spread(const Arrays& arrays, double gate, double assumed_variance
   return {variance, count > 0.0 ? sum_of_lengths / count : 0.0};
 }
 
-Matrix6d invert(Matrix6d information) {
+/// Inverse of the information; a weak prior keeps it finite where there is none.
+Matrix6d covariance_from(Matrix6d information) {
   const double floor = 1e-12 * information.diagonal().maxCoeff();
   information.diagonal().array() += std::max(kPriorInformation, floor);
   const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
@@ -279,48 +198,39 @@ Matrix6d invert(Matrix6d information) {
 
 }  // namespace
 
-void PoseObservations::clear() {
-  point_in_world.clear();
-  bearing.clear();
-  level_pixel_from_bearing.clear();
-  camera.clear();
-  inverse_range.clear();
-  inverse_range_sigma.clear();
-  weight.clear();
-}
-
-PoseWorkspace::PoseWorkspace() : arrays_(std::make_unique<Arrays>()) {}
-PoseWorkspace::~PoseWorkspace() = default;
-PoseWorkspace::PoseWorkspace(PoseWorkspace&&) noexcept = default;
-PoseWorkspace& PoseWorkspace::operator=(PoseWorkspace&&) noexcept = default;
-
 PoseEstimate optimize_pose(const Rig& rig,
                            const PoseObservations& observations,
                            const Rigid3& initial_rig_from_world,
                            const PoseOptions& options,
                            PoseWorkspace& workspace) {
-  check_sizes(observations);
   Arrays& arrays = workspace.arrays();
   const double gate = options.gate_chi2 * options.noise_px * options.noise_px;
   const PoseRobust huber = {PoseLoss::kHuber, kHuberScale * options.noise_px};
-  const std::size_t num_usable = gather(rig, observations, options.noise_px, arrays);
+  const std::size_t num_usable =
+      gather_pose_observations(rig, observations, options.noise_px, arrays);
   PoseSolver solver(rig, initial_rig_from_world, options.noise_px, arrays);
   const bool is_determined = num_usable >= kMinObservations;
   if (is_determined) solver.anneal();
 
-  PoseEstimate estimate;
-  NormalEquations equations;
+  Matrix6d hessian = Matrix6d::Zero();
   solver.compute_residuals();
-  estimate.num_inliers = classify(observations, gate, arrays);
+  PoseClasses classes = classify_pose_observations(observations, gate, arrays);
   for (int round = 0; round < kNumRounds && is_determined; ++round) {
-    equations = solver.minimize(huber, kIterationsPerRound);
+    if (round > 0 && classes.num_changed == 0) break;
+    hessian = solver.minimize(huber, kIterationsPerRound, kFineDecrease).hessian;
     solver.compute_residuals();
-    estimate.num_inliers = classify(observations, gate, arrays);
+    classes = classify_pose_observations(observations, gate, arrays);
   }
-  const Spread spread = measure_spread(arrays, gate, options.noise_px * options.noise_px);
+  const double assumed_variance = options.noise_px * options.noise_px;
+  const Spread spread = measure_spread(arrays, gate, assumed_variance);
+  const Matrix6d of_bearings = solver.has_ranges() ? solver.bearing_hessian(huber) : hessian;
+  const Matrix6d information =
+      of_bearings / spread.variance + (hessian - of_bearings) / assumed_variance;
+  PoseEstimate estimate;
   estimate.rig_from_world = solver.rig_from_world();
   estimate.is_inlier = arrays.is_inlier;
-  estimate.covariance = spread.variance * invert(equations.hessian);
+  estimate.num_inliers = classes.num_inliers;
+  estimate.covariance = covariance_from(information);
   estimate.noise_measured_px = std::sqrt(spread.variance);
   estimate.mean_residual_px = spread.mean;
   estimate.num_iterations = solver.num_iterations();

@@ -15,6 +15,7 @@
 HWY_BEFORE_NAMESPACE();
 namespace waymark {
 namespace HWY_NAMESPACE {
+namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<double, kPoseLanes>;
@@ -170,7 +171,7 @@ HWY_INLINE void add_range(const Seen& seen, Vec weight, Vec residual, Vec scale_
   add(sums.value[23], hn::Mul(weighted.z, residual));
 }
 
-template <bool kIsHuber>
+template <bool kIsHuber, bool kHasRanges>
 HWY_INLINE void add_observations(const PoseWorkspace::Arrays& arrays,
                                  std::size_t i,
                                  const Transform& pose,
@@ -189,6 +190,7 @@ HWY_INLINE void add_observations(const PoseWorkspace::Arrays& arrays,
   add_bearing(seen, hn::IfThenElseZero(seen.is_ahead, hn::Mul(given, bearing.weight)), sums);
   add(sums.value[27], hn::Mul(given, bearing.loss));
 
+  if (!kHasRanges) return;
   const Vec range_scale = load(arrays, kInverseRangeScale, i);
   const Vec residual =
       hn::Mul(hn::Sub(seen.inverse_range, load(arrays, kInverseRange, i)), range_scale);
@@ -198,7 +200,7 @@ HWY_INLINE void add_observations(const PoseWorkspace::Arrays& arrays,
   add(sums.value[27], hn::Mul(given, range.loss));
 }
 
-template <bool kIsHuber>
+template <bool kIsHuber, bool kHasRanges>
 void sum_segment(const PoseWorkspace::Arrays& arrays,
                  const PoseSegment& segment,
                  const Rigid3& cam_from_world,
@@ -210,7 +212,7 @@ void sum_segment(const PoseWorkspace::Arrays& arrays,
     Sums sums;
     for (Vec& sum : sums.value) sum = hn::Zero(tag);
     for (std::size_t i = segment.begin; i < segment.end; i += kPoseLanes) {
-      add_observations<kIsHuber>(arrays, i + lane, pose, scale_px, sums);
+      add_observations<kIsHuber, kHasRanges>(arrays, i + lane, pose, scale_px, sums);
     }
     for (std::size_t k = 0; k < kNumPoseSums; ++k) {
       hn::StoreU(sums.value[k], tag, lanes + k * kPoseLanes + lane);
@@ -224,11 +226,12 @@ void sum_lanes(const PoseWorkspace::Arrays& arrays,
                const Rigid3& cam_from_world,
                const PoseRobust& robust,
                double* lanes) {
-  if (robust.loss == PoseLoss::kHuber) {
-    sum_segment<true>(arrays, segment, cam_from_world, robust.scale_px, lanes);
-  } else {
-    sum_segment<false>(arrays, segment, cam_from_world, robust.scale_px, lanes);
-  }
+  const bool is_huber = robust.loss == PoseLoss::kHuber;
+  const auto sum = is_huber
+                       ? (segment.has_ranges ? sum_segment<true, true> : sum_segment<true, false>)
+                   : segment.has_ranges ? sum_segment<false, true>
+                                        : sum_segment<false, false>;
+  sum(arrays, segment, cam_from_world, robust.scale_px, lanes);
 }
 
 void square_residuals(PoseWorkspace::Arrays& arrays,
@@ -241,6 +244,7 @@ void square_residuals(PoseWorkspace::Arrays& arrays,
   }
 }
 
+}  // namespace
 }  // namespace HWY_NAMESPACE
 }  // namespace waymark
 HWY_AFTER_NAMESPACE();

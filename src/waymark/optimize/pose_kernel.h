@@ -4,55 +4,11 @@
 
 #include <array>
 #include <cstddef>
-#include <cstdint>
-#include <vector>
 
 #include "waymark/geometry/rigid3.h"
-#include "waymark/optimize/pose.h"
+#include "waymark/optimize/pose_arrays.h"
 
 namespace waymark {
-
-/// Observations are summed in kPoseLanes interleaved partial sums whatever the width of the
-/// vectors, without fused multiply-add, so that every instruction set gives the same bits.
-inline constexpr std::size_t kPoseLanes = 8;
-
-/// The observations of one camera: entries [begin, end) of the arrays, a multiple of kPoseLanes.
-struct PoseSegment {
-  std::size_t camera = 0;
-  std::size_t begin = 0;
-  std::size_t end = 0;
-};
-
-/// Columns of PoseWorkspace::Arrays.
-enum PoseField : std::size_t {
-  kPointX,
-  kPointY,
-  kPointZ,
-  kBearingX,
-  kBearingY,
-  kBearingZ,
-  kW00,
-  kW01,
-  kW02,
-  kW10,
-  kW11,
-  kW12,
-  kInverseRange,
-  kInverseRangeScale,  // 1 / sigma in units of the pixel noise; 0 without a measurement.
-  kWeight,             // 0 takes the observation out.
-  kNumPoseFields
-};
-
-/// The observations column by column, grouped by camera and padded with entries of weight 0. All
-/// values are finite.
-struct PoseWorkspace::Arrays {
-  std::array<std::vector<double>, kNumPoseFields> fields;
-  std::vector<double> squared_residual;    // px^2; kGrossSquaredResidual behind the bearing.
-  std::vector<std::uint32_t> observation;  // Index given by the caller, UINT32_MAX in padding.
-  std::vector<PoseSegment> segments;
-  std::vector<double> scratch;
-  std::vector<std::uint8_t> is_inlier;  // In the caller's order.
-};
 
 enum class PoseLoss { kGemanMcClure, kHuber };
 
@@ -64,7 +20,9 @@ struct PoseRobust {
 
 /// Normal equations by a left perturbation of the pose: the upper triangle of the Hessian
 /// approximation row by row (21), the gradient (6) and the robust cost, all without the factor 2
-/// of the derivative of a square.
+/// of the derivative of a square. Summed in kPoseLanes interleaved partial sums, whatever the width
+/// of the vectors, and without fused multiply-add, so that every instruction set gives the same
+/// bits.
 inline constexpr std::size_t kNumPoseSums = 28;
 using PoseSums = std::array<double, kNumPoseSums>;
 

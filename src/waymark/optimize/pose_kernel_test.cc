@@ -46,7 +46,7 @@ KernelInput make_input() {
     fields[kWeight].push_back(is_padding ? 0.0 : rng.uniform(0.5, 2.0));
   }
   input.arrays.squared_residual.resize(48);
-  input.segment = {0, 0, 48};
+  input.segment = {0, 0, 48, true};
   return input;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 
 #include "waymark/camera/camera.h"
@@ -20,7 +21,7 @@ struct Sighting {
 };
 
 inline Sighting sight(const Eigen::Vector3d& point_in_cam) {
-  const double inverse_range = 1.0 / std::sqrt(std::fmax(point_in_cam.squaredNorm(), 1e-24));
+  const double inverse_range = 1.0 / std::sqrt(std::max(point_in_cam.squaredNorm(), 1e-24));
   return {point_in_cam * inverse_range, inverse_range};
 }
 

@@ -9,6 +9,7 @@
 
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
+#include "waymark/optimize/schur_plan.h"
 
 namespace waymark {
 
@@ -16,68 +17,11 @@ namespace {
 
 using Matrix63d = Eigen::Matrix<double, 6, 3>;
 
-constexpr std::uint32_t kFixed = UINT32_MAX;
 constexpr double kInitialDamping = 1e-4;
 constexpr double kMaxDamping = 1e12;
 /// Bounds of the diagonal that the damping scales, so that directions nobody measures stay put.
 constexpr double kMinDiagonal = 1e-6;
 constexpr double kMaxDiagonal = 1e32;
-
-/// Which observations meet where. A link is a point together with a free pose that sees it, by
-/// one camera or more; links run by point, then by pose.
-struct Plan {
-  std::vector<std::uint32_t> slot_of_pose;  // Position in the reduced system, or kFixed.
-  std::size_t num_slots = 0;
-  std::vector<std::uint32_t> observations;         // The used ones.
-  std::vector<std::uint32_t> link_of_observation;  // Parallel to it; kFixed if none.
-  std::vector<std::uint32_t> points;               // Those with observations.
-  std::vector<std::uint32_t> first_observation;    // Per entry of points, and one past the end.
-  std::vector<std::uint32_t> first_link;           // Likewise.
-  std::vector<std::uint32_t> slot_of_link;
-};
-
-/// Appends the links of the point whose observations start at begin.
-void link_point(const BundleProblem& problem, std::size_t begin, Plan& plan) {
-  const auto first = static_cast<std::ptrdiff_t>(plan.slot_of_link.size());
-  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
-    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
-    if (slot != kFixed) plan.slot_of_link.push_back(slot);
-  }
-  auto& slots = plan.slot_of_link;
-  std::sort(slots.begin() + first, slots.end());
-  slots.erase(std::unique(slots.begin() + first, slots.end()), slots.end());
-  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
-    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
-    const auto link = std::lower_bound(slots.begin() + first, slots.end(), slot) - slots.begin();
-    plan.link_of_observation.push_back(slot == kFixed ? kFixed : static_cast<std::uint32_t>(link));
-  }
-  plan.first_observation.push_back(static_cast<std::uint32_t>(plan.observations.size()));
-  plan.first_link.push_back(static_cast<std::uint32_t>(slots.size()));
-}
-
-Plan make_plan(const BundleProblem& problem, std::span<const std::uint8_t> is_used) {
-  Plan plan;
-  for (const std::uint8_t is_fixed : problem.is_pose_fixed) {
-    plan.slot_of_pose.push_back(is_fixed ? kFixed : static_cast<std::uint32_t>(plan.num_slots));
-    plan.num_slots += is_fixed ? 0 : 1;
-  }
-  plan.observations.reserve(problem.observations.size());
-  plan.link_of_observation.reserve(problem.observations.size());
-  plan.slot_of_link.reserve(problem.observations.size());
-  plan.first_observation.push_back(0);
-  plan.first_link.push_back(0);
-  for (std::size_t i = 0; i < problem.observations.size();) {
-    const std::uint32_t point = problem.observations[i].point;
-    const std::size_t begin = plan.observations.size();
-    for (; i < problem.observations.size() && problem.observations[i].point == point; ++i) {
-      if (is_used[i]) plan.observations.push_back(static_cast<std::uint32_t>(i));
-    }
-    if (plan.observations.size() == begin) continue;
-    plan.points.push_back(point);
-    link_point(problem, begin, plan);
-  }
-  return plan;
-}
 
 /// Rotation matrices ready for use.
 struct Frame {
@@ -86,6 +30,12 @@ struct Frame {
 };
 
 Frame frame_of(const Rigid3& pose) { return {pose.rotation_matrix(), pose.translation}; }
+
+inline Eigen::Vector3d apply(const Frame& b_from_a, const Eigen::Vector3d& point_in_a) {
+  Eigen::Vector3d point_in_b = b_from_a.translation;
+  point_in_b.noalias() += b_from_a.rotation * point_in_a;
+  return point_in_b;
+}
 
 /// What the solver moves.
 struct State {
@@ -98,7 +48,7 @@ struct State {
 struct NormalBlocks {
   std::vector<Matrix6d> poses;          // Per slot.
   std::vector<Vector6d> pose_gradient;  // Per slot.
-  std::vector<Eigen::Matrix3d> points;  // Per entry of Plan::points.
+  std::vector<Eigen::Matrix3d> points;  // Per entry of SchurPlan::points.
   std::vector<Eigen::Vector3d> point_gradient;
   std::vector<Matrix63d> links;  // Pose by point.
 };
@@ -110,6 +60,25 @@ struct Rows {
   Eigen::Matrix<double, kRows, 3> by_point_in_cam;
 };
 
+/// M, lower triangular, with M^T * M the inverse of a positive definite block: the inverse of its
+/// Cholesky factor. Pivots that rounding made vanish are kept positive.
+Eigen::Matrix3d half_inverse(const Eigen::Matrix3d& block) {
+  const double inverse00 = 1.0 / std::sqrt(block(0, 0));
+  const double lower10 = block(1, 0) * inverse00;
+  const double lower20 = block(2, 0) * inverse00;
+  const double inverse11 =
+      1.0 / std::sqrt(std::max(block(1, 1) - lower10 * lower10, 1e-15 * block(1, 1)));
+  const double lower21 = (block(2, 1) - lower20 * lower10) * inverse11;
+  const double pivot22 = block(2, 2) - lower20 * lower20 - lower21 * lower21;
+  const double inverse22 = 1.0 / std::sqrt(std::max(pivot22, 1e-15 * block(2, 2)));
+  const double inverse10 = -lower10 * inverse00 * inverse11;
+  const double inverse21 = -lower21 * inverse11 * inverse22;
+  const double inverse20 = -(lower20 * inverse00 + lower21 * inverse10) * inverse22;
+  Eigen::Matrix3d half;
+  half << inverse00, 0.0, 0.0, inverse10, inverse11, 0.0, inverse20, inverse21, inverse22;
+  return half;
+}
+
 double clamp_diagonal(double value) { return std::clamp(value, kMinDiagonal, kMaxDiagonal); }
 
 class SchurSolver {
@@ -117,7 +86,7 @@ class SchurSolver {
   SchurSolver(const BundleProblem& problem,
               std::span<const std::uint8_t> is_used,
               const BundleOptions& options)
-      : problem_(problem), options_(options), plan_(make_plan(problem, is_used)) {
+      : problem_(problem), options_(options), plan_(make_schur_plan(problem, is_used)) {
     state_.rig_from_world = problem.rig_from_world;
     state_.points = problem.points;
     for (const Rigid3& pose : state_.rig_from_world) state_.frames.push_back(frame_of(pose));
@@ -133,9 +102,6 @@ class SchurSolver {
 
  private:
   void allocate();
-  Sighting sight_in(const State& state,
-                    const BundleObservation& observation,
-                    Eigen::Vector3d& point_in_rig) const;
   double cost(const State& state) const;
   void linearize();
   template <int kRows>
@@ -150,7 +116,7 @@ class SchurSolver {
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
-  const Plan plan_;
+  const SchurPlan plan_;
   std::vector<Frame> cameras_;
   State state_;
   State candidate_;
@@ -174,24 +140,13 @@ void SchurSolver::allocate() {
   reduced_gradient_.resize(size);
 }
 
-Sighting SchurSolver::sight_in(const State& state,
-                               const BundleObservation& observation,
-                               Eigen::Vector3d& point_in_rig) const {
-  const Frame& frame = state.frames[observation.pose];
-  const Frame& camera = cameras_[observation.camera];
-  point_in_rig.noalias() = frame.rotation * state.points[observation.point];
-  point_in_rig += frame.translation;
-  Eigen::Vector3d point_in_cam = camera.translation;
-  point_in_cam.noalias() += camera.rotation * point_in_rig;
-  return sight(point_in_cam);
-}
-
 double SchurSolver::cost(const State& state) const {
   double sum = 0.0;
   for (const std::uint32_t i : plan_.observations) {
     const BundleObservation& observation = problem_.observations[i];
-    Eigen::Vector3d point_in_rig;
-    const Sighting sighting = sight_in(state, observation, point_in_rig);
+    const Eigen::Vector3d point_in_rig =
+        apply(state.frames[observation.pose], state.points[observation.point]);
+    const Sighting sighting = sight(apply(cameras_[observation.camera], point_in_rig));
     if (!is_ahead(sighting, observation.bearing)) {
       sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
       continue;
@@ -220,7 +175,7 @@ void SchurSolver::accumulate(const Rows<kRows>& rows,
   blocks_.points[entry].noalias() += by_point.transpose() * by_point;
   blocks_.point_gradient[entry].noalias() += by_point.transpose() * rows.residual;
   const std::uint32_t link = plan_.link_of_observation[k];
-  if (link == kFixed) return;
+  if (link == kNoSlot) return;
   Eigen::Matrix<double, kRows, 6> by_pose;
   by_pose.template leftCols<3>() = by_rig;
   for (int row = 0; row < kRows; ++row) {
@@ -235,8 +190,9 @@ void SchurSolver::accumulate(const Rows<kRows>& rows,
 
 void SchurSolver::linearize_observation(std::size_t entry, std::size_t k) {
   const BundleObservation& observation = problem_.observations[plan_.observations[k]];
-  Eigen::Vector3d point_in_rig;
-  const Sighting sighting = sight_in(state_, observation, point_in_rig);
+  const Eigen::Vector3d point_in_rig =
+      apply(state_.frames[observation.pose], state_.points[observation.point]);
+  const Sighting sighting = sight(apply(cameras_[observation.camera], point_in_rig));
   if (!is_ahead(sighting, observation.bearing)) return;
   const Eigen::Vector2d residual =
       bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);
@@ -273,9 +229,8 @@ void SchurSolver::linearize() {
 void SchurSolver::eliminate_point(std::size_t entry, double damping) {
   Eigen::Matrix3d block = blocks_.points[entry];
   for (int i = 0; i < 3; ++i) block(i, i) += damping * clamp_diagonal(block(i, i));
-  const Eigen::Matrix3d lower = block.llt().matrixL();
-  Eigen::Matrix3d& half = half_inverses_[entry];
-  half = lower.triangularView<Eigen::Lower>().solve(Eigen::Matrix3d::Identity());
+  half_inverses_[entry] = half_inverse(block);
+  const Eigen::Matrix3d& half = half_inverses_[entry];
   const Eigen::Vector3d gradient = half * blocks_.point_gradient[entry];
   const std::uint32_t begin = plan_.first_link[entry];
   const std::uint32_t end = plan_.first_link[entry + 1];
@@ -319,7 +274,7 @@ double SchurSolver::substitute_back(double damping) {
   };
   for (std::size_t pose = 0; pose < plan_.slot_of_pose.size(); ++pose) {
     const std::uint32_t slot = plan_.slot_of_pose[pose];
-    if (slot == kFixed) continue;
+    if (slot == kNoSlot) continue;
     const Vector6d step = -reduced_gradient_.segment<6>(static_cast<Eigen::Index>(6 * slot));
     promise(step, blocks_.pose_gradient[slot], blocks_.poses[slot].diagonal());
     candidate_.rig_from_world[pose] = Rigid3::exp(step) * state_.rig_from_world[pose];

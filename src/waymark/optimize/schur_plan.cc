@@ -1,0 +1,57 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/optimize/schur_plan.h"
+
+#include <algorithm>
+
+namespace waymark {
+
+namespace {
+
+/// Appends the links of the point whose observations start at begin.
+void link_point(const BundleProblem& problem, std::size_t begin, SchurPlan& plan) {
+  const auto first = static_cast<std::ptrdiff_t>(plan.slot_of_link.size());
+  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
+    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
+    if (slot != kNoSlot) plan.slot_of_link.push_back(slot);
+  }
+  auto& slots = plan.slot_of_link;
+  std::sort(slots.begin() + first, slots.end());
+  slots.erase(std::unique(slots.begin() + first, slots.end()), slots.end());
+  for (std::size_t k = begin; k < plan.observations.size(); ++k) {
+    const auto slot = plan.slot_of_pose[problem.observations[plan.observations[k]].pose];
+    const auto link = std::lower_bound(slots.begin() + first, slots.end(), slot) - slots.begin();
+    plan.link_of_observation.push_back(slot == kNoSlot ? kNoSlot
+                                                       : static_cast<std::uint32_t>(link));
+  }
+  plan.first_observation.push_back(static_cast<std::uint32_t>(plan.observations.size()));
+  plan.first_link.push_back(static_cast<std::uint32_t>(slots.size()));
+}
+
+}  // namespace
+
+SchurPlan make_schur_plan(const BundleProblem& problem, std::span<const std::uint8_t> is_used) {
+  SchurPlan plan;
+  for (const std::uint8_t is_fixed : problem.is_pose_fixed) {
+    plan.slot_of_pose.push_back(is_fixed ? kNoSlot : static_cast<std::uint32_t>(plan.num_slots));
+    plan.num_slots += is_fixed ? 0 : 1;
+  }
+  plan.observations.reserve(problem.observations.size());
+  plan.link_of_observation.reserve(problem.observations.size());
+  plan.slot_of_link.reserve(problem.observations.size());
+  plan.first_observation.push_back(0);
+  plan.first_link.push_back(0);
+  for (std::size_t i = 0; i < problem.observations.size();) {
+    const std::uint32_t point = problem.observations[i].point;
+    const std::size_t begin = plan.observations.size();
+    for (; i < problem.observations.size() && problem.observations[i].point == point; ++i) {
+      if (is_used[i]) plan.observations.push_back(static_cast<std::uint32_t>(i));
+    }
+    if (plan.observations.size() == begin) continue;
+    plan.points.push_back(point);
+    link_point(problem, begin, plan);
+  }
+  return plan;
+}
+
+}  // namespace waymark
