@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <compare>
 #include <cstdint>
 #include <vector>
@@ -47,6 +48,13 @@ inline std::size_t num_observers(const Landmark& landmark) {
     last = observation.keyframe;
   }
   return count;
+}
+
+/// Whether a keyframe is among the observers.
+inline bool is_observed_by(const Landmark& landmark, KeyframeId keyframe) {
+  const auto first = std::lower_bound(
+      landmark.observations.begin(), landmark.observations.end(), Observation{keyframe, 0});
+  return first != landmark.observations.end() && first->keyframe == keyframe;
 }
 
 }  // namespace waymark

@@ -19,12 +19,6 @@ std::vector<KeyframeId> observers_except(const Landmark& landmark, KeyframeId ex
   return observers;
 }
 
-bool is_observed_by(const Landmark& landmark, KeyframeId keyframe) {
-  const auto first = std::lower_bound(
-      landmark.observations.begin(), landmark.observations.end(), Observation{keyframe, 0});
-  return first != landmark.observations.end() && first->keyframe == keyframe;
-}
-
 }  // namespace
 
 std::shared_ptr<const Map> Map::freeze() {

@@ -8,7 +8,8 @@ namespace waymark {
 
 struct TrackingSettings {
   int min_inliers = 20;
-  double keyframe_ratio = 0.8;
+  double keyframe_ratio = 0.45;
+  double keyframe_parallax_px = 60.0;
   int max_keyframe_interval = 30;
 
   template <class Self, class Field>
@@ -21,7 +22,14 @@ struct TrackingSettings {
           SettingInfo{.low = 0.1,
                       .high = 1.0,
                       .help = "A new keyframe is due when a frame sees less than this part of the "
-                              "landmarks that its reference keyframe sees."});
+                              "established landmarks that its reference keyframe sees."});
+    field("keyframe_parallax_px",
+          self.keyframe_parallax_px,
+          SettingInfo{.low = 1.0,
+                      .high = 1000.0,
+                      .unit = "px",
+                      .help = "Median parallax against the reference keyframe that makes a new "
+                              "keyframe worth its cost."});
     field("max_keyframe_interval",
           self.max_keyframe_interval,
           SettingInfo{.low = 1,

@@ -15,6 +15,8 @@ constexpr double kPredictedRadiusPx = 15.0;
 constexpr double kWideRadiusPx = 40.0;
 constexpr double kLocatedRadiusPx = 5.0;
 constexpr int kMaxLocalMapAge = 5;
+/// Landmarks that so many keyframes see, or all in a young map, count as established.
+constexpr std::size_t kEstablishedObservers = 3;
 constexpr std::uint32_t kRecoveryKeyframes = 12;
 
 }  // namespace
@@ -223,31 +225,36 @@ TrackOutcome Tracker::lose(const Frame&, FrameReason reason) {
 
 KeyframeSituation Tracker::assess(const Frame& frame, const LocatedFrame& located) const {
   const Keyframe& reference = map_->keyframes().at(local_.reference);
+  const std::size_t established = std::min(kEstablishedObservers, map_->keyframes().size());
   KeyframeSituation situation;
   situation.has_range = has_range_;
-  situation.num_inliers = located.num_inliers;
   situation.num_pending = num_sent_ - map_->keyframes().end_id().value;
   situation.frames_since_keyframe = static_cast<int>(frame.id.value - last_keyframe_frame_.value);
   for (std::uint32_t i = 0; i < reference.features->num_primary; ++i) {
-    situation.num_reference += reference.landmarks[i].is_valid();
+    const Landmark* landmark = map_->landmarks().find(reference.landmarks[i]);
+    situation.num_reference += landmark && num_observers(*landmark) >= established;
   }
   const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
   const Eigen::Vector3d reference_centre = reference.rig_from_world.origin_in_source();
-  std::vector<double> motions_px;
+  std::vector<double> parallaxes_px;
   for (std::uint32_t i = 0; i < frame.features->num_primary; ++i) {
     const bool is_near = has_range_ && has_reliable_range(*rig_, *frame.features, i);
     situation.num_near_tracked += is_near && landmarks_[i].is_valid();
     situation.num_near_untracked += is_near && !landmarks_[i].is_valid();
     if (!landmarks_[i].is_valid()) continue;
-    const Eigen::Vector3d& point = map_->landmarks().at(landmarks_[i]).position_in_world;
+    const Landmark& landmark = map_->landmarks().at(landmarks_[i]);
+    situation.num_shared +=
+        num_observers(landmark) >= established && is_observed_by(landmark, local_.reference);
+    const Eigen::Vector3d& point = landmark.position_in_world;
     const Eigen::Vector3d a = (point - centre).normalized();
     const Eigen::Vector3d b = (point - reference_centre).normalized();
-    motions_px.push_back((a - b).norm() / pixel_rad_);
+    parallaxes_px.push_back((a - b).norm() / pixel_rad_);
   }
-  if (!motions_px.empty()) {
-    const auto middle = motions_px.begin() + static_cast<std::ptrdiff_t>(motions_px.size() / 2);
-    std::nth_element(motions_px.begin(), middle, motions_px.end());
-    situation.median_motion_px = *middle;
+  if (!parallaxes_px.empty()) {
+    const auto middle =
+        parallaxes_px.begin() + static_cast<std::ptrdiff_t>(parallaxes_px.size() / 2);
+    std::nth_element(parallaxes_px.begin(), middle, parallaxes_px.end());
+    situation.median_parallax_px = *middle;
   }
   return situation;
 }
