@@ -5,6 +5,9 @@
 set -euo pipefail
 root=$(cd "$(dirname "${BASH_SOURCE[0]}")/.." && pwd)
 
+# Compiled once is compiled for every clone and folder on this machine.
+export CCACHE_BASEDIR=$root CCACHE_NOHASHDIR=1
+
 die() {
   printf 'error: %s\n' "$*" >&2
   exit 1
