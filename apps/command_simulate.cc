@@ -6,7 +6,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -14,8 +13,8 @@
 #include "choice_option.h"
 #include "commands.h"
 #include "reporter.h"
+#include "simulated_cameras.h"
 #include "waymark/base/check.h"
-#include "waymark/base/config.h"
 #include "waymark/io/atomic_file.h"
 #include "waymark/io/input.h"
 #include "waymark/simulate/dataset.h"
@@ -23,8 +22,6 @@
 
 namespace waymark {
 namespace {
-
-constexpr double kDepthFactor = 5000.0;
 
 struct SimulateOptions {
   std::string name;  ///< Of a world, or of a sequence of the suite.
@@ -35,55 +32,6 @@ struct SimulateOptions {
   bool is_list = false;
   bool is_quiet = false;
 };
-
-/// A moderately distorted camera; the second of a pair is neither parallel to the first nor like
-/// it.
-CameraDescription default_camera(int index) {
-  CameraDescription camera;
-  camera.camera_model = "pinhole";
-  camera.intrinsics = {420.0 + index, 421.0 + index, 317.0 - 3.0 * index, 242.0 + 2.0 * index};
-  camera.distortion_model = "radtan";
-  camera.distortion_coeffs = {-0.2, 0.05, 0.0002, -0.0001};
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.where = "default camera";
-  return camera;
-}
-
-Rigid3 default_cam1_from_cam0() {
-  Vector6d motion;
-  motion << -0.11, 0.002, -0.001, 0.008, -0.01, 0.005;
-  return Rigid3::exp(motion);
-}
-
-CameraChain default_chain(Setup setup) {
-  switch (setup) {
-    case Setup::kMono:
-      return mono_chain(default_camera(0));
-    case Setup::kStereo:
-      return stereo_chain(default_camera(0), default_camera(1), default_cam1_from_cam0());
-    case Setup::kRgbd:
-      return rgbd_chain(default_camera(0), kDepthFactor);
-  }
-  return {};
-}
-
-/// The part of a calibration that a setup uses.
-CameraChain chain_from_file(const std::filesystem::path& file, Setup setup) {
-  std::optional<CameraChain> chain = read_camchain(parse_config(ConfigSource::from_file(file)));
-  const std::size_t num_cameras = setup == Setup::kStereo ? 2 : 1;
-  if (!chain || chain->cameras.size() < num_cameras) {
-    throw InputError(file.string(),
-                     fmt::format("describes {} cameras, expected {} for {}",
-                                 chain ? chain->cameras.size() : 0,
-                                 num_cameras,
-                                 to_string(setup)));
-  }
-  chain->cameras.resize(num_cameras);
-  if (setup != Setup::kRgbd) chain->depth_factor.reset();
-  if (setup == Setup::kRgbd && !chain->depth_factor) chain->depth_factor = kDepthFactor;
-  return *chain;
-}
 
 SequenceSpec spec_of(const SimulateOptions& options) {
   const std::vector<std::string> worlds = world_names();
@@ -96,8 +44,8 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   }
   SequenceSpec spec = options.spec;
   spec.name = spec.world = options.name;
-  spec.chain = options.camera.empty() ? default_chain(options.setup)
-                                      : chain_from_file(options.camera, options.setup);
+  spec.chain = options.camera.empty() ? default_camera_chain(options.setup)
+                                      : read_camera_chain(options.camera, options.setup);
   return spec;
 }
 

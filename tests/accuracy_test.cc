@@ -5,6 +5,9 @@
 // sequences where WAYMARK_DATA has them.
 #include <gtest/gtest.h>
 
+#include <ostream>
+#include <string>
+
 #include "recorded_run.h"
 #include "simulated_run.h"
 
@@ -29,7 +32,7 @@ TEST(Accuracy, Mono) {
   const Recording recording = simulate(small_sequence(Setup::kMono, 60));
   const SessionResults results = map_recording(recording, Timing::kLockstep);
   EXPECT_GE(coverage(results), 0.9);
-  EXPECT_LT(evaluate_results(results, recording).ate_m.rmse, 0.015);
+  EXPECT_LT(evaluate_results(results, recording).ate_m.rmse, 0.02);
 }
 
 /// The gates of recorded sequences are those of the project's accuracy table, with the tolerance
@@ -40,6 +43,8 @@ struct RecordedCase {
   double min_coverage;
   double max_ate_m;
 };
+
+void PrintTo(const RecordedCase& recorded, std::ostream* stream) { *stream << recorded.name; }
 
 class Recorded : public testing::TestWithParam<RecordedCase> {};
 

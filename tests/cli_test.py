@@ -2,11 +2,10 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """The contract of the command line: inputs, outputs, exit status, one-line errors."""
+import os
 import resource
-import shutil
 import signal
 import subprocess
-import time
 import unittest
 
 from cli_support import NUM_FRAMES, PROGRAM, CliTest, png_size, truncate, waymark, write_png
@@ -26,7 +25,7 @@ class Usage(CliTest):
 
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
-        self.assert_fails(waymark("fly"), 2, "fly")
+        self.assert_fails(waymark("fly"), 2, "subcommand")
         self.assert_fails(waymark("run"), 2, "INPUT")
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
@@ -124,14 +123,14 @@ class Outputs(CliTest):
         self.assertIn("<svg", plot.read_text())
 
     def test_interrupt_finishes_early_and_saves(self):
-        process = subprocess.Popen([PROGRAM, "run", self.sequence("stereo"), "-o", self.out,
-                                    "--verbose"], stderr=subprocess.PIPE, text=True)
-        for line in process.stderr:  # --verbose has a line per frame.
-            if "frame 3" in line:
-                break
-        process.send_signal(signal.SIGINT)
-        process.stderr.read()
-        self.assertEqual(process.wait(timeout=120), 0)
+        with subprocess.Popen([PROGRAM, "run", self.sequence("stereo"), "-o", self.out, "--verbose"],
+                              stderr=subprocess.PIPE, text=True) as process:
+            for line in process.stderr:  # --verbose has a line per frame.
+                if "frame 3" in line:
+                    break
+            process.send_signal(signal.SIGINT)
+            process.stderr.read()
+            self.assertEqual(process.wait(timeout=120), 0)
         self.assertLess(self.summary()["frames"], NUM_FRAMES)
         self.assertTrue((self.out / "trajectory.txt").exists())
 
@@ -219,6 +218,16 @@ class BadInput(CliTest):
         self.assertEqual(self.summary()["tracked"], 0)
         self.assertIsNone(self.summary()["initialized_at"])
         self.assertEqual({f["reason"] for f in self.frames()}, {"no_features"})
+
+
+class Example(CliTest):
+    def test_maps_a_folder_of_images(self):
+        done = subprocess.run([os.environ["WAYMARK_EXAMPLE"], self.image_folder(),
+                               self.folder / "camchain.yaml"], capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        poses = [line.split() for line in done.stdout.strip().split("\n")]
+        self.assertGreater(len(poses), NUM_FRAMES // 2)
+        self.assertEqual({len(pose) for pose in poses}, {4})
 
 
 class BadOutput(CliTest):

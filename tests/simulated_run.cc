@@ -28,7 +28,7 @@ CameraChain small_chain(Setup setup) {
   if (setup == Setup::kMono) return mono_chain(small_camera());
   if (setup == Setup::kRgbd) return rgbd_chain(small_camera(), kDepthFactor);
   Vector6d cam1_from_cam0;
-  cam1_from_cam0 << -0.11, 0.003, -0.002, 0.01, -0.012, 0.006;
+  cam1_from_cam0 << -0.2, 0.003, -0.002, 0.01, -0.012, 0.006;
   return stereo_chain(small_camera(), small_camera(), Rigid3::exp(cam1_from_cam0));
 }
 
