@@ -9,14 +9,17 @@ namespace waymark {
 using Vector7d = Eigen::Matrix<double, 7, 1>;
 
 /// Similarity b_from_a: point_in_b = scale * (rotation * point_in_a) + translation. Tangent vectors
-/// are (rho, phi, sigma), sigma = log of the scale; perturbations on the left (Strasdat 2012; Eade).
+/// are (rho, phi, sigma), sigma = log of the scale; perturbations on the left (Strasdat 2012;
+/// Eade).
 struct Sim3 {
   Eigen::Quaterniond rotation = Eigen::Quaterniond::Identity();
   Eigen::Vector3d translation = Eigen::Vector3d::Zero();
   double scale = 1.0;
 
   Sim3() = default;
-  Sim3(const Eigen::Quaterniond& rotation_in, const Eigen::Vector3d& translation_in, double scale_in)
+  Sim3(const Eigen::Quaterniond& rotation_in,
+       const Eigen::Vector3d& translation_in,
+       double scale_in)
       : rotation(rotation_in), translation(translation_in), scale(scale_in) {}
   explicit Sim3(const Rigid3& rigid) : rotation(rigid.rotation), translation(rigid.translation) {}
 

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "waymark/image/fast.h"
+#include "waymark/image/corner.h"
 #include "waymark/image/features.h"
 #include "waymark/image/padded_image.h"
 

@@ -11,6 +11,7 @@
 #include <opencv2/features2d.hpp>
 
 #include "waymark/image/brief_pattern.h"
+#include "waymark/image/corners.h"
 #include "waymark/image/gaussian.h"
 #include "waymark/image/hamming.h"
 #include "waymark/image/image_testing.h"
@@ -35,10 +36,10 @@ cv::Ptr<cv::ORB> make_one_level_orb() {
 }
 
 std::vector<Corner> corners_within(const PaddedImage& image) {
-  PaddedImage scores;
-  fast_scores(image, kBriefRadius, 15, scores);
+  CornerWorkspace workspace;
   std::vector<Corner> buffer;
-  const auto corners = find_corners(scores, kBriefRadius, 15, buffer);
+  const CornerRequest request{.border_px = kBriefRadius, .min_contrast = 15, .density = 1.0};
+  const auto corners = find_corners(image, request, workspace, buffer);
   return {corners.begin(), corners.end()};
 }
 

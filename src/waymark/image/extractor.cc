@@ -5,10 +5,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <span>
 
 #include "waymark/base/check.h"
 #include "waymark/image/brief.h"
+#include "waymark/image/corners.h"
 #include "waymark/image/fast.h"
 #include "waymark/image/gaussian.h"
 #include "waymark/image/orientation.h"
@@ -25,8 +27,7 @@ constexpr int kBorderPx = kBriefRadius;
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
 
-struct Level {
-  PaddedImage scores;
+struct Candidates {
   std::vector<Corner> buffer;
   std::span<Corner> corners;
 };
@@ -51,8 +52,14 @@ void check_input(ImageView image, ImageView mask) {
   }
 }
 
-bool is_large_enough(const PaddedImage& image) {
-  return std::min(image.width_px(), image.height_px()) > 2 * kBorderPx;
+// What a level must give per pixel if corners were the same everywhere.
+double needed_density(const PaddedImage& image, int level, int count) {
+  LevelCounts plenty;
+  plenty.fill(count);
+  const int share = share_among_levels(count, plenty)[static_cast<std::size_t>(level)];
+  const double area = static_cast<double>(std::max(image.width_px() - 2 * kBorderPx, 1)) *
+                      std::max(image.height_px() - 2 * kBorderPx, 1);
+  return share / area;
 }
 
 // The corners of a level that the mask lets through.
@@ -71,15 +78,17 @@ std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corner
 
 struct FeatureExtractor::Workspace {
   Pyramid pyramid;
-  std::array<Level, Pyramid::kNumLevels> levels;
-  PaddedImage smooth;
-  BlurWorkspace blur;
+  CornerWorkspace corner;
+  std::array<Candidates, Pyramid::kNumLevels> candidates;
   SpreadSelector selector;
   std::vector<Corner> selected;
+  std::vector<ScorePatch> score_patches;
   std::vector<float> angles_rad;
+  PaddedImage smooth;
+  BlurWorkspace blur;
 
   void reserve(int width_px, int height_px, int count);
-  void detect(int level, ImageView mask, int min_contrast);
+  LevelCounts detect(ImageView mask, const FeatureSettings& settings);
   void choose(int level, int count);
   void append(int level, std::vector<Keypoint>& keypoints, std::vector<Descriptor>& descriptors);
 };
@@ -89,22 +98,30 @@ void FeatureExtractor::Workspace::reserve(int width_px, int height_px, int count
   blur.reserve(width_px);
   selector.reserve(width_px, height_px, count);
   selected.reserve(static_cast<std::size_t>(count));
+  score_patches.reserve(static_cast<std::size_t>(count));
   angles_rad.reserve(static_cast<std::size_t>(count));
 }
 
-void FeatureExtractor::Workspace::detect(int level, ImageView mask, int min_contrast) {
-  const PaddedImage& image = pyramid.image(level);
-  Level& its = levels[static_cast<std::size_t>(level)];
-  its.corners = {};
-  if (!is_large_enough(image)) return;
-  fast_scores(image, kBorderPx - 1, min_contrast, its.scores);
-  its.corners = find_corners(its.scores, kBorderPx - 1, min_contrast, its.buffer);
-  if (!mask.is_empty()) its.corners = apply_mask(mask, level, its.corners);
+// Fills the candidates of all levels; returns how many there are.
+LevelCounts FeatureExtractor::Workspace::detect(ImageView mask, const FeatureSettings& settings) {
+  LevelCounts available{};
+  for (int level = 0; level < Pyramid::kNumLevels; ++level) {
+    const auto i = static_cast<std::size_t>(level);
+    const PaddedImage& image = pyramid.image(level);
+    const CornerRequest request{.border_px = kBorderPx,
+                                .min_contrast = settings.min_contrast,
+                                .density = needed_density(image, level, settings.count)};
+    auto& corners = candidates[i].corners;
+    corners = find_corners(image, request, corner, candidates[i].buffer);
+    if (!mask.is_empty()) corners = apply_mask(mask, level, corners);
+    available[i] = static_cast<int>(corners.size());
+  }
+  return available;
 }
 
 void FeatureExtractor::Workspace::choose(int level, int count) {
   const PaddedImage& image = pyramid.image(level);
-  selector.select(levels[static_cast<std::size_t>(level)].corners,
+  selector.select(candidates[static_cast<std::size_t>(level)].corners,
                   image.width_px(),
                   image.height_px(),
                   count,
@@ -115,23 +132,24 @@ void FeatureExtractor::Workspace::append(int level,
                                          std::vector<Keypoint>& keypoints,
                                          std::vector<Descriptor>& descriptors) {
   const PaddedImage& image = pyramid.image(level);
-  const Level& its = levels[static_cast<std::size_t>(level)];
+  score_patches.resize(selected.size());
+  fast_score_patches(image, selected, score_patches);
   angles_rad.resize(selected.size());
   orient(image, selected, angles_rad);
   gaussian_blur(image, blur, smooth);
   const std::size_t num_before = descriptors.size();
   descriptors.resize(num_before + selected.size());
   describe(smooth, selected, angles_rad, std::span(descriptors).subspan(num_before));
+  const auto level0 = [&](double coordinate_px) {
+    return static_cast<float>(Pyramid::level0_from_level(coordinate_px, level));
+  };
   for (std::size_t i = 0; i < selected.size(); ++i) {
-    const Corner& corner = selected[i];
-    const SubpixelOffset offset = locate_peak(its.scores, corner);
+    const SubpixelOffset offset = locate_peak(score_patches[i]);
     Keypoint keypoint;
-    keypoint.x_px =
-        static_cast<float>(Pyramid::level0_from_level(corner.x_px + offset.x_px, level));
-    keypoint.y_px =
-        static_cast<float>(Pyramid::level0_from_level(corner.y_px + offset.y_px, level));
+    keypoint.x_px = level0(selected[i].x_px + offset.x_px);
+    keypoint.y_px = level0(selected[i].y_px + offset.y_px);
     keypoint.angle_rad = angles_rad[i];
-    keypoint.response = corner.score;
+    keypoint.response = selected[i].score;
     keypoint.level = static_cast<std::uint8_t>(level);
     keypoints.push_back(keypoint);
   }
@@ -156,12 +174,7 @@ void FeatureExtractor::extract(ImageView image,
   descriptors.reserve(static_cast<std::size_t>(settings_.count));
   workspace_->reserve(image.width_px, image.height_px, settings_.count);
   workspace_->pyramid.build(image);
-  LevelCounts available{};
-  for (int level = 0; level < Pyramid::kNumLevels; ++level) {
-    workspace_->detect(level, mask, settings_.min_contrast);
-    const auto i = static_cast<std::size_t>(level);
-    available[i] = static_cast<int>(workspace_->levels[i].corners.size());
-  }
+  const LevelCounts available = workspace_->detect(mask, settings_);
   const LevelCounts counts = share_among_levels(settings_.count, available);
   for (int level = 0; level < Pyramid::kNumLevels; ++level) {
     const int count = counts[static_cast<std::size_t>(level)];

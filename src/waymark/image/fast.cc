@@ -4,8 +4,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
-#include <cstring>
 
 #include "waymark/base/check.h"
 
@@ -54,120 +52,120 @@ namespace HWY_NAMESPACE {
 namespace {
 
 namespace hn = hwy::HWY_NAMESPACE;
-using Tag = hn::CappedTag<std::uint8_t, PaddedImage::kPadding>;
-using Pixels = hn::Vec<Tag>;
 
 struct Lower {
-  static HWY_INLINE Pixels of(Pixels a, Pixels b) { return hn::Min(a, b); }
+  template <class V>
+  static HWY_INLINE V of(V a, V b) {
+    return hn::Min(a, b);
+  }
 };
 struct Higher {
-  static HWY_INLINE Pixels of(Pixels a, Pixels b) { return hn::Max(a, b); }
+  template <class V>
+  static HWY_INLINE V of(V a, V b) {
+    return hn::Max(a, b);
+  }
 };
 
 // For Worst = Lower, Best = Higher: the best over all arcs of 9 of the lowest pixel in the arc.
 // Two arcs that share 8 pixels are done at once: they differ by the one at either end.
-template <class Worst, class Best>
-HWY_INLINE Pixels best_arc(const Pixels (&ring)[kRingSize]) {
-  const auto at = [&](int i) HWY_ATTR { return ring[i % kRingSize]; };
-  Pixels two[kRingSize / 2];
-  for (int i = 0; i < 8; ++i) two[i] = Worst::of(at(2 * i + 1), at(2 * i + 2));
-  Pixels four[kRingSize / 2];
+template <class Worst, class Best, class V>
+HWY_INLINE V best_arc(const V (&ring)[kRingSize]) {
+  V two[kRingSize / 2];
+  for (int i = 0; i < 8; ++i) two[i] = Worst::of(ring[2 * i + 1], ring[(2 * i + 2) % kRingSize]);
+  V four[kRingSize / 2];
   for (int i = 0; i < 8; ++i) four[i] = Worst::of(two[i], two[(i + 1) % 8]);
-  Pixels best = hn::Undefined(Tag());
+  V best = ring[0];
   for (int i = 0; i < 8; ++i) {
-    const Pixels eight = Worst::of(four[i], four[(i + 2) % 8]);
-    const Pixels nine = Worst::of(eight, Best::of(at(2 * i), at(2 * i + 9)));
+    const V eight = Worst::of(four[i], four[(i + 2) % 8]);
+    const V nine = Worst::of(eight, Best::of(ring[2 * i], ring[(2 * i + 9) % kRingSize]));
     best = i == 0 ? nine : Best::of(best, nine);
   }
   return best;
 }
 
-// Any arc of 9 holds two neighbours of the four compass points, which tells most pixels apart.
-HWY_INLINE bool may_hold_corner(
-    Pixels centre, Pixels north, Pixels east, Pixels south, Pixels west, Pixels min_contrast) {
-  const Pixels high = hn::Min(hn::Max(north, south), hn::Max(east, west));
-  const Pixels low = hn::Max(hn::Min(north, south), hn::Min(east, west));
-  const Pixels contrast = hn::Max(hn::SaturatedSub(high, centre), hn::SaturatedSub(centre, low));
-  return !hn::AllTrue(Tag(), hn::Eq(hn::Max(contrast, min_contrast), min_contrast));
+template <class V>
+HWY_INLINE V brighter_score(const V (&ring)[kRingSize], V centre) {
+  return hn::SaturatedSub(best_arc<Lower, Higher>(ring), centre);
 }
 
-void score_row(const std::uint8_t* HWY_RESTRICT row,
-               std::ptrdiff_t stride,
-               int begin,
-               int end,
-               int min_contrast,
-               std::uint8_t* HWY_RESTRICT scores) {
-  const Tag d;
-  const Pixels threshold = hn::Set(d, static_cast<std::uint8_t>(min_contrast));
-  for (int x = begin; x < end; x += static_cast<int>(hn::Lanes(d))) {
+template <class V>
+HWY_INLINE V darker_score(const V (&ring)[kRingSize], V centre) {
+  return hn::SaturatedSub(centre, best_arc<Higher, Lower>(ring));
+}
+
+template <class V>
+HWY_INLINE bool is_any_above(V values, V threshold) {
+  return !hn::AllTrue(hn::DFromV<V>(), hn::Eq(hn::Max(values, threshold), threshold));
+}
+
+// Any arc of 9 holds two neighbours of the four compass points, which rules out many pixels, for
+// one side or both.
+HWY_INLINE void score_row(const std::uint8_t* HWY_RESTRICT row,
+                          std::ptrdiff_t stride,
+                          int width,
+                          int min_contrast,
+                          std::uint8_t* HWY_RESTRICT scores) {
+  const hn::CappedTag<std::uint8_t, PaddedImage::kPadding> d;
+  const auto threshold = hn::Set(d, static_cast<std::uint8_t>(min_contrast));
+  for (int x = 0; x < width; x += static_cast<int>(hn::Lanes(d))) {
     const auto load = [&](int i) HWY_ATTR {
       return hn::LoadU(d, row + x + kRing[i].y * stride + kRing[i].x);
     };
-    const Pixels centre = hn::LoadU(d, row + x);
-    if (!may_hold_corner(centre, load(8), load(4), load(0), load(12), threshold)) {
-      hn::StoreU(hn::Zero(d), d, scores + x);
-      continue;
+    const auto centre = hn::LoadU(d, row + x);
+    const auto north = load(8);
+    const auto south = load(0);
+    const auto east = load(4);
+    const auto west = load(12);
+    const auto high = hn::Min(hn::Max(north, south), hn::Max(east, west));
+    const auto low = hn::Max(hn::Min(north, south), hn::Min(east, west));
+    const bool may_be_brighter = is_any_above(hn::SaturatedSub(high, centre), threshold);
+    const bool may_be_darker = is_any_above(hn::SaturatedSub(centre, low), threshold);
+    auto score = hn::Zero(d);
+    if (may_be_brighter || may_be_darker) {
+      hn::Vec<decltype(d)> ring[kRingSize];
+      for (int i = 0; i < kRingSize; ++i) ring[i] = load(i);
+      if (may_be_brighter) score = brighter_score(ring, centre);
+      if (may_be_darker) score = hn::Max(score, darker_score(ring, centre));
+      score = hn::IfThenZeroElse(hn::Eq(hn::Max(score, threshold), threshold), score);
     }
-    Pixels ring[kRingSize];
-    for (int i = 0; i < kRingSize; ++i) ring[i] = load(i);
-    const Pixels brighter = hn::SaturatedSub(best_arc<Lower, Higher>(ring), centre);
-    const Pixels darker = hn::SaturatedSub(centre, best_arc<Higher, Lower>(ring));
-    const Pixels score = hn::Max(brighter, darker);
-    hn::StoreU(
-        hn::IfThenZeroElse(hn::Eq(hn::Max(score, threshold), threshold), score), d, scores + x);
+    hn::StoreU(score, d, scores + x);
   }
 }
 
-void score_rows(const PaddedImage& image, int margin, int min_contrast, PaddedImage& scores) {
-  for (int y = margin; y < image.height_px() - margin; ++y) {
-    score_row(image.row(y),
+void score_window(const PaddedImage& image,
+                  const Window& window,
+                  int min_contrast,
+                  PaddedImage& scores) {
+  for (int y = 0; y < window.height_px; ++y) {
+    score_row(image.row(window.y_px + y) + window.x_px,
               image.stride(),
-              margin,
-              image.width_px() - margin,
+              window.width_px,
               min_contrast,
               scores.row(y));
   }
 }
 
-// One bit for each lane that is a maximum.
-HWY_INLINE std::uint64_t maxima(const std::uint8_t* HWY_RESTRICT row,
-                                std::ptrdiff_t stride,
-                                Pixels min_contrast) {
-  const Tag d;
-  const auto load = [&](std::ptrdiff_t offset) HWY_ATTR { return hn::LoadU(d, row + offset); };
-  const Pixels before =
-      hn::Max(hn::Max(load(-stride - 1), load(-stride)), hn::Max(load(-stride + 1), load(-1)));
-  const Pixels after =
-      hn::Max(hn::Max(load(stride - 1), load(stride)), hn::Max(load(stride + 1), load(1)));
-  // At least as large as those before: larger than one less.
-  const Pixels below = hn::SaturatedSub(before, hn::Set(d, std::uint8_t{1}));
-  const Pixels rest = hn::Max(hn::Max(below, after), min_contrast);
-  const auto is_maximum = hn::Ne(hn::Max(load(0), rest), rest);
-  alignas(8) std::uint8_t bytes[8] = {};
-  hn::StoreMaskBits(d, is_maximum, bytes);
-  std::uint64_t bits;
-  std::memcpy(&bits, bytes, sizeof(bits));
-  return bits;
-}
-
-std::size_t find_maxima(const PaddedImage& scores, int margin, int min_contrast, Corner* corners) {
-  const Tag d;
+void score_patches(const PaddedImage& image,
+                   std::span<const Corner> corners,
+                   ScorePatch* HWY_RESTRICT patches) {
+  const hn::CappedTag<std::uint8_t, 16> d;
+  HWY_ALIGN std::uint8_t row_scores[16];
   const int lanes = static_cast<int>(hn::Lanes(d));
-  const Pixels threshold = hn::Set(d, static_cast<std::uint8_t>(min_contrast));
-  const int end = scores.width_px() - margin - 1;
-  Corner* next = corners;
-  for (int y = margin + 1; y < scores.height_px() - margin - 1; ++y) {
-    const std::uint8_t* const row = scores.row(y);
-    for (int x = margin + 1; x < end; x += lanes) {
-      std::uint64_t bits = maxima(row + x, scores.stride(), threshold);
-      if (end - x < 64) bits &= (std::uint64_t{1} << (end - x)) - 1;
-      for (; bits != 0; bits &= bits - 1) {
-        const int column = x + std::countr_zero(bits);
-        *next++ = {static_cast<std::uint16_t>(column), static_cast<std::uint16_t>(y), row[column]};
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (int y = 0; y < 3; ++y) {
+      const std::uint8_t* const row = image.row(corners[i].y_px + y - 1) + corners[i].x_px - 1;
+      for (int x = 0; x < 3; x += lanes) {
+        hn::Vec<decltype(d)> ring[kRingSize];
+        for (int k = 0; k < kRingSize; ++k) {
+          ring[k] = hn::LoadU(d, row + x + kRing[k].y * image.stride() + kRing[k].x);
+        }
+        const auto centre = hn::LoadU(d, row + x);
+        const auto score = hn::Max(brighter_score(ring, centre), darker_score(ring, centre));
+        hn::StoreU(score, d, row_scores + x);
       }
+      std::copy_n(row_scores, 3, patches[i].data() + 3 * y);
     }
   }
-  return static_cast<std::size_t>(next - corners);
 }
 
 }  // namespace
@@ -178,13 +176,27 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace waymark {
 
-HWY_EXPORT(score_rows);
-HWY_EXPORT(find_maxima);
+HWY_EXPORT(score_window);
+HWY_EXPORT(score_patches);
 
-void fast_scores(const PaddedImage& image, int margin_px, int min_contrast, PaddedImage& scores) {
-  WAYMARK_CHECK(margin_px >= kFastRadius && min_contrast >= 0 && min_contrast < 255);
-  scores.resize(image.width_px(), image.height_px());
-  HWY_DYNAMIC_DISPATCH(score_rows)(image, margin_px, min_contrast, scores);
+void fast_scores(const PaddedImage& image,
+                 const Window& window,
+                 int min_contrast,
+                 PaddedImage& scores) {
+  WAYMARK_CHECK(min_contrast >= 0 && min_contrast < 255);
+  WAYMARK_CHECK(window.x_px >= kFastRadius &&
+                window.x_px + window.width_px <= image.width_px() - kFastRadius);
+  WAYMARK_CHECK(window.y_px >= kFastRadius &&
+                window.y_px + window.height_px <= image.height_px() - kFastRadius);
+  scores.resize(window.width_px, window.height_px);
+  HWY_DYNAMIC_DISPATCH(score_window)(image, window, min_contrast, scores);
+}
+
+void fast_score_patches(const PaddedImage& image,
+                        std::span<const Corner> corners,
+                        std::span<ScorePatch> patches) {
+  WAYMARK_CHECK(patches.size() == corners.size());
+  HWY_DYNAMIC_DISPATCH(score_patches)(image, corners, patches.data());
 }
 
 int fast_score_reference(ImageView image, int x, int y) {
@@ -202,17 +214,6 @@ int fast_score_reference(ImageView image, int x, int y) {
     score = std::max({score, brighter, darker});
   }
   return score;
-}
-
-std::span<Corner> find_corners(const PaddedImage& scores,
-                               int margin_px,
-                               int min_contrast,
-                               std::vector<Corner>& buffer) {
-  const std::size_t most = max_num_corners(scores.width_px(), scores.height_px());
-  if (buffer.size() < most) buffer.resize(most);
-  const std::size_t count =
-      HWY_DYNAMIC_DISPATCH(find_maxima)(scores, margin_px, min_contrast, buffer.data());
-  return {buffer.data(), count};
 }
 
 }  // namespace waymark

@@ -21,7 +21,8 @@ class PaddedImage {
     width_px_ = width_px;
     height_px_ = height_px;
     stride_ = (width_px + 2 * kPadding - 1) / kPadding * kPadding;
-    values_.resize(static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px));
+    const auto size = static_cast<std::size_t>(stride_) * static_cast<std::size_t>(height_px);
+    if (values_.size() < size) values_.resize(size);
   }
 
   int width_px() const { return width_px_; }

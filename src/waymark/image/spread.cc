@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstring>
 
+#include "waymark/image/corners.h"
+
 namespace waymark {
 namespace {
 
@@ -153,12 +155,12 @@ void SpreadSelector::select(std::span<const Corner> corners,
   if (wanted == 0) return;
   if (corners.size() <= wanted) {
     selected.assign(corners.begin(), corners.end());
-    return;
+  } else {
+    sort_by_score(corners);
+    search(width_px, height_px, wanted);
+    adjust(wanted);
+    for (std::uint32_t i : best_) selected.push_back(sorted_[i]);
   }
-  sort_by_score(corners);
-  search(width_px, height_px, wanted);
-  adjust(wanted);
-  for (std::uint32_t i : best_) selected.push_back(sorted_[i]);
   std::sort(selected.begin(), selected.end(), [](const Corner& a, const Corner& b) {
     return a.y_px != b.y_px ? a.y_px < b.y_px : a.x_px < b.x_px;
   });

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/image/fast.h"
+#include "waymark/image/corner.h"
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
@@ -44,7 +44,7 @@ class SpreadSelector {
   void adjust(std::size_t count);
 
   std::size_t num_sorted_ = 0;
-  std::vector<Corner> sorted_;         ///< Descending score, then raster order.
+  std::vector<Corner> sorted_;         ///< Descending score, then in the order given.
   std::vector<std::uint32_t> taken_;   ///< Indices in sorted_, ascending, by the last suppress().
   std::vector<std::uint32_t> best_;    ///< By the widest suppress() that left enough.
   std::vector<std::uint8_t> covered_;  ///< Cells of half the size of a square.

@@ -3,7 +3,6 @@
 #pragma once
 
 #include "waymark/image/fast.h"
-#include "waymark/image/padded_image.h"
 
 namespace waymark {
 
@@ -13,8 +12,8 @@ struct SubpixelOffset {
   float y_px = 0.0f;
 };
 
-/// Where the corner score peaks: top of the parabolas through the score of the corner and of its
-/// neighbours in the row and in the column.
-SubpixelOffset locate_peak(const PaddedImage& scores, const Corner& corner);
+/// Where the FAST score peaks: top of the paraboloid (six coefficients) that fits the scores of a
+/// corner and of its 8 neighbours best in the sense of least squares.
+SubpixelOffset locate_peak(const ScorePatch& scores);
 
 }  // namespace waymark

@@ -1,0 +1,295 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/geometry/two_view.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+#include "waymark/base/check.h"
+#include "waymark/geometry/essential.h"
+#include "waymark/geometry/homography.h"
+#include "waymark/geometry/ransac.h"
+#include "waymark/geometry/relative_pose.h"
+#include "waymark/geometry/triangulation.h"
+#include "waymark/geometry/two_view_models.h"
+
+namespace waymark {
+namespace {
+
+using Fit = std::optional<RansacResult<Eigen::Matrix3d>>;
+
+// The cost of a match that contradicts a motion, in squared standard deviations.
+constexpr double kOutlierCost = EssentialEstimator::kMaxSquaredError;
+// With less support than this share of the matches, agreement may be chance.
+constexpr double kMinInlierRatio = 0.3;
+// Parallax in standard deviations from which a point counts as behind, and as a point at all.
+constexpr double kBehindSigmas = 3.0;
+constexpr double kPointSigmas = 4.0;
+// Poses closer than this are one solution.
+constexpr double kSameRotation_rad = 0.02;
+constexpr double kSameDirection_rad = 0.1;
+// A rival is rejected if it is less likely by a factor of exp(10 / 2) and, since a few wrong
+// matches can do that by chance, by three standard deviations of the difference.
+constexpr double kMinCostGap = 10.0;
+constexpr double kMinVuongSigmas = 3.0;
+
+double parallax_sigma_rad(const BearingMatches& matches, std::size_t index) {
+  return std::hypot(matches.sigmas_rad_a[index], matches.sigmas_rad_b[index]);
+}
+
+// --- Which model: GRIC (Torr 1998, Geometric Motion Segmentation and Model Selection) ---
+
+struct ModelSize {
+  int dimension;       // of the surface of all matches that fit, of 4 for any pair of directions
+  int num_parameters;  // of the model
+};
+
+// Sum over the matches of squared error + dimension * log 4, plus log(4 n) per parameter. A match
+// costs no more than an outlier, which is the same for each model (here, that of the essential
+// matrix at its threshold): otherwise outliers would vote for the model that calls more of them so.
+template <class Estimator>
+double gric(const Estimator& estimator, const Fit& fit, ModelSize size) {
+  if (!fit) return std::numeric_limits<double>::infinity();
+  const double per_dimension = std::log(4.0);
+  const double outlier_cost = kOutlierCost + 3.0 * per_dimension;
+  const double num_matches = static_cast<double>(estimator.num_data());
+  double sum = size.num_parameters * std::log(4.0 * num_matches);
+  for (std::size_t i = 0; i < estimator.num_data(); ++i) {
+    const double cost = estimator.squared_error(fit->model, i) + size.dimension * per_dimension;
+    sum += cost < outlier_cost ? cost : outlier_cost;
+  }
+  return sum;
+}
+
+struct Fits {
+  Fit essential, homography, rotation;
+  TwoViewModel best = TwoViewModel::kScene;
+  std::size_t num_inliers = 0;  // of the best
+};
+
+Fits fit_models(const BearingMatches& matches, const TwoViewOptions& options) {
+  const EssentialEstimator essential(matches);
+  const HomographyEstimator homography(matches);
+  const RotationEstimator rotation(matches);
+  const RansacOptions ransac_options{
+      .seed = options.seed, .stream = options.stream, .min_inlier_ratio = kMinInlierRatio};
+  Fits fits;
+  fits.essential = ransac(essential, ransac_options);
+  fits.homography = ransac(homography, ransac_options);
+  fits.rotation = ransac(rotation, ransac_options);
+
+  const double scene_cost = gric(essential, fits.essential, {3, 5});
+  const double plane_cost = gric(homography, fits.homography, {2, 8});
+  const double rotation_cost = gric(rotation, fits.rotation, {2, 3});
+  const Fit* best = &fits.essential;
+  if (plane_cost < scene_cost) {
+    fits.best = TwoViewModel::kPlane;
+    best = &fits.homography;
+  }
+  if (rotation_cost < std::min(scene_cost, plane_cost)) {
+    fits.best = TwoViewModel::kRotation;
+    best = &fits.rotation;
+  }
+  if (*best) fits.num_inliers = (*best)->inliers.size();
+  return fits;
+}
+
+// --- Which motion ---
+
+struct Candidate {
+  Rigid3 b_from_a;
+  std::vector<double> match_costs;  // at most kOutlierCost each
+  double cost = 0.0;
+};
+
+bool is_behind(const BearingMatches& matches, std::size_t index, const Rigid3& a_from_b) {
+  const Eigen::Vector3d& a = matches.bearings_a[index];
+  const Eigen::Vector3d& b = matches.bearings_b[index];
+  const double threshold = kBehindSigmas * parallax_sigma_rad(matches, index);
+  return a.cross(a_from_b.rotation * b).norm() > threshold && !triangulate(a, b, a_from_b, 0.0);
+}
+
+Candidate make_candidate(const Rigid3& b_from_a, const BearingMatches& matches) {
+  Candidate candidate{b_from_a, {}, 0.0};
+  candidate.match_costs.resize(matches.size());
+  const Eigen::Matrix3d essential = essential_from_pose(b_from_a);
+  const Rigid3 a_from_b = b_from_a.inverse();
+  for (std::size_t i = 0; i < matches.size(); ++i) {
+    const double squared_error = squared_epipolar_error(essential, matches, i);
+    const bool is_consistent = squared_error < kOutlierCost && !is_behind(matches, i, a_from_b);
+    candidate.match_costs[i] = is_consistent ? squared_error : kOutlierCost;
+    candidate.cost += candidate.match_costs[i];
+  }
+  return candidate;
+}
+
+Rigid3 refine(const Rigid3& b_from_a, const BearingMatches& matches) {
+  std::vector<std::uint32_t> all(matches.size());
+  std::iota(all.begin(), all.end(), 0u);
+  const Rigid3 start(b_from_a.rotation, b_from_a.translation.normalized());
+  return refine_relative_pose(start, matches, all, {.max_iterations = 15});
+}
+
+// Of the motions past a plane, those that have most of its points on the visible side.
+std::vector<Rigid3> visible_motions(const RansacResult<Eigen::Matrix3d>& homography,
+                                    const BearingMatches& matches) {
+  std::vector<Rigid3> motions;
+  for (const PlanarMotion& motion : decompose_homography(homography.model)) {
+    if (!(motion.b_from_a.translation.norm() > 0.0)) continue;
+    const auto num_visible = std::count_if(
+        homography.inliers.begin(), homography.inliers.end(), [&](std::uint32_t index) {
+          return motion.normal_in_a.dot(matches.bearings_a[index]) > 0.0;
+        });
+    if (2 * static_cast<std::size_t>(num_visible) > homography.inliers.size()) {
+      motions.push_back(motion.b_from_a);
+    }
+  }
+  return motions;
+}
+
+// The motions that the matches allow, best first.
+std::vector<Candidate> find_candidates(const Fits& fits, const BearingMatches& matches) {
+  std::vector<Candidate> candidates;
+  if (fits.essential) {
+    const Rigid3 refined = refine(decompose_essential(fits.essential->model).front(), matches);
+    for (const Rigid3& b_from_a : decompose_essential(essential_from_pose(refined))) {
+      candidates.push_back(make_candidate(b_from_a, matches));
+    }
+  }
+  if (fits.homography) {
+    for (const Rigid3& motion : visible_motions(*fits.homography, matches)) {
+      candidates.push_back(make_candidate(refine(motion, matches), matches));
+    }
+  }
+  std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
+    return a.cost < b.cost;
+  });
+  return candidates;
+}
+
+bool is_same(const Rigid3& first, const Rigid3& second) {
+  return first.rotation.angularDistance(second.rotation) < kSameRotation_rad &&
+         angle_between(first.translation, second.translation) < kSameDirection_rad;
+}
+
+// Whether the matches prefer a candidate to its rival beyond chance: Vuong 1989 (Likelihood Ratio
+// Tests for Model Selection and Non-nested Hypotheses), costs being -2 log likelihoods.
+bool is_significantly_better(const Candidate& candidate, const Candidate& rival) {
+  double sum = 0.0;
+  double sum_of_squares = 0.0;
+  for (std::size_t i = 0; i < candidate.match_costs.size(); ++i) {
+    const double difference = rival.match_costs[i] - candidate.match_costs[i];
+    sum += difference;
+    sum_of_squares += difference * difference;
+  }
+  return sum > kMinCostGap && sum > kMinVuongSigmas * std::sqrt(sum_of_squares);
+}
+
+bool is_ambiguous(const std::vector<Candidate>& candidates) {
+  const Candidate& best = candidates.front();
+  return std::any_of(candidates.begin() + 1, candidates.end(), [&](const Candidate& rival) {
+    return !is_same(best.b_from_a, rival.b_from_a) && !is_significantly_better(best, rival);
+  });
+}
+
+// --- The points ---
+
+TwoViewGeometry make_geometry(const Candidate& candidate,
+                              TwoViewModel model,
+                              const BearingMatches& matches) {
+  const std::size_t num_matches = matches.size();
+  TwoViewGeometry geometry;
+  geometry.b_from_a = candidate.b_from_a;
+  geometry.model = model;
+  geometry.is_inlier.resize(num_matches, 0);
+  geometry.has_point.resize(num_matches, 0);
+  geometry.points_in_a.resize(num_matches, Eigen::Vector3d::Zero());
+  geometry.parallaxes_rad.resize(num_matches, 0.0);
+  const Rigid3 a_from_b = candidate.b_from_a.inverse();
+  std::vector<double> inlier_parallaxes;
+  for (std::size_t i = 0; i < num_matches; ++i) {
+    if (!(candidate.match_costs[i] < kOutlierCost)) continue;
+    const Eigen::Vector3d& a = matches.bearings_a[i];
+    const Eigen::Vector3d& b = matches.bearings_b[i];
+    geometry.is_inlier[i] = 1;
+    geometry.parallaxes_rad[i] = parallax_angle(a, b, a_from_b);
+    inlier_parallaxes.push_back(geometry.parallaxes_rad[i]);
+    const auto point = triangulate(a, b, a_from_b, kPointSigmas * parallax_sigma_rad(matches, i));
+    if (!point) continue;
+    geometry.has_point[i] = 1;
+    geometry.points_in_a[i] = *point;
+  }
+  if (!inlier_parallaxes.empty()) {
+    const auto middle = inlier_parallaxes.begin() + inlier_parallaxes.size() / 2;
+    std::nth_element(inlier_parallaxes.begin(), middle, inlier_parallaxes.end());
+    geometry.median_parallax_rad = *middle;
+  }
+  return geometry;
+}
+
+int count_near_points(const TwoViewGeometry& geometry, double min_parallax_rad) {
+  int count = 0;
+  for (std::size_t i = 0; i < geometry.has_point.size(); ++i) {
+    count += geometry.has_point[i] && geometry.parallaxes_rad[i] >= min_parallax_rad;
+  }
+  return count;
+}
+
+bool has_support(std::size_t num_inliers, std::size_t num_matches, const TwoViewOptions& options) {
+  const double enough =
+      std::max<double>(options.min_num_points, kMinInlierRatio * static_cast<double>(num_matches));
+  return static_cast<double>(num_inliers) >= enough;
+}
+
+}  // namespace
+
+std::string_view to_string(TwoViewStatus status) {
+  switch (status) {
+    case TwoViewStatus::kOk:
+      return "ok";
+    case TwoViewStatus::kTooFewMatches:
+      return "too few matches";
+    case TwoViewStatus::kTooFewInliers:
+      return "too few inliers";
+    case TwoViewStatus::kTooLittleParallax:
+      return "too little parallax";
+    case TwoViewStatus::kAmbiguous:
+      return "ambiguous";
+  }
+  return "unknown";
+}
+
+TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOptions& options) {
+  const std::size_t num_matches = matches.size();
+  WAYMARK_CHECK(matches.bearings_b.size() == num_matches);
+  WAYMARK_CHECK(matches.sigmas_rad_a.size() == num_matches);
+  WAYMARK_CHECK(matches.sigmas_rad_b.size() == num_matches);
+  if (num_matches < static_cast<std::size_t>(std::max(options.min_num_points, 5))) {
+    return {TwoViewStatus::kTooFewMatches, std::nullopt};
+  }
+  const Fits fits = fit_models(matches, options);
+  if (!has_support(fits.num_inliers, num_matches, options)) {
+    return {TwoViewStatus::kTooFewInliers, std::nullopt};
+  }
+  if (fits.best == TwoViewModel::kRotation) {
+    return {TwoViewStatus::kTooLittleParallax, std::nullopt};
+  }
+  const std::vector<Candidate> candidates = find_candidates(fits, matches);
+  if (candidates.empty()) return {TwoViewStatus::kTooLittleParallax, std::nullopt};
+
+  TwoViewGeometry geometry = make_geometry(candidates.front(), fits.best, matches);
+  const auto num_inliers = static_cast<std::size_t>(
+      std::count(geometry.is_inlier.begin(), geometry.is_inlier.end(), std::uint8_t{1}));
+  if (!has_support(num_inliers, num_matches, options)) {
+    return {TwoViewStatus::kTooFewInliers, std::nullopt};
+  }
+  if (count_near_points(geometry, options.min_parallax_rad) < options.min_num_points) {
+    return {TwoViewStatus::kTooLittleParallax, std::nullopt};
+  }
+  if (is_ambiguous(candidates)) return {TwoViewStatus::kAmbiguous, std::nullopt};
+  return {TwoViewStatus::kOk, std::move(geometry)};
+}
+
+}  // namespace waymark
