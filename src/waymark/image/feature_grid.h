@@ -45,11 +45,8 @@ class FeatureGrid {
 };
 
 template <class PixelOf>
-FeatureGrid::FeatureGrid(int width_px,
-                         int height_px,
-                         double wrap_width_px,
-                         std::size_t count,
-                         PixelOf pixel)
+FeatureGrid::FeatureGrid(
+    int width_px, int height_px, double wrap_width_px, std::size_t count, PixelOf pixel)
     : columns_((width_px + kCellPx - 1) / kCellPx),
       rows_((height_px + kCellPx - 1) / kCellPx),
       wrap_width_px_(wrap_width_px),
@@ -69,8 +66,7 @@ FeatureGrid::FeatureGrid(int width_px,
 }
 
 template <class Visit>
-void FeatureGrid::visit_columns(
-    double left, double right, int row0, int row1, Visit& visit) const {
+void FeatureGrid::visit_columns(double left, double right, int row0, int row1, Visit& visit) const {
   const int column0 = column_of(left);
   const int column1 = column_of(right);
   for (int row = row0; row <= row1; ++row) {

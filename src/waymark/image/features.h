@@ -17,10 +17,10 @@ namespace waymark {
 struct Keypoint {
   float x_px = 0.0f;
   float y_px = 0.0f;
-  float angle_rad = 0.0f;    ///< Orientation of the patch, clockwise as y points down.
-  float response = 0.0f;     ///< Corner score; comparable within one image only.
-  std::uint8_t level = 0;    ///< Pyramid level it was found at.
-  std::uint8_t camera = 0;   ///< Index in the rig.
+  float angle_rad = 0.0f;   ///< Orientation of the patch, clockwise as y points down.
+  float response = 0.0f;    ///< Corner score; comparable within one image only.
+  std::uint8_t level = 0;   ///< Pyramid level it was found at.
+  std::uint8_t camera = 0;  ///< Index in the rig.
 };
 
 /// 256 bits of rotated BRIEF.
@@ -34,12 +34,12 @@ inline constexpr std::uint32_t kNoFeature = UINT32_MAX;
 struct Features {
   std::size_t num_primary = 0;
   std::vector<Keypoint> keypoints;
-  std::vector<Descriptor> descriptors;         ///< num_primary entries.
-  std::vector<Eigen::Vector3f> bearings;       ///< Unit, in the frame of the feature's camera.
+  std::vector<Descriptor> descriptors;    ///< num_primary entries.
+  std::vector<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
   /// Derivative of the pixel of the feature's level by the bearing, at the measured bearing (W).
   /// The residual of a landmark is W * (predicted bearing - measured bearing).
   std::vector<Matrix23f> level_pixel_from_bearing;
-  std::vector<float> size_rad;                 ///< Angle of one pixel of the feature's level.
+  std::vector<float> size_rad;  ///< Angle of one pixel of the feature's level.
   /// The feature of camera 1 that belongs to a primary feature, and back; kNoFeature where none.
   std::vector<std::uint32_t> partner;
   /// Distance along the bearing in metres, derived from stereo or measured by the depth image;
@@ -47,7 +47,7 @@ struct Features {
   std::vector<float> range_m;
   /// RGB-D only: standard deviation of the inverse range in 1/m; 0 where there is no measurement.
   std::vector<float> inverse_range_sigma;
-  FeatureGrid grid;                            ///< Of the primary features, by level-0 pixel.
+  FeatureGrid grid;  ///< Of the primary features, by level-0 pixel.
 
   std::size_t size() const { return keypoints.size(); }
 };

@@ -21,8 +21,9 @@ struct BasicImageView {
   bool is_empty() const { return data == nullptr || width_px <= 0 || height_px <= 0; }
 };
 
-using ImageView = BasicImageView<std::uint8_t>;   ///< Grey values.
-using DepthView = BasicImageView<std::uint16_t>;  ///< Depth along z in units of the sensor; 0: none.
+using ImageView = BasicImageView<std::uint8_t>;  ///< Grey values.
+using DepthView =
+    BasicImageView<std::uint16_t>;  ///< Depth along z in units of the sensor; 0: none.
 
 /// An image that owns its rows; stride is the width.
 template <class T>
