@@ -9,7 +9,6 @@
 #include <limits>
 
 #include "waymark/base/check.h"
-#include "waymark/image/allocation_count.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {
@@ -217,16 +216,6 @@ TEST(Pose, SameInputSameBits) {
   EXPECT_EQ(first.rig_from_world.translation, second.rig_from_world.translation);
   EXPECT_EQ(first.rig_from_world.rotation.coeffs(), second.rig_from_world.rotation.coeffs());
   EXPECT_EQ(first.covariance, second.covariance);
-}
-
-TEST(Pose, DoesNotAllocateAfterWarmUp) {
-  const PoseScene scene = make_pose_scene({.num_cameras = 2, .share_of_outliers = 0.4}, 13);
-  const Rigid3 initial = perturb(scene.rig_from_world, 0.05, 0.01, 13);
-  PoseWorkspace workspace;
-  run(scene, initial, workspace);
-  const long before = testing::num_allocations();
-  run(scene, initial, workspace);
-  EXPECT_EQ(testing::num_allocations(), before);
 }
 
 void expect_finite(const PoseEstimate& estimate) {
