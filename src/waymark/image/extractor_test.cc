@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <cmath>
+
 #include "waymark/base/check.h"
 #include "waymark/image/allocation_count.h"
 #include "waymark/image/image_testing.h"
@@ -79,6 +82,44 @@ TEST(FeatureExtractor, AllocatesNothingAfterTheFirstImage) {
     EXPECT_EQ(keypoints.size(), 800u);
   }
   EXPECT_EQ(testing::num_allocations() - before, 0);
+}
+
+// Every fourth pixel of an image, from the given column on, after averaging 4x4 pixels.
+PaddedImage reduce_by_four(const PaddedImage& image, int first_column) {
+  PaddedImage reduced;
+  reduced.resize(image.width_px() / 4 - 1, image.height_px() / 4);
+  for (int y = 0; y < reduced.height_px(); ++y) {
+    for (int x = 0; x < reduced.width_px(); ++x) {
+      int sum = 8;
+      for (int i = 0; i < 16; ++i) sum += image.row(4 * y + i / 4)[4 * x + first_column + i % 4];
+      reduced.row(y)[x] = static_cast<std::uint8_t>(sum / 16);
+    }
+  }
+  return reduced;
+}
+
+TEST(FeatureExtractor, LocatesToFractionsOfAPixel) {
+  const PaddedImage fine = testing::make_texture(1600, 1200, 1, 4);
+  FeatureExtractor extractor({.count = 1000});
+  const Extracted first = extract(extractor, reduce_by_four(fine, 0));
+  for (int shift : {1, 2, 3}) {
+    const Extracted second = extract(extractor, reduce_by_four(fine, shift));
+    std::vector<double> errors;
+    for (const Keypoint& a : first.keypoints) {
+      for (const Keypoint& b : second.keypoints) {
+        if (a.level != b.level) continue;
+        const double scale = Pyramid::scale(a.level);
+        const double error_x = (b.x_px - a.x_px + 0.25 * shift) / scale;
+        const double error_y = (b.y_px - a.y_px) / scale;
+        if (std::hypot(error_x, error_y) > 1.0) continue;
+        errors.push_back(std::abs(error_x));
+        errors.push_back(std::abs(error_y));
+      }
+    }
+    ASSERT_GT(errors.size(), 1000u);
+    std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
+    EXPECT_LT(errors[errors.size() / 2], 0.1) << "at a shift of " << shift << " / 4 pixels";
+  }
 }
 
 TEST(FeatureExtractor, HonoursMasks) {
