@@ -186,14 +186,14 @@ double RowReader::number(std::size_t index) const {
 std::int64_t RowReader::nanoseconds(std::size_t index) const {
   WAYMARK_CHECK(index < fields_.size());
   const std::optional<std::int64_t> value = parse_nanoseconds(fields_[index]);
-  if (!value) fail(index, "a time in whole nanoseconds");
+  if (!value || *value < 0) fail(index, "a time in whole nanoseconds, not negative");
   return *value;
 }
 
 std::int64_t RowReader::seconds_as_ns(std::size_t index) const {
   WAYMARK_CHECK(index < fields_.size());
   const std::optional<std::int64_t> value = parse_seconds(fields_[index]);
-  if (!value) fail(index, "a time in seconds below 9.2e9");
+  if (!value || *value < 0) fail(index, "a time in seconds from 0 to 9.2e9");
   return *value;
 }
 

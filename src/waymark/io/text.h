@@ -46,7 +46,8 @@ class RowReader {
   void expect_at_least(std::size_t num_fields, std::string_view layout) const;
   void expect_exactly(std::size_t num_fields, std::string_view layout) const;
 
-  /// A field of the current row; fails when it is malformed. The index must exist.
+  /// A field of the current row; fails when it is malformed. The index must exist. Times are not
+  /// negative, so that differences of two cannot overflow.
   double number(std::size_t index) const;
   std::int64_t nanoseconds(std::size_t index) const;
   std::int64_t seconds_as_ns(std::size_t index) const;

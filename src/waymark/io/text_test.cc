@@ -114,6 +114,13 @@ TEST(RowReader, SaysWhereAndWhatWasExpected) {
             "f.txt:2: 3 fields, expected 2: a b");
 }
 
+TEST(RowReader, RefusesNegativeTimes) {
+  RowReader rows("-1 -0.5", "f.txt", ' ');
+  ASSERT_TRUE(rows.next());
+  EXPECT_THROW(rows.nanoseconds(0), InputError);
+  EXPECT_THROW(rows.seconds_as_ns(1), InputError);
+}
+
 TEST(RowReader, AcceptsNoPathOutsideTheFolder) {
   for (const char* path : {"/etc/passwd",
                            "..",
