@@ -52,7 +52,7 @@ void Mapper::add(const NewKeyframe& message) {
   fuse_with_neighbours(map_, id, projection_, dirty_);
   const BundleWindow window =
       choose_window(map_, id, static_cast<std::size_t>(settings_.window_keyframes));
-  adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 5}, dirty_);
+  adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 8}, dirty_);
   cull_redundant_keyframes(map_, id, dirty_);
   refresh_appearances();
 }
