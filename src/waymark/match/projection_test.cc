@@ -1,0 +1,116 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/match/projection.h"
+
+#include <gtest/gtest.h>
+
+#include <set>
+
+#include "waymark/match/test_scene.h"
+
+namespace waymark {
+namespace {
+
+using Eigen::Vector3d;
+
+class Projection : public ::testing::Test {
+ protected:
+  Projection() {
+    PointNoise noise;
+    noise.max_features = 3000;
+    noise.outlier_share = 0.1;
+    seen_ = observe(cloud_, *rig_, world_from_rig_, noise, 1);
+  }
+
+  int num_true_features() const {
+    int count = 0;
+    for (std::size_t i = 0; i < seen_.features->num_primary; ++i) {
+      count += seen_.landmark_of_feature[i] != kNoLandmark;
+    }
+    return count;
+  }
+
+  const std::shared_ptr<const Rig> rig_ = make_test_rig(1);
+  const PointCloud cloud_ = scatter_in({-4.0, -3.0, 2.0}, {4.0, 3.0, 7.0}, 1500, 4.0, 3);
+  const Rigid3 world_from_rig_ = make_test_pose({0.2, -0.1, -0.4}, {0.05, -0.1, 0.2});
+  const LandmarkSet landmarks_ = true_landmarks(cloud_, world_from_rig_.translation);
+  PointObservation seen_;
+  ProjectionMatcher matcher_{rig_};
+};
+
+TEST_F(Projection, FindsLandmarksAtTheTruePose) {
+  const auto& matches =
+      matcher_.match(landmarks_, *seen_.features, {}, world_from_rig_.inverse(), {});
+  int num_right = 0;
+  int num_wrong = 0;
+  std::set<std::uint32_t> used;
+  for (std::size_t i = 0; i < landmarks_.size(); ++i) {
+    if (matches.features[i] == kNoFeature) continue;
+    (seen_.landmark_of_feature[matches.features[i]] == i ? num_right : num_wrong) += 1;
+    EXPECT_TRUE(matches.is_visible[i]);
+    EXPECT_TRUE(used.insert(matches.features[i]).second);
+  }
+  ASSERT_GT(num_true_features(), 200);
+  EXPECT_GT(num_right, 0.9 * num_true_features());
+  EXPECT_LT(num_wrong, 0.01 * num_true_features());
+  EXPECT_EQ(matches.num_matches, used.size());
+}
+
+TEST_F(Projection, LeavesTakenFeaturesAlone) {
+  std::vector<std::uint8_t> is_taken(seen_.features->num_primary);
+  for (std::size_t i = 0; i < is_taken.size(); i += 2) is_taken[i] = 1;
+  const auto& matches =
+      matcher_.match(landmarks_, *seen_.features, is_taken, world_from_rig_.inverse(), {});
+  EXPECT_GT(matches.num_matches, 80u);
+  for (const std::uint32_t feature : matches.features) {
+    if (feature != kNoFeature) {
+      EXPECT_FALSE(is_taken[feature]);
+    }
+  }
+}
+
+TEST_F(Projection, OneFeatureServesTheMoreSimilarOfTwoLandmarks) {
+  std::uint32_t feature = 0;
+  while (seen_.landmark_of_feature[feature] == kNoLandmark) ++feature;
+  const std::uint32_t index = seen_.landmark_of_feature[feature];
+  for (const bool is_better_first : {true, false}) {
+    LandmarkSet twins;
+    for (const bool is_better : {is_better_first, !is_better_first}) {
+      Landmark landmark;
+      landmark.position_in_world = landmarks_.positions_in_world[index];
+      landmark.appearance = {seen_.features->descriptors[feature],
+                             landmarks_.directions[index],
+                             landmarks_.sizes_m[index]};
+      if (!is_better) landmark.appearance.descriptor[0] ^= 0xff;
+      twins.add(LandmarkId{is_better ? 1u : 0u}, landmark);
+    }
+    const auto& matches = matcher_.match(twins, *seen_.features, {}, world_from_rig_.inverse(), {});
+    EXPECT_EQ(matches.num_matches, 1u);
+    EXPECT_EQ(matches.features[is_better_first ? 0 : 1], feature);
+    EXPECT_EQ(matches.features[is_better_first ? 1 : 0], kNoFeature);
+  }
+}
+
+TEST_F(Projection, DoesNotLookForWhatIsKnownFromTheOtherSideOnly) {
+  LandmarkSet behind = landmarks_;
+  for (Vector3d& direction : behind.directions) direction = -direction;
+  const auto& matches = matcher_.match(behind, *seen_.features, {}, world_from_rig_.inverse(), {});
+  EXPECT_EQ(matches.num_matches, 0u);
+  for (const std::uint8_t is_visible : matches.is_visible) EXPECT_FALSE(is_visible);
+}
+
+TEST_F(Projection, DoesNotMatchOtherSizes) {
+  LandmarkSet large = landmarks_;
+  for (double& size_m : large.sizes_m) size_m *= 2.5;
+  const auto& matches = matcher_.match(large, *seen_.features, {}, world_from_rig_.inverse(), {});
+  EXPECT_LT(static_cast<double>(matches.num_matches), 0.02 * num_true_features());
+}
+
+TEST_F(Projection, FindsNothingWhereThePoseIsFarOff) {
+  const Rigid3 turned = make_test_pose(Vector3d::Zero(), {0.0, 0.3, 0.0}) * world_from_rig_;
+  const auto& matches = matcher_.match(landmarks_, *seen_.features, {}, turned.inverse(), {});
+  EXPECT_LT(static_cast<double>(matches.num_matches), 0.02 * num_true_features());
+}
+
+}  // namespace
+}  // namespace waymark
