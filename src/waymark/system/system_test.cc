@@ -1,0 +1,176 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/system.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/base/check.h"
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kNumFrames = 25;
+
+SequenceSpec small_spec() {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {210.0, 210.0, 159.5, 119.5};
+  camera.width_px = 320;
+  camera.height_px = 240;
+  SequenceSpec spec;
+  spec.name = "small";
+  spec.motion = "slide";
+  spec.seed = 3;
+  spec.num_frames = kNumFrames;
+  spec.chain = rgbd_chain(camera, 1000.0);
+  return spec;
+}
+
+/// Rendered once for all tests.
+const std::vector<SimulatedFrame>& frames() {
+  static const std::vector<SimulatedFrame> rendered = [] {
+    SimulatedSequence sequence(small_spec());
+    std::vector<SimulatedFrame> result;
+    for (int i = 0; i < kNumFrames; ++i) result.push_back(sequence.frame(i));
+    return result;
+  }();
+  return rendered;
+}
+
+Rig small_rig() { return SimulatedSequence(small_spec()).rig(); }
+
+Settings small_settings() {
+  Settings settings;
+  settings.features.count = 500;
+  settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
+  return settings;
+}
+
+FrameInput input_of(const SimulatedFrame& frame) {
+  FrameInput input;
+  input.timestamp_ns = frame.timestamp_ns;
+  input.image0 = frame.images[0].view();
+  input.depth = frame.depth.view();
+  return input;
+}
+
+struct Played {
+  std::vector<TrackingResult> results;
+  std::vector<TrajectoryFrame> trajectory;
+  SystemStatistics statistics;
+  std::shared_ptr<const Map> map;
+};
+
+Played play(Timing timing) {
+  System system(small_rig(), small_settings(), timing);
+  Played played;
+  for (const SimulatedFrame& frame : frames())
+    played.results.push_back(system.feed(input_of(frame)));
+  system.finish();
+  played.trajectory = system.trajectory();
+  played.statistics = system.statistics();
+  played.map = system.map();
+  return played;
+}
+
+TEST(System, FollowsARenderedSequence) {
+  const Played inline_run = play(Timing::kInline);
+  ASSERT_EQ(inline_run.trajectory.size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_GE(inline_run.statistics.num_keyframes, 3);
+  EXPECT_EQ(inline_run.statistics.mapping_ms.size(),
+            static_cast<std::size_t>(inline_run.statistics.num_keyframes));
+  EXPECT_EQ(inline_run.map->broken_invariants(), "");
+  // Depth gives the scale and the first frame the origin.
+  const Rigid3 world_from_first = frames()[0].world_from_rig;
+  for (std::size_t i = 0; i < frames().size(); ++i) {
+    const Rigid3 truth = world_from_first.inverse() * frames()[i].world_from_rig;
+    const Rigid3 error = truth.inverse() * inline_run.trajectory[i].world_from_rig;
+    EXPECT_LT(error.translation.norm(), 0.03) << "frame " << i;
+    EXPECT_LT(error.log().tail<3>().norm(), 0.01) << "frame " << i;
+  }
+}
+
+TEST(System, InlineAndLockstepGiveTheSameBits) {
+  const Played alone = play(Timing::kInline);
+  const Played threaded = play(Timing::kLockstep);
+  ASSERT_GE(alone.statistics.num_keyframes, 3);
+  for (std::size_t i = 0; i < alone.results.size(); ++i) {
+    const TrackingResult& a = alone.results[i];
+    const TrackingResult& b = threaded.results[i];
+    ASSERT_EQ(a.state, b.state) << "frame " << i;
+    ASSERT_EQ(a.is_keyframe, b.is_keyframe) << "frame " << i;
+    ASSERT_EQ(a.num_inliers, b.num_inliers) << "frame " << i;
+    ASSERT_EQ(a.world_from_rig.has_value(), b.world_from_rig.has_value());
+    if (!a.world_from_rig) continue;
+    ASSERT_EQ(a.world_from_rig->matrix(), b.world_from_rig->matrix()) << "frame " << i;
+    ASSERT_EQ(a.covariance, b.covariance) << "frame " << i;
+  }
+  ASSERT_EQ(alone.trajectory.size(), threaded.trajectory.size());
+  for (std::size_t i = 0; i < alone.trajectory.size(); ++i) {
+    EXPECT_EQ(alone.trajectory[i].world_from_rig.matrix(),
+              threaded.trajectory[i].world_from_rig.matrix());
+  }
+  EXPECT_EQ(alone.statistics.num_landmarks, threaded.statistics.num_landmarks);
+}
+
+TEST(System, RealtimeFollowsToo) {
+  const Played realtime = play(Timing::kRealtime);
+  EXPECT_EQ(realtime.trajectory.size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_EQ(realtime.map->broken_invariants(), "");
+}
+
+TEST(System, TimeStampsMustIncrease) {
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  system.feed(input_of(frames()[1]));
+  EXPECT_THROW(system.feed(input_of(frames()[1])), InputError);
+  EXPECT_THROW(system.feed(input_of(frames()[0])), InputError);
+  EXPECT_NO_THROW(system.feed(input_of(frames()[2])));
+  EXPECT_EQ(system.frame_states().size(), 2u);
+}
+
+TEST(System, ImagesMustHaveTheSizeOfTheCalibration) {
+  System system(small_rig(), small_settings(), Timing::kInline);
+  const Image small(160, 120);
+  FrameInput input = input_of(frames()[0]);
+  input.image0 = small.view();
+  EXPECT_THROW(system.feed(input), InputError);
+  input.image0 = {};
+  EXPECT_THROW(system.feed(input), InputError);
+  EXPECT_EQ(system.feed(input_of(frames()[0])).frame, FrameId{0});
+}
+
+TEST(System, AnImageWithoutFeaturesIsLostAndTheNextIsFoundAgain) {
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  for (int i = 0; i < 3; ++i) system.feed(input_of(frames()[static_cast<std::size_t>(i)]));
+  const Image black(320, 240);
+  FrameInput blind = input_of(frames()[3]);
+  blind.image0 = black.view();
+  const TrackingResult lost = system.feed(blind);
+  EXPECT_EQ(lost.state, FrameState::kLost);
+  EXPECT_EQ(lost.reason, FrameReason::kNoFeatures);
+  EXPECT_FALSE(lost.world_from_rig);
+  EXPECT_EQ(system.feed(input_of(frames()[4])).state, FrameState::kTracked);
+  system.finish();
+  EXPECT_EQ(system.trajectory().size(), 4u);
+}
+
+TEST(System, FinishesTwiceAndThenTakesNoFrames) {
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  system.feed(input_of(frames()[0]));
+  EXPECT_THROW(system.statistics(), CheckError);
+  system.finish();
+  EXPECT_NO_THROW(system.finish());
+  EXPECT_EQ(system.statistics().num_submaps, 1);
+  EXPECT_THROW(system.feed(input_of(frames()[1])), CheckError);
+}
+
+TEST(System, FinishesWithoutAnyFrame) {
+  System system(small_rig(), small_settings(), Timing::kRealtime);
+  system.finish();
+  EXPECT_TRUE(system.trajectory().empty());
+  EXPECT_EQ(system.statistics().num_submaps, 0);
+}
+
+}  // namespace
+}  // namespace waymark
