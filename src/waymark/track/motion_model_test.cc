@@ -1,0 +1,47 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/motion_model.h"
+
+#include <gtest/gtest.h>
+
+namespace waymark {
+namespace {
+
+const Vector6d kMotion = (Vector6d() << 0.1, -0.05, 0.2, 0.02, 0.1, -0.03).finished();
+
+TEST(MotionModel, StaysWithoutAVelocity) {
+  MotionModel model;
+  const Rigid3 pose = Rigid3::exp(kMotion);
+  model.update(0, pose);
+  EXPECT_EQ(model.predict(1'000'000).matrix(), pose.matrix());
+}
+
+TEST(MotionModel, GoesOnInProportionToTime) {
+  MotionModel model;
+  model.update(0, Rigid3());
+  model.update(100, Rigid3::exp(kMotion));
+  EXPECT_TRUE(model.predict(200).matrix().isApprox(Rigid3::exp(2.0 * kMotion).matrix(), 1e-12));
+  EXPECT_TRUE(model.predict(150).matrix().isApprox(Rigid3::exp(1.5 * kMotion).matrix(), 1e-12));
+}
+
+TEST(MotionModel, KeepsTheVelocityWhenTheMapMoves) {
+  MotionModel model;
+  model.update(0, Rigid3());
+  model.update(100, Rigid3::exp(kMotion));
+  const Rigid3 moved(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
+  model.move_last(moved);
+  EXPECT_TRUE(model.predict(200).matrix().isApprox((Rigid3::exp(kMotion) * moved).matrix(), 1e-12));
+}
+
+TEST(MotionModel, ForgetsOnReset) {
+  MotionModel model;
+  model.update(0, Rigid3());
+  model.update(100, Rigid3::exp(kMotion));
+  model.reset();
+  const Rigid3 pose = Rigid3::exp(3.0 * kMotion);
+  model.update(200, pose);
+  EXPECT_EQ(model.predict(300).matrix(), pose.matrix());
+}
+
+}  // namespace
+}  // namespace waymark
