@@ -53,6 +53,8 @@ std::span<const FeatureMatch> AppearanceMatcher::match_near(
     const float size = a.size_rad[index];
     candidates_.clear();
     b.grid.visit_near(pixel.x(), pixel.y(), radius_px, [&](std::uint32_t feature) {
+      const Keypoint& keypoint = b.keypoints[feature];
+      if (std::hypot(keypoint.x_px - pixel.x(), keypoint.y_px - pixel.y()) > radius_px) return;
       const float ratio = b.size_rad[feature] / size;
       if (ratio < kMaxSizeRatio && ratio > 1.0f / kMaxSizeRatio) candidates_.push_back(feature);
     });

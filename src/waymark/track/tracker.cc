@@ -191,8 +191,8 @@ void Tracker::count_sightings(const ProjectionMatches& matches) {
   for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
     if (matches.is_visible[i]) sightings_.push_back({local_.landmarks.ids[i], 1, 0});
   }
-  for (LandmarkId id : landmarks_) {
-    if (id.is_valid()) sightings_.push_back({id, 0, 1});
+  for (std::size_t i = 0; i < is_taken_.size(); ++i) {  // Primary features only.
+    if (landmarks_[i].is_valid()) sightings_.push_back({landmarks_[i], 0, 1});
   }
 }
 
