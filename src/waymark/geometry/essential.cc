@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/geometry/essential.h"
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
@@ -84,28 +83,29 @@ Cubic multiply(const Quadratic& a, const Linear& b) {
 // five epipolar constraints (Nister 2004, section 3).
 using NullSpace = Eigen::Matrix<double, 9, 4>;
 
+// Normally distributed numbers, of no further meaning.
+constexpr std::array<std::array<double, 9>, 4> kGeneralPosition = {
+    {{0.041, 0.465, -0.461, 0.353, 0.926, 0.411, 1.562, -0.885, 0.067},
+     {-0.705, -0.784, -0.184, 0.221, 0.419, 0.508, 2.234, 0.863, -1.595},
+     {0.204, -0.623, -0.516, 1.306, -0.223, -1.951, 0.311, -0.291, -1.174},
+     {-0.921, -0.625, -0.023, -0.427, 0.071, 1.836, -0.800, -0.807, -0.249}}};
+
 NullSpace epipolar_null_space(std::span<const Eigen::Vector3d, 5> bearings_a,
                               std::span<const Eigen::Vector3d, 5> bearings_b) {
-  // The constraints, then the axes along which most is missing, by the method of Gram and Schmidt.
+  // Gram-Schmidt over the constraints and then four directions in general position. Directions
+  // along the axes would not do: without rotation, as on a straight road, the essential matrix is
+  // skew-symmetric, and in a basis of matching structure two solutions share the same z.
   Eigen::Matrix<double, 9, 9> basis;
-  Eigen::Matrix<double, 9, 1> missing = Eigen::Matrix<double, 9, 1>::Ones();
   for (int i = 0; i < 9; ++i) {
-    Eigen::Matrix<double, 9, 1> column = Eigen::Matrix<double, 9, 1>::Zero();
-    if (i < 5) {
-      for (int row = 0; row < 3; ++row) {
-        column.segment<3>(3 * row) = bearings_b[i][row] * bearings_a[i];
-      }
-    } else {
-      int axis = 0;
-      missing.maxCoeff(&axis);
-      column[axis] = 1.0;
+    Eigen::Matrix<double, 9, 1> column;
+    for (int k = 0; k < 9; ++k) {
+      column[k] = i < 5 ? bearings_b[i][k / 3] * bearings_a[i][k % 3]
+                        : kGeneralPosition[static_cast<std::size_t>(i - 5)][k];
     }
     for (int pass = 0; pass < 2; ++pass) {  // Twice is enough (Kahan).
       for (int j = 0; j < i; ++j) column -= basis.col(j).dot(column) * basis.col(j);
     }
-    column.normalize();
-    basis.col(i) = column;
-    missing -= column.cwiseAbs2();
+    basis.col(i) = column.normalized();
   }
   return basis.rightCols<4>();
 }

@@ -8,10 +8,8 @@
 #include <concepts>
 #include <cstddef>
 #include <cstdint>
-#include <limits>
 #include <optional>
 #include <span>
-#include <utility>
 #include <vector>
 
 #include "waymark/base/rng.h"
@@ -117,23 +115,34 @@ inline int samples_needed(double inlier_ratio, std::size_t sample_size, double c
 /// How far beyond the inliers local optimisation looks. A model through a minimal sample is off by
 /// several standard deviations, so its own inliers would hold it where it is.
 inline constexpr double kNearness = 4.0;
+/// Local optimisation of a sample's model starts if it has this share of the support of the best
+/// sample's. Were it to be compared with the best optimised model, none but the first few would
+/// ever start, and the first local optimum would be the result.
+inline constexpr double kPromisingSupport = 0.8;
+
+template <class Model>
+struct Scored {
+  Model model;
+  double cost;
+};
 
 /// Refits to the data near the model as long as that lowers the cost (Chum et al. 2003).
 template <RansacEstimator Estimator>
-void optimise_locally(const Estimator& estimator, RansacResult<typename Estimator::Model>& best) {
+Scored<typename Estimator::Model> optimise_locally(const Estimator& estimator,
+                                                   Scored<typename Estimator::Model> scored) {
   constexpr int kMaxRounds = 3;
   constexpr double kMaxSquaredError = kNearness * kNearness * Estimator::kMaxSquaredError;
   for (int round = 0; round < kMaxRounds; ++round) {
-    const auto nearby = data_within(estimator, best.model, kMaxSquaredError);
-    const auto refined = estimator.refine(best.model, nearby);
-    if (!refined) return;
-    const double refined_cost = cost(estimator, *refined, best.cost);
-    if (!(refined_cost < best.cost)) return;
-    const double gain = best.cost - refined_cost;
-    best.model = *refined;
-    best.cost = refined_cost;
-    if (gain < 0.01 * refined_cost) return;
+    const auto nearby = data_within(estimator, scored.model, kMaxSquaredError);
+    const auto refined = estimator.refine(scored.model, nearby);
+    if (!refined) break;
+    const double refined_cost = cost(estimator, *refined, scored.cost);
+    if (!(refined_cost < scored.cost)) break;
+    const bool is_converged = refined_cost > 0.99 * scored.cost;
+    scored = {*refined, refined_cost};
+    if (is_converged) break;
   }
+  return scored;
 }
 
 }  // namespace ransac_internal
@@ -144,29 +153,36 @@ template <RansacEstimator Estimator>
 std::optional<RansacResult<typename Estimator::Model>> ransac(const Estimator& estimator,
                                                               const RansacOptions& options) {
   namespace internal = ransac_internal;
+  using Scored = internal::Scored<typename Estimator::Model>;
   const std::size_t num_data = estimator.num_data();
   if (num_data < Estimator::kSampleSize) return std::nullopt;
-  Rng rng(options.seed, options.stream);
-  std::optional<RansacResult<typename Estimator::Model>> best;
   const auto needed_for = [&](double inlier_ratio) {
     const double ratio = std::max(inlier_ratio, options.min_inlier_ratio);
     return internal::samples_needed(ratio, Estimator::kSampleSize, options.confidence);
   };
+  const double worst_cost = static_cast<double>(num_data) * Estimator::kMaxSquaredError;
+  Rng rng(options.seed, options.stream);
+  std::optional<RansacResult<typename Estimator::Model>> best;
+  double best_sample_cost = worst_cost;
   int needed = needed_for(0.0);
   int iteration = 0;
   for (; iteration < needed; ++iteration) {
     const auto sample = internal::draw_distinct<Estimator::kSampleSize>(rng, num_data);
-    bool is_improved = false;
+    const double bound = worst_cost - internal::kPromisingSupport * (worst_cost - best_sample_cost);
+    std::optional<Scored> promising;
     for (const auto& model : estimator.fit(sample)) {
-      const double bound = best ? best->cost : std::numeric_limits<double>::infinity();
-      const double cost = internal::cost(estimator, model, bound);
-      if (!(cost < bound)) continue;
-      best = RansacResult<typename Estimator::Model>{model, {}, cost, 0};
-      is_improved = true;
+      const double limit = promising ? promising->cost : bound;
+      const double cost = internal::cost(estimator, model, limit);
+      if (cost < limit) promising = Scored{model, cost};
     }
-    if (!is_improved) continue;
-    internal::optimise_locally(estimator, *best);
-    best->inliers = internal::data_within(estimator, best->model, Estimator::kMaxSquaredError);
+    if (!promising) continue;
+    best_sample_cost = std::min(best_sample_cost, promising->cost);
+    const Scored optimised = internal::optimise_locally(estimator, *promising);
+    if (best && !(optimised.cost < best->cost)) continue;
+    best = {optimised.model,
+            internal::data_within(estimator, optimised.model, Estimator::kMaxSquaredError),
+            optimised.cost,
+            0};
     needed = needed_for(static_cast<double>(best->inliers.size()) / static_cast<double>(num_data));
   }
   if (!best || best->inliers.size() <= Estimator::kSampleSize) return std::nullopt;

@@ -12,8 +12,6 @@
 namespace waymark {
 namespace {
 
-using Matrix5d = Eigen::Matrix<double, 5, 5>;
-
 struct EpipolarSystem {
   Matrix5d information = Matrix5d::Zero();
   Vector5d gradient = Vector5d::Zero();
@@ -141,6 +139,17 @@ EpipolarResidual epipolar_residual(const Rigid3& b_from_a,
   residual.jacobian.head<3>() = m.cross(by_m);  // dm = phi x m
   residual.jacobian.tail<2>() = tangent_basis(t).transpose() * by_t;
   return residual;
+}
+
+Matrix5d relative_pose_information(const Rigid3& b_from_a,
+                                   const BearingMatches& matches,
+                                   std::span<const std::uint32_t> indices) {
+  Matrix5d information = Matrix5d::Zero();
+  for (const std::uint32_t index : indices) {
+    const Vector5d jacobian = epipolar_residual(b_from_a, matches, index).jacobian;
+    information += jacobian * jacobian.transpose();
+  }
+  return information;
 }
 
 Rigid3 refine_relative_pose(const Rigid3& initial_b_from_a,

@@ -12,6 +12,7 @@
 namespace waymark {
 
 using Vector5d = Eigen::Matrix<double, 5, 1>;
+using Matrix5d = Eigen::Matrix<double, 5, 5>;
 
 /// Squared Sampson distance (Luong & Faugeras 1996; Hartley & Zisserman 2004, eq. 11.9), on the
 /// sphere instead of the image plane: the squared epipolar error b^T E a over its variance to first
@@ -34,6 +35,12 @@ struct EpipolarResidual {
 EpipolarResidual epipolar_residual(const Rigid3& b_from_a,
                                    const BearingMatches& matches,
                                    std::size_t index);
+
+/// Information (inverse covariance) of the tangent vector that the matches of these indices hold,
+/// at a pose they agree with. Singular where they leave part of the motion open.
+Matrix5d relative_pose_information(const Rigid3& b_from_a,
+                                   const BearingMatches& matches,
+                                   std::span<const std::uint32_t> indices);
 
 struct RefinementOptions {
   double first_scale = 8.0;  ///< Of the loss, in standard deviations, for the first descent.

@@ -118,6 +118,26 @@ TEST(RefineRelativePose, OutliersHaveNoPull) {
   }
 }
 
+// The errors over many noisy trials, whitened by the information, have unit variance.
+TEST(RelativePoseInformation, IsThatOfTheErrors) {
+  Rng rng(6, 0);
+  double sum = 0.0;
+  constexpr int kTrials = 200;
+  for (int trial = 0; trial < kTrials; ++trial) {
+    const TwoViewScene scene = scene_all_round(100, 0.002, 0.0, rng);
+    const RefinementOptions least_squares{.first_scale = 1e3, .last_scale = 1e3};
+    const Rigid3 refined =
+        refine_relative_pose(scene.b_from_a, scene.matches(), all_of(scene), least_squares);
+    Vector5d error;
+    error << so3_log(scene.b_from_a.rotation * refined.rotation.conjugate()),
+        tangent_basis(refined.translation).transpose() * scene.b_from_a.translation;
+    const Matrix5d information = relative_pose_information(refined, scene.matches(), all_of(scene));
+    sum += error.dot(information * error);
+  }
+  // Chi-squared of 5 degrees of freedom; four standard deviations of its mean.
+  EXPECT_NEAR(sum / kTrials, 5.0, 4.0 * std::sqrt(10.0 / kTrials));
+}
+
 TEST(RefineRelativePose, LeavesThePoseWithoutMatches) {
   Rng rng(5, 0);
   const TwoViewScene scene = scene_all_round(5, 0.001, 0.0, rng);

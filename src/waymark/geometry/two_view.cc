@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/geometry/two_view.h"
 
+#include <Eigen/Eigenvalues>
+#include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
 #include <limits>
@@ -24,16 +26,21 @@ using Fit = std::optional<RansacResult<Eigen::Matrix3d>>;
 constexpr double kOutlierCost = EssentialEstimator::kMaxSquaredError;
 // With less support than this share of the matches, agreement may be chance.
 constexpr double kMinInlierRatio = 0.3;
-// Parallax in standard deviations from which a point counts as behind, and as a point at all.
+// Parallax in standard deviations from which a point counts as behind, and angles of its triangle
+// from which it counts as a point.
 constexpr double kBehindSigmas = 3.0;
 constexpr double kPointSigmas = 4.0;
 // Poses closer than this are one solution.
 constexpr double kSameRotation_rad = 0.02;
 constexpr double kSameDirection_rad = 0.1;
+// With a standard deviation of the direction of motion above this, the motion is not known.
+constexpr double kMaxDirectionSigma_rad = 0.1;
 // A rival is rejected if it is less likely by a factor of exp(10 / 2) and, since a few wrong
-// matches can do that by chance, by three standard deviations of the difference.
+// matches can do that by chance, by so many standard deviations of the difference. On a plane
+// nothing but chance tells two motions apart, unless one of them puts points behind a view.
 constexpr double kMinCostGap = 10.0;
-constexpr double kMinVuongSigmas = 3.0;
+constexpr double kMinVuongSigmas = 2.5;
+constexpr double kMinVuongSigmasOnPlane = 4.0;
 
 double parallax_sigma_rad(const BearingMatches& matches, std::size_t index) {
   return std::hypot(matches.sigmas_rad_a[index], matches.sigmas_rad_b[index]);
@@ -73,10 +80,16 @@ Fits fit_models(const BearingMatches& matches, const TwoViewOptions& options) {
   const EssentialEstimator essential(matches);
   const HomographyEstimator homography(matches);
   const RotationEstimator rotation(matches);
-  const RansacOptions ransac_options{
+  RansacOptions ransac_options{
       .seed = options.seed, .stream = options.stream, .min_inlier_ratio = kMinInlierRatio};
   Fits fits;
   fits.essential = ransac(essential, ransac_options);
+  if (fits.essential) {
+    // A model of less support than this would lose to the essential matrix anyway.
+    const double support = static_cast<double>(fits.essential->inliers.size());
+    ransac_options.min_inlier_ratio =
+        std::max(kMinInlierRatio, 0.8 * support / static_cast<double>(matches.size()));
+  }
   fits.homography = ransac(homography, ransac_options);
   fits.rotation = ransac(rotation, ransac_options);
 
@@ -125,11 +138,12 @@ Candidate make_candidate(const Rigid3& b_from_a, const BearingMatches& matches) 
   return candidate;
 }
 
-Rigid3 refine(const Rigid3& b_from_a, const BearingMatches& matches) {
+Rigid3 refine(const Rigid3& b_from_a, const BearingMatches& matches, double first_scale) {
   std::vector<std::uint32_t> all(matches.size());
   std::iota(all.begin(), all.end(), 0u);
   const Rigid3 start(b_from_a.rotation, b_from_a.translation.normalized());
-  return refine_relative_pose(start, matches, all, {.max_iterations = 15});
+  return refine_relative_pose(
+      start, matches, all, {.first_scale = first_scale, .max_iterations = 15});
 }
 
 // Of the motions past a plane, those that have most of its points on the visible side.
@@ -153,14 +167,14 @@ std::vector<Rigid3> visible_motions(const RansacResult<Eigen::Matrix3d>& homogra
 std::vector<Candidate> find_candidates(const Fits& fits, const BearingMatches& matches) {
   std::vector<Candidate> candidates;
   if (fits.essential) {
-    const Rigid3 refined = refine(decompose_essential(fits.essential->model).front(), matches);
+    const Rigid3 refined = refine(decompose_essential(fits.essential->model).front(), matches, 3.0);
     for (const Rigid3& b_from_a : decompose_essential(essential_from_pose(refined))) {
       candidates.push_back(make_candidate(b_from_a, matches));
     }
   }
-  if (fits.homography) {
+  if (fits.homography && 2 * fits.homography->inliers.size() > fits.num_inliers) {
     for (const Rigid3& motion : visible_motions(*fits.homography, matches)) {
-      candidates.push_back(make_candidate(refine(motion, matches), matches));
+      candidates.push_back(make_candidate(refine(motion, matches, 8.0), matches));
     }
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
@@ -176,7 +190,9 @@ bool is_same(const Rigid3& first, const Rigid3& second) {
 
 // Whether the matches prefer a candidate to its rival beyond chance: Vuong 1989 (Likelihood Ratio
 // Tests for Model Selection and Non-nested Hypotheses), costs being -2 log likelihoods.
-bool is_significantly_better(const Candidate& candidate, const Candidate& rival) {
+bool is_significantly_better(const Candidate& candidate,
+                             const Candidate& rival,
+                             double min_sigmas) {
   double sum = 0.0;
   double sum_of_squares = 0.0;
   for (std::size_t i = 0; i < candidate.match_costs.size(); ++i) {
@@ -184,17 +200,48 @@ bool is_significantly_better(const Candidate& candidate, const Candidate& rival)
     sum += difference;
     sum_of_squares += difference * difference;
   }
-  return sum > kMinCostGap && sum > kMinVuongSigmas * std::sqrt(sum_of_squares);
+  return sum > kMinCostGap && sum > min_sigmas * std::sqrt(sum_of_squares);
 }
 
-bool is_ambiguous(const std::vector<Candidate>& candidates) {
+bool is_ambiguous(const std::vector<Candidate>& candidates, TwoViewModel model) {
+  const double min_sigmas =
+      model == TwoViewModel::kPlane ? kMinVuongSigmasOnPlane : kMinVuongSigmas;
   const Candidate& best = candidates.front();
   return std::any_of(candidates.begin() + 1, candidates.end(), [&](const Candidate& rival) {
-    return !is_same(best.b_from_a, rival.b_from_a) && !is_significantly_better(best, rival);
+    return !is_same(best.b_from_a, rival.b_from_a) &&
+           !is_significantly_better(best, rival, min_sigmas);
   });
 }
 
+// Whether the matches fix the direction of motion: its standard deviation, whatever the rotation.
+bool is_determined(const Candidate& candidate, const BearingMatches& matches) {
+  std::vector<std::uint32_t> inliers;
+  for (std::uint32_t i = 0; i < candidate.match_costs.size(); ++i) {
+    if (candidate.match_costs[i] < kOutlierCost) inliers.push_back(i);
+  }
+  const Matrix5d information = relative_pose_information(candidate.b_from_a, matches, inliers);
+  const Eigen::Matrix3d of_rotation = information.topLeftCorner<3, 3>();
+  const Eigen::Matrix<double, 3, 2> mixed = information.topRightCorner<3, 2>();
+  const Eigen::Matrix2d of_direction =
+      information.bottomRightCorner<2, 2>() - mixed.transpose() * of_rotation.inverse() * mixed;
+  if (!of_direction.allFinite()) return false;
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(of_direction, Eigen::EigenvaluesOnly);
+  return solver.eigenvalues()[0] * kMaxDirectionSigma_rad * kMaxDirectionSigma_rad > 1.0;
+}
+
 // --- The points ---
+
+// The triangle of both centres and the point has known angles if none of its sines is lost in
+// noise. Near zero parallax the distances are unknown; a bearing near the epipole without the other
+// means a point in the other view's centre.
+bool is_triangle_certain(const BearingMatches& matches, std::size_t index, const Rigid3& a_from_b) {
+  const Eigen::Vector3d& ray_a = matches.bearings_a[index];
+  const Eigen::Vector3d ray_b = a_from_b.rotation * matches.bearings_b[index];
+  const Eigen::Vector3d& t = a_from_b.translation;
+  const double min_sine = kPointSigmas * parallax_sigma_rad(matches, index);
+  return ray_a.cross(ray_b).norm() > min_sine && ray_a.cross(t).norm() > min_sine &&
+         ray_b.cross(t).norm() > min_sine;
+}
 
 TwoViewGeometry make_geometry(const Candidate& candidate,
                               TwoViewModel model,
@@ -216,7 +263,8 @@ TwoViewGeometry make_geometry(const Candidate& candidate,
     geometry.is_inlier[i] = 1;
     geometry.parallaxes_rad[i] = parallax_angle(a, b, a_from_b);
     inlier_parallaxes.push_back(geometry.parallaxes_rad[i]);
-    const auto point = triangulate(a, b, a_from_b, kPointSigmas * parallax_sigma_rad(matches, i));
+    if (!is_triangle_certain(matches, i, a_from_b)) continue;
+    const auto point = triangulate(a, b, a_from_b, 0.0);
     if (!point) continue;
     geometry.has_point[i] = 1;
     geometry.points_in_a[i] = *point;
@@ -285,10 +333,11 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
   if (!has_support(num_inliers, num_matches, options)) {
     return {TwoViewStatus::kTooFewInliers, std::nullopt};
   }
-  if (count_near_points(geometry, options.min_parallax_rad) < options.min_num_points) {
+  if (count_near_points(geometry, options.min_parallax_rad) < options.min_num_points ||
+      !is_determined(candidates.front(), matches)) {
     return {TwoViewStatus::kTooLittleParallax, std::nullopt};
   }
-  if (is_ambiguous(candidates)) return {TwoViewStatus::kAmbiguous, std::nullopt};
+  if (is_ambiguous(candidates, fits.best)) return {TwoViewStatus::kAmbiguous, std::nullopt};
   return {TwoViewStatus::kOk, std::move(geometry)};
 }
 

@@ -30,10 +30,12 @@ enum class TwoViewModel {
 
 enum class TwoViewStatus {
   kOk,
-  kTooFewMatches,      ///< Fewer than min_num_points.
-  kTooFewInliers,      ///< No model that enough of the matches agree with.
-  kTooLittleParallax,  ///< A rotation explains the matches, or too few points are near enough.
-  kAmbiguous,          ///< Two motions explain the matches, for example past a plane.
+  kTooFewMatches,  ///< Fewer than min_num_points.
+  kTooFewInliers,  ///< No model that enough of the matches agree with.
+  /// A rotation explains the matches, too few points are near enough, or they leave the direction
+  /// of motion open.
+  kTooLittleParallax,
+  kAmbiguous,  ///< Two motions explain the matches, for example past a plane.
 };
 std::string_view to_string(TwoViewStatus status);
 
@@ -42,8 +44,8 @@ struct TwoViewGeometry {
   Rigid3 b_from_a;  ///< Translation of unit length.
   TwoViewModel model = TwoViewModel::kScene;
   std::vector<std::uint8_t> is_inlier;
-  /// Whether an inlier has a point: its parallax is at least four times its standard deviation, so
-  /// its distance is known to a quarter.
+  /// Whether an inlier has a point: its parallax and its angles from the direction of motion are at
+  /// least four times their standard deviations, so its distances are known to about a quarter.
   std::vector<std::uint8_t> has_point;
   std::vector<Eigen::Vector3d> points_in_a;  ///< In units of the translation; zero if none.
   std::vector<double> parallaxes_rad;        ///< Zero where the match is no inlier.

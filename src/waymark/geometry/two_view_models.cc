@@ -24,7 +24,7 @@ std::array<Eigen::Vector3d, kSize> gather(std::span<const Eigen::Vector3d> beari
 // Every k-th of the indices such that about this many remain: local optimisation needs no more to
 // find the right basin (Lebeda, Matas & Chum 2012, Fixing the Locally Optimized RANSAC).
 std::vector<std::uint32_t> thin_out(std::span<const std::uint32_t> indices) {
-  constexpr std::size_t kEnough = 200;
+  constexpr std::size_t kEnough = 300;
   const std::size_t stride = (indices.size() + kEnough - 1) / kEnough;
   std::vector<std::uint32_t> result;
   for (std::size_t i = 0; i < indices.size(); i += stride) result.push_back(indices[i]);
@@ -51,7 +51,7 @@ std::optional<Eigen::Matrix3d> EssentialEstimator::refine(
   // The epipolar error is the same for all four poses of an essential matrix.
   const Rigid3 b_from_a = decompose_essential(essential).front();
   return essential_from_pose(
-      refine_relative_pose(b_from_a, matches_, thin_out(nearby), {.max_iterations = 4}));
+      refine_relative_pose(b_from_a, matches_, thin_out(nearby), {.max_iterations = 6}));
 }
 
 std::vector<Eigen::Matrix3d> HomographyEstimator::fit(

@@ -90,8 +90,11 @@ Summary run_trials(std::uint64_t seed, DrawScene&& draw_scene) {
   return summary;
 }
 
-void expect_accurate(const Summary& summary, double max_rotation_rad, double max_direction_rad) {
-  EXPECT_GE(summary.num_ok, kTrials - 1);
+void expect_accurate(const Summary& summary,
+                     double max_rotation_rad,
+                     double max_direction_rad,
+                     int min_num_ok = kTrials - 1) {
+  EXPECT_GE(summary.num_ok, min_num_ok);
   EXPECT_EQ(summary.num_wrong, 0);
   ASSERT_FALSE(summary.rotation_errors.empty());
   EXPECT_LT(testing::quantile(summary.rotation_errors, 0.9), max_rotation_rad);
@@ -163,7 +166,7 @@ TEST(TwoView, NearlyPlanar) {
     const auto points = points_on_plane(View{}, {0.4, 0.2, 1.0}, 0.15, 0.5);
     return make_scene(b_from_a, View{}, 500, kSigma, 0.3, rng, points);
   });
-  expect_accurate(summary, 0.006, 0.05);
+  expect_accurate(summary, 0.006, 0.05, 20);  // the others are called ambiguous
 }
 
 TEST(TwoView, LowParallaxIsRightOrRefused) {
@@ -265,7 +268,8 @@ TEST(TwoView, DegenerateInputGivesAReasonAndNoPose) {
   for (int i = 0; i < 100; ++i) spread.push_back(random_direction(rng));
   for (const auto& a : {same, bad, line, spread}) {
     for (const auto& b : {same, bad, line, spread}) {
-      EXPECT_FALSE(estimate_two_view({a, b, sigmas, sigmas}, {}).geometry);
+      EXPECT_FALSE(estimate_two_view({a, b, sigmas, sigmas}, {}).geometry)
+          << a[0].transpose() << " to " << b[0].transpose();
     }
   }
   EXPECT_THROW(estimate_two_view({same, line, sigmas, {}}, {}), CheckError);
