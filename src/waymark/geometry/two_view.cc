@@ -6,21 +6,17 @@
 #include <Eigen/LU>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <numeric>
 
 #include "waymark/base/check.h"
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/homography.h"
-#include "waymark/geometry/ransac.h"
 #include "waymark/geometry/relative_pose.h"
 #include "waymark/geometry/triangulation.h"
 #include "waymark/geometry/two_view_models.h"
 
 namespace waymark {
 namespace {
-
-using Fit = std::optional<RansacResult<Eigen::Matrix3d>>;
 
 // The cost of a match that contradicts a motion, in squared standard deviations.
 constexpr double kOutlierCost = EssentialEstimator::kMaxSquaredError;
@@ -31,82 +27,19 @@ constexpr double kMinInlierRatio = 0.3;
 constexpr double kBehindSigmas = 3.0;
 constexpr double kPointSigmas = 4.0;
 // Poses closer than this are one solution.
-constexpr double kSameRotation_rad = 0.02;
-constexpr double kSameDirection_rad = 0.1;
+constexpr double kSameRotationRad = 0.02;
+constexpr double kSameDirectionRad = 0.1;
 // With a standard deviation of the direction of motion above this, the motion is not known.
-constexpr double kMaxDirectionSigma_rad = 0.1;
+constexpr double kMaxDirectionSigmaRad = 0.1;
 // A rival is rejected if it is less likely by a factor of exp(10 / 2) and, since a few wrong
 // matches can do that by chance, by so many standard deviations of the difference. On a plane
 // nothing but chance tells two motions apart, unless one of them puts points behind a view.
 constexpr double kMinCostGap = 10.0;
 constexpr double kMinVuongSigmas = 2.5;
-constexpr double kMinVuongSigmasOnPlane = 4.0;
+constexpr double kMinVuongSigmasOnPlane = 3.5;
 
 double parallax_sigma_rad(const BearingMatches& matches, std::size_t index) {
   return std::hypot(matches.sigmas_rad_a[index], matches.sigmas_rad_b[index]);
-}
-
-// --- Which model: GRIC (Torr 1998, Geometric Motion Segmentation and Model Selection) ---
-
-struct ModelSize {
-  int dimension;       // of the surface of all matches that fit, of 4 for any pair of directions
-  int num_parameters;  // of the model
-};
-
-// Sum over the matches of squared error + dimension * log 4, plus log(4 n) per parameter. A match
-// costs no more than an outlier, which is the same for each model (here, that of the essential
-// matrix at its threshold): otherwise outliers would vote for the model that calls more of them so.
-template <class Estimator>
-double gric(const Estimator& estimator, const Fit& fit, ModelSize size) {
-  if (!fit) return std::numeric_limits<double>::infinity();
-  const double per_dimension = std::log(4.0);
-  const double outlier_cost = kOutlierCost + 3.0 * per_dimension;
-  const double num_matches = static_cast<double>(estimator.num_data());
-  double sum = size.num_parameters * std::log(4.0 * num_matches);
-  for (std::size_t i = 0; i < estimator.num_data(); ++i) {
-    const double cost = estimator.squared_error(fit->model, i) + size.dimension * per_dimension;
-    sum += cost < outlier_cost ? cost : outlier_cost;
-  }
-  return sum;
-}
-
-struct Fits {
-  Fit essential, homography, rotation;
-  TwoViewModel best = TwoViewModel::kScene;
-  std::size_t num_inliers = 0;  // of the best
-};
-
-Fits fit_models(const BearingMatches& matches, const TwoViewOptions& options) {
-  const EssentialEstimator essential(matches);
-  const HomographyEstimator homography(matches);
-  const RotationEstimator rotation(matches);
-  RansacOptions ransac_options{
-      .seed = options.seed, .stream = options.stream, .min_inlier_ratio = kMinInlierRatio};
-  Fits fits;
-  fits.essential = ransac(essential, ransac_options);
-  if (fits.essential) {
-    // A model of less support than this would lose to the essential matrix anyway.
-    const double support = static_cast<double>(fits.essential->inliers.size());
-    ransac_options.min_inlier_ratio =
-        std::max(kMinInlierRatio, 0.8 * support / static_cast<double>(matches.size()));
-  }
-  fits.homography = ransac(homography, ransac_options);
-  fits.rotation = ransac(rotation, ransac_options);
-
-  const double scene_cost = gric(essential, fits.essential, {3, 5});
-  const double plane_cost = gric(homography, fits.homography, {2, 8});
-  const double rotation_cost = gric(rotation, fits.rotation, {2, 3});
-  const Fit* best = &fits.essential;
-  if (plane_cost < scene_cost) {
-    fits.best = TwoViewModel::kPlane;
-    best = &fits.homography;
-  }
-  if (rotation_cost < std::min(scene_cost, plane_cost)) {
-    fits.best = TwoViewModel::kRotation;
-    best = &fits.rotation;
-  }
-  if (*best) fits.num_inliers = (*best)->inliers.size();
-  return fits;
 }
 
 // --- Which motion ---
@@ -138,17 +71,16 @@ Candidate make_candidate(const Rigid3& b_from_a, const BearingMatches& matches) 
   return candidate;
 }
 
-Rigid3 refine(const Rigid3& b_from_a, const BearingMatches& matches, double first_scale) {
+// On all matches. The models are good enough to start from with a narrow loss.
+Rigid3 refine(const Rigid3& b_from_a, const BearingMatches& matches) {
   std::vector<std::uint32_t> all(matches.size());
   std::iota(all.begin(), all.end(), 0u);
   const Rigid3 start(b_from_a.rotation, b_from_a.translation.normalized());
-  return refine_relative_pose(
-      start, matches, all, {.first_scale = first_scale, .max_iterations = 15});
+  return refine_relative_pose(start, matches, all, {.first_scale = 3.0, .max_iterations = 15});
 }
 
 // Of the motions past a plane, those that have most of its points on the visible side.
-std::vector<Rigid3> visible_motions(const RansacResult<Eigen::Matrix3d>& homography,
-                                    const BearingMatches& matches) {
+std::vector<Rigid3> visible_motions(const TwoViewFit& homography, const BearingMatches& matches) {
   std::vector<Rigid3> motions;
   for (const PlanarMotion& motion : decompose_homography(homography.model)) {
     if (!(motion.b_from_a.translation.norm() > 0.0)) continue;
@@ -164,17 +96,17 @@ std::vector<Rigid3> visible_motions(const RansacResult<Eigen::Matrix3d>& homogra
 }
 
 // The motions that the matches allow, best first.
-std::vector<Candidate> find_candidates(const Fits& fits, const BearingMatches& matches) {
+std::vector<Candidate> find_candidates(const TwoViewModels& models, const BearingMatches& matches) {
   std::vector<Candidate> candidates;
-  if (fits.essential) {
-    const Rigid3 refined = refine(decompose_essential(fits.essential->model).front(), matches, 3.0);
+  if (models.essential) {
+    const Rigid3 refined = refine(decompose_essential(models.essential->model).front(), matches);
     for (const Rigid3& b_from_a : decompose_essential(essential_from_pose(refined))) {
       candidates.push_back(make_candidate(b_from_a, matches));
     }
   }
-  if (fits.homography && 2 * fits.homography->inliers.size() > fits.num_inliers) {
-    for (const Rigid3& motion : visible_motions(*fits.homography, matches)) {
-      candidates.push_back(make_candidate(refine(motion, matches, 8.0), matches));
+  if (models.homography && 2 * models.homography->inliers.size() > models.num_inliers) {
+    for (const Rigid3& motion : visible_motions(*models.homography, matches)) {
+      candidates.push_back(make_candidate(refine(motion, matches), matches));
     }
   }
   std::stable_sort(candidates.begin(), candidates.end(), [](const auto& a, const auto& b) {
@@ -184,8 +116,8 @@ std::vector<Candidate> find_candidates(const Fits& fits, const BearingMatches& m
 }
 
 bool is_same(const Rigid3& first, const Rigid3& second) {
-  return first.rotation.angularDistance(second.rotation) < kSameRotation_rad &&
-         angle_between(first.translation, second.translation) < kSameDirection_rad;
+  return first.rotation.angularDistance(second.rotation) < kSameRotationRad &&
+         angle_between(first.translation, second.translation) < kSameDirectionRad;
 }
 
 // Whether the matches prefer a candidate to its rival beyond chance: Vuong 1989 (Likelihood Ratio
@@ -226,7 +158,7 @@ bool is_determined(const Candidate& candidate, const BearingMatches& matches) {
       information.bottomRightCorner<2, 2>() - mixed.transpose() * of_rotation.inverse() * mixed;
   if (!of_direction.allFinite()) return false;
   const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> solver(of_direction, Eigen::EigenvaluesOnly);
-  return solver.eigenvalues()[0] * kMaxDirectionSigma_rad * kMaxDirectionSigma_rad > 1.0;
+  return solver.eigenvalues()[0] * kMaxDirectionSigmaRad * kMaxDirectionSigmaRad > 1.0;
 }
 
 // --- The points ---
@@ -317,17 +249,19 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
   if (num_matches < static_cast<std::size_t>(std::max(options.min_num_points, 5))) {
     return {TwoViewStatus::kTooFewMatches, std::nullopt};
   }
-  const Fits fits = fit_models(matches, options);
-  if (!has_support(fits.num_inliers, num_matches, options)) {
+  const TwoViewModels models = fit_two_view_models(
+      matches,
+      {.seed = options.seed, .stream = options.stream, .min_inlier_ratio = kMinInlierRatio});
+  if (!has_support(models.num_inliers, num_matches, options)) {
     return {TwoViewStatus::kTooFewInliers, std::nullopt};
   }
-  if (fits.best == TwoViewModel::kRotation) {
+  if (models.best == TwoViewModel::kRotation) {
     return {TwoViewStatus::kTooLittleParallax, std::nullopt};
   }
-  const std::vector<Candidate> candidates = find_candidates(fits, matches);
+  const std::vector<Candidate> candidates = find_candidates(models, matches);
   if (candidates.empty()) return {TwoViewStatus::kTooLittleParallax, std::nullopt};
 
-  TwoViewGeometry geometry = make_geometry(candidates.front(), fits.best, matches);
+  TwoViewGeometry geometry = make_geometry(candidates.front(), models.best, matches);
   const auto num_inliers = static_cast<std::size_t>(
       std::count(geometry.is_inlier.begin(), geometry.is_inlier.end(), std::uint8_t{1}));
   if (!has_support(num_inliers, num_matches, options)) {
@@ -337,7 +271,7 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
       !is_determined(candidates.front(), matches)) {
     return {TwoViewStatus::kTooLittleParallax, std::nullopt};
   }
-  if (is_ambiguous(candidates, fits.best)) return {TwoViewStatus::kAmbiguous, std::nullopt};
+  if (is_ambiguous(candidates, models.best)) return {TwoViewStatus::kAmbiguous, std::nullopt};
   return {TwoViewStatus::kOk, std::move(geometry)};
 }
 

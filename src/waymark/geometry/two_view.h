@@ -10,6 +10,7 @@
 
 #include "waymark/geometry/bearing.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/two_view_models.h"
 
 namespace waymark {
 
@@ -19,13 +20,6 @@ struct TwoViewOptions {
   /// Matches that must agree with the motion and see their point under min_parallax_rad or more.
   int min_num_points = 50;
   double min_parallax_rad = 0.0175;  ///< About 1 degree.
-};
-
-/// What the matches have in common.
-enum class TwoViewModel {
-  kScene,     ///< An essential matrix: points anywhere.
-  kPlane,     ///< A homography: points on one plane.
-  kRotation,  ///< Nothing but a rotation: no parallax.
 };
 
 enum class TwoViewStatus {

@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/geometry/two_view_models.h"
 
+#include <algorithm>
 #include <array>
+#include <cmath>
+#include <limits>
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/geometry/bearing.h"
@@ -29,6 +32,30 @@ std::vector<std::uint32_t> thin_out(std::span<const std::uint32_t> indices) {
   std::vector<std::uint32_t> result;
   for (std::size_t i = 0; i < indices.size(); i += stride) result.push_back(indices[i]);
   return result;
+}
+
+struct ModelSize {
+  int dimension;       // of the surface of all matches that fit, of 4 for any pair of directions
+  int num_parameters;  // of the model
+};
+
+// The geometric robust information criterion: the sum over the matches of squared error +
+// dimension * log 4, plus log(4 n) per parameter (Torr 1998, Geometric Motion Segmentation and
+// Model Selection). A match costs no more than an outlier, which here is the same for each model
+// (that of the essential matrix at its threshold): otherwise outliers would vote for the model that
+// calls more of them so.
+template <class Estimator>
+double gric(const Estimator& estimator, const std::optional<TwoViewFit>& fit, ModelSize size) {
+  if (!fit) return std::numeric_limits<double>::infinity();
+  const double per_dimension = std::log(4.0);
+  const double outlier_cost = EssentialEstimator::kMaxSquaredError + 3.0 * per_dimension;
+  const double num_matches = static_cast<double>(estimator.num_data());
+  double sum = size.num_parameters * std::log(4.0 * num_matches);
+  for (std::size_t i = 0; i < estimator.num_data(); ++i) {
+    const double cost = estimator.squared_error(fit->model, i) + size.dimension * per_dimension;
+    sum += cost < outlier_cost ? cost : outlier_cost;
+  }
+  return sum;
 }
 
 }  // namespace
@@ -103,6 +130,37 @@ std::optional<Eigen::Matrix3d> RotationEstimator::refine(
 double RotationEstimator::variance(std::size_t index) const {
   return matches_.sigmas_rad_a[index] * matches_.sigmas_rad_a[index] +
          matches_.sigmas_rad_b[index] * matches_.sigmas_rad_b[index];
+}
+
+TwoViewModels fit_two_view_models(const BearingMatches& matches, RansacOptions options) {
+  const EssentialEstimator essential(matches);
+  const HomographyEstimator homography(matches);
+  const RotationEstimator rotation(matches);
+  TwoViewModels models;
+  models.essential = ransac(essential, options);
+  if (models.essential) {
+    // A model of less support than this would lose to the essential matrix anyway.
+    const double support = static_cast<double>(models.essential->inliers.size());
+    options.min_inlier_ratio =
+        std::max(options.min_inlier_ratio, 0.8 * support / static_cast<double>(matches.size()));
+  }
+  models.homography = ransac(homography, options);
+  models.rotation = ransac(rotation, options);
+
+  const double scene_cost = gric(essential, models.essential, {3, 5});
+  const double plane_cost = gric(homography, models.homography, {2, 8});
+  const double rotation_cost = gric(rotation, models.rotation, {2, 3});
+  const std::optional<TwoViewFit>* best = &models.essential;
+  if (plane_cost < scene_cost) {
+    models.best = TwoViewModel::kPlane;
+    best = &models.homography;
+  }
+  if (rotation_cost < std::min(scene_cost, plane_cost)) {
+    models.best = TwoViewModel::kRotation;
+    best = &models.rotation;
+  }
+  if (*best) models.num_inliers = (*best)->inliers.size();
+  return models;
 }
 
 }  // namespace waymark

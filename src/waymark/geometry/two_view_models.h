@@ -10,12 +10,19 @@
 #include <vector>
 
 #include "waymark/geometry/bearing.h"
+#include "waymark/geometry/ransac.h"
 
 namespace waymark {
 
-/// The three things two views of a rigid scene can have in common, as estimators for ransac().
-/// Each keeps a view of the matches. Thresholds are the 95 % quantiles of chi-squared of 1 and 2
-/// degrees of freedom.
+/// What the matches of two views have in common.
+enum class TwoViewModel {
+  kScene,     ///< An essential matrix: points anywhere.
+  kPlane,     ///< A homography: points on one plane.
+  kRotation,  ///< Nothing but a rotation: no parallax.
+};
+
+// The three models as estimators for ransac(). Each keeps a view of the matches. Thresholds are the
+// 95 % quantiles of chi-squared of 1 and 2 degrees of freedom.
 
 /// Essential matrices of any scene seen from two places.
 class EssentialEstimator {
@@ -72,5 +79,16 @@ class RotationEstimator {
 
   BearingMatches matches_;
 };
+
+using TwoViewFit = RansacResult<Eigen::Matrix3d>;
+
+struct TwoViewModels {
+  std::optional<TwoViewFit> essential, homography, rotation;
+  TwoViewModel best = TwoViewModel::kScene;
+  std::size_t num_inliers = 0;  ///< Of the best.
+};
+
+/// Fits the three models by ransac() and chooses between them by GRIC (Torr 1998).
+TwoViewModels fit_two_view_models(const BearingMatches& matches, RansacOptions options);
 
 }  // namespace waymark

@@ -138,6 +138,30 @@ TEST(TwoView, FewMatches) {
   expect_accurate(summary, 0.006, 0.04);
 }
 
+TEST(TwoView, HalfOfManyMatchesWrong) {
+  const Summary summary = run_trials(15, [](Rng& rng) {
+    const Rigid3 b_from_a(small_rotation(rng), 0.6 * random_direction(rng));
+    return make_scene(b_from_a, View{}, 1000, kSigma, 0.5, rng, points_in_view(View{}, 2, 8));
+  });
+  expect_accurate(summary, 0.004, 0.03);
+}
+
+// Real noise is never quite what the caller says.
+TEST(TwoView, NoiseOffByAFactorOfTwo) {
+  for (const double factor : {0.5, 2.0}) {
+    const Summary summary = run_trials(16, [&](Rng& rng) {
+      const Rigid3 b_from_a(small_rotation(rng), {0.4, 0.0, 0.2});
+      TwoViewScene scene =
+          make_scene(b_from_a, View{}, 400, kSigma, 0.3, rng, points_in_view(View{}, 2, 8));
+      for (double& sigma : scene.sigmas_rad_a) sigma *= factor;
+      for (double& sigma : scene.sigmas_rad_b) sigma *= factor;
+      return scene;
+    });
+    EXPECT_GE(summary.num_ok, kTrials - 1);
+    EXPECT_EQ(summary.num_wrong, 0);
+  }
+}
+
 // A camera that looks down and moves along the plane: the false motion puts half of it behind.
 TEST(TwoView, PlaneSeenAcrossTheMotion) {
   const Summary summary = run_trials(5, [](Rng& rng) {
