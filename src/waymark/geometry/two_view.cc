@@ -32,11 +32,9 @@ constexpr double kSameDirectionRad = 0.1;
 // With a standard deviation of the direction of motion above this, the motion is not known.
 constexpr double kMaxDirectionSigmaRad = 0.1;
 // A rival is rejected if it is less likely by a factor of exp(10 / 2) and, since a few wrong
-// matches can do that by chance, by so many standard deviations of the difference. On a plane
-// nothing but chance tells two motions apart, unless one of them puts points behind a view.
+// matches can do that by chance, by so many standard deviations of the difference.
 constexpr double kMinCostGap = 10.0;
-constexpr double kMinVuongSigmas = 2.5;
-constexpr double kMinVuongSigmasOnPlane = 3.5;
+constexpr double kMinVuongSigmas = 3.0;
 
 double parallax_sigma_rad(const BearingMatches& matches, std::size_t index) {
   return std::hypot(matches.sigmas_rad_a[index], matches.sigmas_rad_b[index]);
@@ -122,9 +120,7 @@ bool is_same(const Rigid3& first, const Rigid3& second) {
 
 // Whether the matches prefer a candidate to its rival beyond chance: Vuong 1989 (Likelihood Ratio
 // Tests for Model Selection and Non-nested Hypotheses), costs being -2 log likelihoods.
-bool is_significantly_better(const Candidate& candidate,
-                             const Candidate& rival,
-                             double min_sigmas) {
+bool is_significantly_better(const Candidate& candidate, const Candidate& rival) {
   double sum = 0.0;
   double sum_of_squares = 0.0;
   for (std::size_t i = 0; i < candidate.match_costs.size(); ++i) {
@@ -132,16 +128,13 @@ bool is_significantly_better(const Candidate& candidate,
     sum += difference;
     sum_of_squares += difference * difference;
   }
-  return sum > kMinCostGap && sum > min_sigmas * std::sqrt(sum_of_squares);
+  return sum > kMinCostGap && sum > kMinVuongSigmas * std::sqrt(sum_of_squares);
 }
 
-bool is_ambiguous(const std::vector<Candidate>& candidates, TwoViewModel model) {
-  const double min_sigmas =
-      model == TwoViewModel::kPlane ? kMinVuongSigmasOnPlane : kMinVuongSigmas;
+bool is_ambiguous(const std::vector<Candidate>& candidates) {
   const Candidate& best = candidates.front();
   return std::any_of(candidates.begin() + 1, candidates.end(), [&](const Candidate& rival) {
-    return !is_same(best.b_from_a, rival.b_from_a) &&
-           !is_significantly_better(best, rival, min_sigmas);
+    return !is_same(best.b_from_a, rival.b_from_a) && !is_significantly_better(best, rival);
   });
 }
 
@@ -271,7 +264,7 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
       !is_determined(candidates.front(), matches)) {
     return {TwoViewStatus::kTooLittleParallax, std::nullopt};
   }
-  if (is_ambiguous(candidates, models.best)) return {TwoViewStatus::kAmbiguous, std::nullopt};
+  if (is_ambiguous(candidates)) return {TwoViewStatus::kAmbiguous, std::nullopt};
   return {TwoViewStatus::kOk, std::move(geometry)};
 }
 
