@@ -184,6 +184,13 @@ Renderer::Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Cam
   centre_bearings_ = tabulate(*camera_, width, height, 0.0);
 }
 
+double Renderer::pixel_rad() const {
+  const std::size_t width = static_cast<std::size_t>(camera_->width_px());
+  const std::size_t middle = (centre_bearings_.size() / width / 2) * width + width / 2;
+  const Vector3d& bearing = centre_bearings_[middle];
+  return bearing.cross(centre_bearings_[middle - 1]).norm();
+}
+
 template <class Body>
 void Renderer::for_tiles(ThreadPool& pool, Body body) const {
   const int width = camera_->width_px();

@@ -30,6 +30,9 @@ class Renderer {
   /// rounded; 0 where there is none, or it is behind the camera or above 65535.
   DepthImage depth(const Rigid3& world_from_cam, double units_per_metre, ThreadPool& pool) const;
 
+  /// Angle between neighbouring pixels in the middle of the image.
+  double pixel_rad() const;
+
   const World& world() const { return *world_; }
   const Camera& camera() const { return *camera_; }
 

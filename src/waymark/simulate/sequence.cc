@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/simulate/sequence.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
@@ -10,8 +11,17 @@
 namespace waymark {
 namespace {
 
-/// Renderings per exposure that make motion blur.
-constexpr int kSubExposures = 5;
+/// Motion blur is the mean of renderings no more than about a pixel apart, as seen at this
+/// distance; of so many at most.
+constexpr double kBlurDistanceM = 3.0;
+constexpr int kMaxSubExposures = 9;
+
+int num_sub_exposures(const Rigid3& begin, const Rigid3& end, double pixel_rad) {
+  const double turn = begin.rotation.angularDistance(end.rotation);
+  const double shift = (end.translation - begin.translation).norm() / kBlurDistanceM;
+  const double blur_px = (turn + shift) / pixel_rad;
+  return std::clamp(static_cast<int>(std::ceil(blur_px - 1e-6)), 1, kMaxSubExposures);
+}
 
 /// Streams of random numbers of a frame: one for each camera's image, one for depth.
 constexpr std::uint64_t kStreamsPerFrame = 64;
@@ -77,18 +87,22 @@ const ImageEffects& SimulatedSequence::effects_of(int index) const {
 Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
   const Renderer& renderer = renderers_[camera];
   const Rigid3 rig_from_cam = rig_.cameras[camera].cam_from_rig.inverse();
-  if (effects.exposure_s <= 0.0)
-    return renderer.image(world_from_rig(index) * rig_from_cam, *pool_);
+  const double middle = seconds(index);
+  const double half = 0.5 * effects.exposure_s;
+  const int count = num_sub_exposures(motion_.world_from_rig(middle - half),
+                                      motion_.world_from_rig(middle + half),
+                                      renderer.pixel_rad());
+  if (count == 1) return renderer.image(world_from_rig(index) * rig_from_cam, *pool_);
   std::vector<int> sums;
   Image image;
-  for (int k = 0; k < kSubExposures; ++k) {
-    const double offset = effects.exposure_s * ((k + 0.5) / kSubExposures - 0.5);
-    image = renderer.image(motion_.world_from_rig(seconds(index) + offset) * rig_from_cam, *pool_);
+  for (int k = 0; k < count; ++k) {
+    const double time = middle + effects.exposure_s * ((k + 0.5) / count - 0.5);
+    image = renderer.image(motion_.world_from_rig(time) * rig_from_cam, *pool_);
     sums.resize(image.values.size(), 0);
     for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += image.values[i];
   }
   for (std::size_t i = 0; i < sums.size(); ++i) {
-    image.values[i] = static_cast<std::uint8_t>((sums[i] + kSubExposures / 2) / kSubExposures);
+    image.values[i] = static_cast<std::uint8_t>((sums[i] + count / 2) / count);
   }
   return image;
 }
