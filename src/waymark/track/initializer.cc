@@ -21,8 +21,6 @@ constexpr std::uint32_t kReferenceInterval = 3;
 /// points are then known to a tenth of their depth and the pair to much better.
 constexpr double kMinParallaxPx = 12.0;
 constexpr double kSearchRadiusPx = 60.0;
-/// Points nearer or farther than this, in baselines of the pair, carry little.
-constexpr double kMaxDepthBaselines = 200.0;
 
 std::vector<Eigen::Vector2f> pixels_of(const Features& features) {
   std::vector<Eigen::Vector2f> pixels;
