@@ -42,8 +42,9 @@ std::optional<Image> to_grey(const cv::Mat& mat) {
 class VideoReader {
  public:
   explicit VideoReader(const std::filesystem::path& path) {
+    // Not CAP_ANY: given a file that is no video, it goes on to look for cameras.
     try {
-      if (!capture_.open(path.string(), cv::CAP_FFMPEG)) capture_.open(path.string(), cv::CAP_ANY);
+      capture_.open(path.string(), cv::CAP_FFMPEG);
     } catch (const cv::Exception&) {
       capture_.release();
     }
