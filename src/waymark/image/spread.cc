@@ -25,10 +25,6 @@ constexpr double kMinCellPx = 1.0;
 constexpr double kTolerance = 0.05;
 constexpr int kMaxTrials = 8;
 
-// Part of the widest possible distance between corners that is kept. Of 1000 features, two frames
-// apart, 38 % more are found again than with all of it (docs/decisions.md).
-constexpr double kKeptDistance = 0.5;
-
 // Size of the first cell and its growth, relative to the side of the area per corner.
 constexpr double kFirstGuess = 0.4;
 constexpr double kGrowth = 1.25;
@@ -119,7 +115,7 @@ void SpreadSelector::search(int width_px, int height_px, std::size_t count) {
     const std::size_t remaining = suppress(cell, width_px, height_px, limit);
     if (remaining >= count) {
       std::swap(best_, taken_);
-      if (remaining < limit) return prefer_strength(cell, width_px, height_px, count);
+      if (remaining < limit) return;
       low = cell;
       cell = std::min(cell * kGrowth, std::sqrt(low * high));
     } else {
@@ -128,17 +124,6 @@ void SpreadSelector::search(int width_px, int height_px, std::size_t count) {
       if (cell <= low) cell = std::sqrt(low * high);
     }
   }
-}
-
-// Takes the strongest corners that keep part of the distance that the widest squares would: which
-// of two neighbours of like strength wins changes from image to image, so wide squares make
-// features that are not found again.
-void SpreadSelector::prefer_strength(double cell_px,
-                                     int width_px,
-                                     int height_px,
-                                     std::size_t count) {
-  const double kept_px = std::max(kMinCellPx, kKeptDistance * cell_px);
-  if (suppress(kept_px, width_px, height_px, count) >= count) std::swap(best_, taken_);
 }
 
 // Makes best_ count corners: drops its weakest, or adds the strongest that it lacks.

@@ -21,8 +21,8 @@ LevelCounts share_among_levels(int count, const LevelCounts& available);
 
 /// Chooses strong corners that are spread evenly over an image: suppression via square covering
 /// (Bailo et al. 2018, section 3.3). Going from strong to weak, a corner is taken unless it lies
-/// in the square around one that was. The size of the squares at which count corners remain is
-/// searched; squares of half that size then choose the strongest. Keeps its buffers.
+/// in the square around one that was; the size of the squares is searched such that count corners
+/// remain. Keeps its buffers.
 class SpreadSelector {
  public:
   /// Makes room for any corners of images up to this size, so that select() allocates nothing.
@@ -41,7 +41,6 @@ class SpreadSelector {
   void sort_by_score(std::span<const Corner> corners);
   std::size_t suppress(double cell_px, int width_px, int height_px, std::size_t limit);
   void search(int width_px, int height_px, std::size_t count);
-  void prefer_strength(double cell_px, int width_px, int height_px, std::size_t count);
   void adjust(std::size_t count);
 
   std::size_t num_sorted_ = 0;

@@ -47,6 +47,9 @@ class System::Impl {
         mapper_(rig_, settings.mapping),
         feed_(timing, 0),
         inbox_(kInboxCapacity) {
+    if (timing_ == Timing::kRealtime) {
+      throw InputError("timing", "realtime is not supported yet, expected inline or lockstep");
+    }
     if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run_mapper(); });
   }
 
@@ -129,7 +132,10 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
 }
 
 void System::Impl::remember(const Frame& frame, const TrackOutcome& outcome) {
-  memory_.push_back({frame.timestamp_ns, outcome.state, outcome.pose.value_or(RelativePose{})});
+  RelativePose pose = outcome.pose.value_or(RelativePose{});
+  // A keyframe is its own reference, so that it moves as the map moves it.
+  if (outcome.keyframe) pose = {*outcome.keyframe, Rigid3{}, pose.reference_scale};
+  memory_.push_back({frame.timestamp_ns, outcome.state, pose});
   for (const FilledPose& filled : outcome.filled) {
     memory_.at(filled.frame.value).state = FrameState::kFilled;
     memory_.at(filled.frame.value).pose = filled.pose;

@@ -65,7 +65,8 @@ struct SystemStatistics {
 /// kInline. kInline and kLockstep give the same bits.
 class System {
  public:
-  /// Throws InputError for a rig or settings that cannot work together.
+  /// Throws InputError for a rig or settings that cannot work together, and for kRealtime, which is
+  /// not supported yet.
   System(Rig rig, const Settings& settings, Timing timing);
   ~System();
   System(const System&) = delete;

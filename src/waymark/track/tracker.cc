@@ -210,6 +210,7 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
                               reference.applied_scale};
   if (should_make_keyframe(assess(frame, located), settings_)) {
     outcome.message = make_keyframe(frame, *outcome.pose);
+    outcome.keyframe = KeyframeId{num_sent_ - 1};
   }
   return outcome;
 }

@@ -31,6 +31,7 @@ struct TrackOutcome {
   int num_matches = 0;
   int num_inliers = 0;
   std::optional<MapperMessage> message;  ///< For the mapper; a frame with a message is a keyframe.
+  std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
   std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
 };
 
