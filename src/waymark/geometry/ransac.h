@@ -53,7 +53,7 @@ struct RansacOptions {
   std::uint64_t stream = 0;   ///< For example the frame: same seed and stream, same result.
   double confidence = 0.999;  ///< Of having drawn one sample without outliers.
   /// Models with a smaller share of inliers need not be found: this limits the iterations.
-  double min_inlier_ratio = 0.35;
+  double min_inlier_ratio = 0.4;
 };
 
 template <class Model>

@@ -21,7 +21,7 @@ namespace {
 // The cost of a match that contradicts a motion, in squared standard deviations.
 constexpr double kOutlierCost = EssentialEstimator::kMaxSquaredError;
 // With less support than this share of the matches, agreement may be chance.
-constexpr double kMinInlierRatio = 0.3;
+constexpr double kMinInlierRatio = 0.4;
 // Parallax in standard deviations from which a point counts as behind, and angles of its triangle
 // from which it counts as a point.
 constexpr double kBehindSigmas = 3.0;
