@@ -164,7 +164,7 @@ TEST(System, FinishesTwiceAndThenTakesNoFrames) {
 }
 
 TEST(System, FinishesWithoutAnyFrame) {
-  System system(small_rig(), small_settings(), Timing::kRealtime);
+  System system(small_rig(), small_settings(), Timing::kLockstep);
   system.finish();
   EXPECT_TRUE(system.trajectory().empty());
   EXPECT_EQ(system.statistics().num_submaps, 0);
