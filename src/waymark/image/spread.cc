@@ -157,7 +157,9 @@ void SpreadSelector::select(std::span<const Corner> corners,
     selected.assign(corners.begin(), corners.end());
   } else {
     sort_by_score(corners);
-    search(width_px, height_px, wanted);
+    const std::size_t num_covering = (wanted + 1) / 2;
+    search(width_px, height_px, num_covering);
+    adjust(num_covering);
     adjust(wanted);
     for (std::uint32_t i : best_) selected.push_back(sorted_[i]);
   }

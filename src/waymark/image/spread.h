@@ -21,8 +21,10 @@ LevelCounts share_among_levels(int count, const LevelCounts& available);
 
 /// Chooses strong corners that are spread evenly over an image: suppression via square covering
 /// (Bailo et al. 2018, section 3.3). Going from strong to weak, a corner is taken unless it lies
-/// in the square around one that was; the size of the squares is searched such that count corners
-/// remain. Keeps its buffers.
+/// in the square around one that was; the size of the squares is searched such that half of the
+/// count remains. The other half are the strongest corners left: which of two neighbours of like
+/// strength wins changes from image to image, so spacing alone chooses corners that are not found
+/// again (docs/decisions.md). Keeps its buffers.
 class SpreadSelector {
  public:
   /// Makes room for any corners of images up to this size, so that select() allocates nothing.
