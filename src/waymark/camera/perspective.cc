@@ -14,8 +14,10 @@ namespace {
 // The field of view ends where an angle is compressed to less than this part of what it covers in
 // the centre: closer to the fold a pixel says nothing about its direction.
 constexpr double kMinSlope = 0.05;
-// No lens covers more than this, and it keeps the polynomials within range (89.994 degrees).
-constexpr double kLargestRadius = 1e4;
+// Tangent of 80 degrees, where a distorted perspective camera's field of view ends at the latest:
+// the tangential terms grow with the squared radius and would fold farther points back into the
+// image, though the radial ones do not.
+constexpr double kLargestRadius = 5.67;
 // In squared units of the focal length. Newton's step squares the error, so that the step taken
 // with this residual is the last that changes anything.
 constexpr double kLastStepResidual = 1e-15;
