@@ -169,7 +169,9 @@ World make_hall(std::uint64_t seed) {
   builder.add_room({{0.0, 0.0, 0.0}, {24.0, 16.0, 7.0}}, {}, Style::kWall);
   for (const double x : {6.0, 12.0, 18.0}) {
     builder.add_cylinder({x, 8.0, 0.0}, 0.35, 7.0, Style::kMetal);
-    add_crates(builder, {x + 1.2, 8.0 + rng.uniform(-0.4, 0.4), 0.0}, rng.uniform(0.8, 1.2), rng);
+    const double side = rng.uniform(0.8, 1.2);
+    const double y = 8.0 + rng.uniform(-0.4, 0.4);
+    add_crates(builder, {x + 1.2, y, 0.0}, side, rng);
   }
   for (const double y : {1.2, 14.8}) {
     for (double x = 2.5; x < 22.5; x += rng.uniform(2.2, 3.4)) {
