@@ -7,6 +7,8 @@
 #include <cmath>
 #include <functional>
 
+#include "waymark/image/allocation_count.h"
+
 namespace waymark {
 namespace {
 
@@ -93,6 +95,19 @@ TEST(Depth, KeypointsAtTheBorderAreSafe) {
       EXPECT_NEAR(measure(image, x_px, y_px).range_m, 2.0f, 1e-3f);
     }
   }
+}
+
+TEST(Depth, AllocatesNothingOnceWarm) {
+  const DepthImage slanted = depth_image([](int x, int y) { return 1.0 + 0.01 * x + 0.02 * y; });
+  const std::vector<Keypoint> keypoints(50, {.x_px = 20.3f, .y_px = 17.8f});
+  const std::vector<Eigen::Vector3f> bearings(50, Eigen::Vector3f::UnitZ());
+  std::vector<float> range_m;
+  std::vector<float> sigma;
+  sample_depth(slanted.view(), {.factor = kFactor}, keypoints, bearings, range_m, sigma);
+  const long before = testing::num_allocations();
+  sample_depth(slanted.view(), {.factor = kFactor}, keypoints, bearings, range_m, sigma);
+  EXPECT_EQ(testing::num_allocations() - before, 0);
+  EXPECT_GT(range_m[49], 1.0f);
 }
 
 }  // namespace
