@@ -4,13 +4,11 @@
 
 #include <algorithm>
 #include <chrono>
-#include <thread>
 
 #include "waymark/base/check.h"
-#include "waymark/base/feed.h"
-#include "waymark/base/mailbox.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/mapping/mapper.h"
+#include "waymark/system/map_worker.h"
 #include "waymark/track/tracker.h"
 
 namespace waymark {
@@ -23,13 +21,12 @@ struct FrameMemory {
   RelativePose pose;  ///< Where state is kTracked or kFilled.
 };
 
-/// A message and the frame from which on the tracker sees its effect.
-struct Delivery {
-  FrameId visible_from;
-  MapperMessage message;
-};
-
-constexpr std::size_t kInboxCapacity = 8;
+Timing checked(Timing timing) {
+  if (timing == Timing::kRealtime) {
+    throw InputError("timing", "realtime is not supported yet, expected inline or lockstep");
+  }
+  return timing;
+}
 
 bool has_pose(FrameState state) {
   return state == FrameState::kTracked || state == FrameState::kFilled;
@@ -42,18 +39,10 @@ class System::Impl {
   Impl(Rig rig, const Settings& settings, Timing timing)
       : rig_(std::make_shared<const Rig>(std::move(rig))),
         settings_(settings),
-        timing_(timing),
+        timing_(checked(timing)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth}),
         mapper_(rig_, settings.mapping),
-        feed_(timing, 0),
-        inbox_(kInboxCapacity) {
-    if (timing_ == Timing::kRealtime) {
-      throw InputError("timing", "realtime is not supported yet, expected inline or lockstep");
-    }
-    if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run_mapper(); });
-  }
-
-  ~Impl() { stop_mapper(); }
+        worker_(timing, [this](const MapperMessage& message) { return process(message); }) {}
 
   TrackingResult feed(const FrameInput& input);
   void finish();
@@ -64,9 +53,7 @@ class System::Impl {
 
  private:
   void send(FrameId frame, MapperMessage message);
-  void process(Delivery delivery);
-  void run_mapper();
-  void stop_mapper();
+  std::shared_ptr<const Map> process(const MapperMessage& message);
   void remember(const Frame& frame, const TrackOutcome& outcome);
 
   // Fixed after construction.
@@ -85,10 +72,8 @@ class System::Impl {
   Mapper mapper_;
   std::vector<double> mapping_ms_;
 
-  // Shared, safe by themselves.
-  Feed<Map> feed_;
-  Mailbox<Delivery> inbox_;
-  std::jthread thread_;
+  // Between the two; last, so that its thread ends before what it works on.
+  MapWorker worker_;
 };
 
 TrackingResult System::Impl::feed(const FrameInput& input) {
@@ -111,7 +96,7 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   }
   {
     StageTimer timer(result.stages, Stage::kWait);
-    if (auto map = feed_.for_frame(id)) visible_map_ = std::move(map);
+    if (auto map = worker_.for_frame(id)) visible_map_ = std::move(map);
   }
   TrackOutcome outcome = tracker_->track(frame, visible_map_, result.stages);
   remember(frame, outcome);
@@ -146,42 +131,21 @@ void System::Impl::send(FrameId frame, MapperMessage message) {
   // A new sub-map is what the next frame is tracked in; a keyframe shows its effect later.
   const bool is_submap = std::holds_alternative<NewSubmap>(message);
   const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
-  Delivery delivery{FrameId{frame.value + latency}, std::move(message)};
-  feed_.expect(delivery.visible_from);
-  if (timing_ == Timing::kInline) {
-    process(std::move(delivery));
-  } else {
-    inbox_.push(std::move(delivery));
-  }
+  worker_.send(FrameId{frame.value + latency}, std::move(message));
 }
 
-void System::Impl::process(Delivery delivery) {
+std::shared_ptr<const Map> System::Impl::process(const MapperMessage& message) {
   const auto start = std::chrono::steady_clock::now();
-  std::visit([&](const auto& message) { mapper_.add(message); }, delivery.message);
+  std::visit([&](const auto& content) { mapper_.add(content); }, message);
   mapping_ms_.push_back(
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  feed_.publish(delivery.visible_from, mapper_.freeze());
-}
-
-void System::Impl::run_mapper() {
-  try {
-    while (auto delivery = inbox_.pop()) process(std::move(*delivery));
-  } catch (...) {
-    inbox_.close();
-    feed_.fail(std::current_exception());
-  }
-}
-
-void System::Impl::stop_mapper() {
-  inbox_.close();
-  if (thread_.joinable()) thread_.join();
+  return mapper_.freeze();
 }
 
 void System::Impl::finish() {
   if (is_finished_) return;
   is_finished_ = true;
-  stop_mapper();
-  feed_.for_frame(FrameId{UINT32_MAX - 1});  // Rethrows what failed in the mapper's thread.
+  worker_.finish();
   mapper_.refine_globally();
   visible_map_ = mapper_.freeze();
 }

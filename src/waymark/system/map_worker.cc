@@ -1,0 +1,56 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/map_worker.h"
+
+#include <utility>
+
+namespace waymark {
+namespace {
+
+constexpr std::size_t kInboxCapacity = 8;
+
+}  // namespace
+
+MapWorker::MapWorker(Timing timing, Work work)
+    : timing_(timing), work_(std::move(work)), feed_(timing, 0), inbox_(kInboxCapacity) {
+  if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run(); });
+}
+
+MapWorker::~MapWorker() { stop(); }
+
+void MapWorker::send(FrameId visible_from, MapperMessage message) {
+  feed_.expect(visible_from);
+  Delivery delivery{visible_from, std::move(message)};
+  if (timing_ == Timing::kInline) {
+    process(delivery);
+  } else {
+    inbox_.push(std::move(delivery));  // Refused only after a failure, which for_frame() tells.
+  }
+}
+
+std::shared_ptr<const Map> MapWorker::for_frame(FrameId frame) { return feed_.for_frame(frame); }
+
+void MapWorker::finish() {
+  stop();
+  feed_.for_frame(FrameId{UINT32_MAX - 1});  // Rethrows what failed in the thread.
+}
+
+void MapWorker::process(const Delivery& delivery) {
+  feed_.publish(delivery.visible_from, work_(delivery.message));
+}
+
+void MapWorker::run() {
+  try {
+    while (const auto delivery = inbox_.pop()) process(*delivery);
+  } catch (...) {
+    inbox_.close();
+    feed_.fail(std::current_exception());
+  }
+}
+
+void MapWorker::stop() {
+  inbox_.close();
+  if (thread_.joinable()) thread_.join();
+}
+
+}  // namespace waymark
