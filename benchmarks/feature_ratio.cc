@@ -3,6 +3,7 @@
 //
 // Time of our feature extractor relative to cv::ORB on the images of a folder:
 //   waymark_feature_ratio FOLDER [COUNT [MAX_IMAGES]]
+// Of more than MAX_IMAGES as many are used, evenly spread.
 // Both work on each image in turn, on one thread. Times are those that the thread had the
 // processor, so that other load on the machine hits neither, or both alike.
 
@@ -50,6 +51,14 @@ std::vector<std::filesystem::path> list_images(const std::filesystem::path& fold
   return paths;
 }
 
+std::vector<std::filesystem::path> spread(const std::vector<std::filesystem::path>& all,
+                                          std::size_t max_count) {
+  if (all.size() <= max_count) return all;
+  std::vector<std::filesystem::path> chosen;
+  for (std::size_t i = 0; i < max_count; ++i) chosen.push_back(all[i * all.size() / max_count]);
+  return chosen;
+}
+
 nlohmann::json measure(const std::vector<std::filesystem::path>& paths, int count) {
   waymark::FeatureExtractor ours({.count = count});
   const cv::Ptr<cv::ORB> theirs = cv::ORB::create(count, 1.2f, 8);
@@ -89,7 +98,7 @@ int main(int argc, char** argv) {
     cv::setNumThreads(1);
     std::vector<std::filesystem::path> paths = list_images(argv[1]);
     const int count = argc > 2 ? std::stoi(argv[2]) : 1000;
-    if (argc > 3) paths.resize(std::min(paths.size(), std::stoul(argv[3])));
+    if (argc > 3) paths = spread(paths, std::stoul(argv[3]));
     if (paths.empty()) throw std::runtime_error(std::string(argv[1]) + ": no PNG images");
     std::cout << measure(paths, count).dump(2) << "\n";
   } catch (const std::exception& error) {

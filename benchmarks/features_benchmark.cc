@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// Feature extraction, ours and cv::ORB, on the same images: those in the folder WAYMARK_IMAGES
-// (PNG), else one of synthetic texture.
+// Feature extraction, ours and cv::ORB, on the same images: the first of euroc_mh01_stereo in the
+// folder WAYMARK_DATA, else one of synthetic texture.
 
 #include <benchmark/benchmark.h>
 
@@ -33,19 +33,25 @@ cv::Mat make_texture() {
   return image;
 }
 
+std::vector<std::filesystem::path> recorded_images() {
+  const char* data = std::getenv("WAYMARK_DATA");
+  if (data == nullptr) return {};
+  const auto folder = std::filesystem::path(data) / "euroc_mh01_stereo/mav0/cam0/data";
+  if (!std::filesystem::is_directory(folder)) return {};
+  std::vector<std::filesystem::path> paths;
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    if (entry.path().extension() == ".png") paths.push_back(entry.path());
+  }
+  std::sort(paths.begin(), paths.end());
+  paths.resize(std::min(paths.size(), kMaxImages));
+  return paths;
+}
+
 const std::vector<cv::Mat>& images() {
   static const std::vector<cv::Mat> all = [] {
     std::vector<cv::Mat> loaded;
-    if (const char* folder = std::getenv("WAYMARK_IMAGES")) {
-      std::vector<std::filesystem::path> paths;
-      for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-        if (entry.path().extension() == ".png") paths.push_back(entry.path());
-      }
-      std::sort(paths.begin(), paths.end());
-      paths.resize(std::min(paths.size(), kMaxImages));
-      for (const auto& path : paths) {
-        loaded.push_back(cv::imread(path.string(), cv::IMREAD_GRAYSCALE));
-      }
+    for (const std::filesystem::path& path : recorded_images()) {
+      loaded.push_back(cv::imread(path.string(), cv::IMREAD_GRAYSCALE));
     }
     if (loaded.empty()) loaded.push_back(make_texture());
     return loaded;
