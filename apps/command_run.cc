@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -11,6 +12,7 @@
 #include "choice_option.h"
 #include "commands.h"
 #include "interrupt.h"
+#include "paced_input.h"
 #include "reporter.h"
 #include "session.h"
 #include "session_options.h"
@@ -27,6 +29,7 @@ struct RunOptions {
   std::filesystem::path log;
   bool is_quiet = false;
   bool is_verbose = false;
+  double pace = 0.0;  ///< Times the input's own rate; 0: as fast as possible.
 
   Verbosity verbosity() const {
     if (is_quiet) return Verbosity::kQuiet;
@@ -75,19 +78,24 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             options.out.string()));
 }
 
-int run(const RunOptions& options) {
-  silence_image_library();
-  Reporter reporter(options.verbosity(), options.log);
+SessionResults map_input(Session& session, const RunOptions& options, Reporter& reporter) {
+  catch_interrupts();
+  const FrameObserver observer = report_frames(reporter, session.input->info());
+  if (options.pace > 0.0) {
+    PacedInput paced(*session.input, options.pace, is_interrupted);
+    return run_session(paced, *session.system, is_interrupted, observer);
+  }
+  return run_session(*session.input, *session.system, is_interrupted, observer);
+}
+
+int run(const RunOptions& options, Reporter& reporter) {
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
   make_output_folder(options.out);
 
-  catch_interrupts();
-  SessionResults results = run_session(*session.input,
-                                       *session.system,
-                                       is_interrupted,
-                                       report_frames(reporter, session.input->info()));
+  SessionResults results = map_input(session, options, reporter);
   reporter.finish_progress();
+  if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(session.input->info().setup);
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
@@ -97,6 +105,17 @@ int run(const RunOptions& options) {
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
 }
 
+int run_and_log(const RunOptions& options) {
+  silence_image_library();
+  Reporter reporter(options.verbosity(), options.log);
+  try {
+    return run(options, reporter);
+  } catch (const std::exception& error) {
+    reporter.failure(error.what());
+    throw;
+  }
+}
+
 void add_input_options(CLI::App& command, SessionOptions& options) {
   command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
       ->required();
@@ -104,11 +123,11 @@ void add_input_options(CLI::App& command, SessionOptions& options) {
       .add_option("-c,--config",
                   options.configs,
                   "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
-                  "files override")
+                  "files override [none]")
       ->allow_extra_args(false);
   command
       .add_option(
-          "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500")
+          "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500 [none]")
       ->allow_extra_args(false);
   command
       .add_option("--format",
@@ -121,15 +140,35 @@ void add_input_options(CLI::App& command, SessionOptions& options) {
       options.reading.setup,
       {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
       "mono, stereo or rgbd [all that INPUT offers]");
-  command.add_option("--first", options.reading.first, "Index of the first frame to use [0]")
+}
+
+/// Which part of the input, of the images, and how fast.
+void add_selection_options(CLI::App& command, RunOptions& options) {
+  InputOptions& reading = options.session.reading;
+  command.add_option("--first", reading.first, "Index of the first frame to use [0]")
       ->check(CLI::NonNegativeNumber);
-  command.add_option("--frames", options.reading.frames, "Use at most so many frames [all]")
+  command.add_option("--frames", reading.frames, "Use at most so many frames [all]")
       ->check(CLI::PositiveNumber);
-  command.add_option("--every", options.reading.every, "Use each N-th frame [1]")
+  command.add_option("--every", reading.every, "Use each N-th frame [1]")
       ->check(CLI::PositiveNumber);
-  command.add_option("--mask",
-                     options.reading.mask,
-                     "Mask image, or a folder with one per frame by name; black is not used");
+  command.add_option(
+      "--mask",
+      reading.mask,
+      "Mask image, or a folder with one per frame by name; black is not used [none]");
+  command
+      .add_option("--pace",
+                  options.pace,
+                  "Feed files at their own rate times X, as a camera would [off; X is 1]")
+      ->expected(0, 1)
+      ->default_str("1")
+      ->type_name("[X]")
+      ->check(CLI::Range(1e-3, 1e3));
+}
+
+void add_report_options(CLI::App& command, RunOptions& options) {
+  CLI::Option& quiet = *command.add_flag("--quiet", options.is_quiet, "Errors only [off]");
+  command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
+  command.add_option("--log", options.log, "Write all messages to this file, too [none]");
 }
 
 }  // namespace
@@ -138,7 +177,8 @@ void add_run_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<RunOptions>();
   CLI::App& run_command = *program.add_subcommand("run", "Map INPUT; write results to --out");
   add_input_options(run_command, options->session);
-  run_command.add_option("-o,--out", options->out, "Folder for the results")->capture_default_str();
+  add_selection_options(run_command, *options);
+  run_command.add_option("-o,--out", options->out, "Folder for the results [waymark-out]");
   add_choice<Timing>(run_command,
                      "--timing",
                      options->session.timing,
@@ -146,10 +186,9 @@ void add_run_command(CLI::App& program, Command& command) {
                      "inline (one thread) or lockstep (threads, same results) [lockstep]");
   run_command.add_option("--seed", options->session.seed, "Seed of all random numbers [0]")
       ->check(CLI::Range(0, 1000000000));
-  CLI::Option& quiet = *run_command.add_flag("--quiet", options->is_quiet, "Errors only");
-  run_command.add_flag("--verbose", options->is_verbose, "A line per frame")->excludes(&quiet);
-  run_command.add_option("--log", options->log, "Write all messages to this file, too");
-  run_command.callback([options, &command] { command = [options] { return run(*options); }; });
+  add_report_options(run_command, *options);
+  run_command.callback(
+      [options, &command] { command = [options] { return run_and_log(*options); }; });
 }
 
 }  // namespace waymark

@@ -25,6 +25,18 @@ int fail(int status, std::string message) {
   return status;
 }
 
+/// The parser itself would say only that a command is missing.
+void check_command_name(const CLI::App& program, int argc, char** argv) {
+  const std::string name = argc > 1 ? argv[1] : "";
+  if (name.empty() || name.front() == '-') return;
+  std::string known;
+  for (const CLI::App* command : program.get_subcommands({})) {
+    if (command->get_name() == name) return;
+    known += (known.empty() ? "" : ", ") + command->get_name();
+  }
+  throw InputError("command line", fmt::format("unknown command '{}', expected {}", name, known));
+}
+
 int run_program(int argc, char** argv) {
   CLI::App program("Waymark: visual SLAM for any camera.", "waymark");
   program.require_subcommand(1);
@@ -37,6 +49,7 @@ int run_program(int argc, char** argv) {
   add_simulate_command(program, command);
   add_config_command(program, command);
 
+  check_command_name(program, argc, argv);
   try {
     program.parse(argc, argv);
   } catch (const CLI::Success& help_or_version) {

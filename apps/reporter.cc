@@ -9,6 +9,7 @@
 #include <cstdio>
 
 #include "waymark/base/check.h"
+#include "waymark/io/atomic_file.h"
 
 namespace waymark {
 namespace {
@@ -36,6 +37,7 @@ std::string format_duration(double seconds) {
 Reporter::Reporter(Verbosity verbosity, const std::filesystem::path& log)
     : verbosity_(verbosity), is_terminal_(isatty(STDERR_FILENO) != 0) {
   if (log.empty()) return;
+  if (log.has_parent_path()) make_output_folder(log.parent_path());
   log_.open(log);
   if (!log_) throw OutputError(log.string(), "cannot be written, expected a file name for --log");
 }
@@ -47,6 +49,8 @@ void Reporter::info(std::string_view line) { write(line, verbosity_ != Verbosity
 void Reporter::detail(std::string_view line) { write(line, verbosity_ == Verbosity::kVerbose); }
 
 void Reporter::warning(std::string_view line) { write(fmt::format("warning: {}", line), true); }
+
+void Reporter::failure(std::string_view line) { write(fmt::format("error: {}", line), false); }
 
 void Reporter::progress(std::size_t num_done,
                         std::optional<std::size_t> num_total,

@@ -18,7 +18,7 @@ enum class Verbosity { kQuiet, kNormal, kVerbose };
 /// bar on a terminal or else as a line every few seconds. Everything also goes to the log, if any.
 class Reporter {
  public:
-  /// Throws OutputError when the log cannot be made.
+  /// Makes the folder of the log, too. Throws OutputError when the log cannot be made.
   Reporter(Verbosity verbosity, const std::filesystem::path& log);
   ~Reporter();
 
@@ -28,6 +28,8 @@ class Reporter {
   void detail(std::string_view line);
   /// Something that may be wrong; always shown.
   void warning(std::string_view line);
+  /// What ends the program, for the log; main() tells the user.
+  void failure(std::string_view line);
 
   /// num_done of num_total (if it is known) frames are done; state names the tracker's.
   void progress(std::size_t num_done, std::optional<std::size_t> num_total, std::string_view state);

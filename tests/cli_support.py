@@ -9,6 +9,7 @@ import shutil
 import struct
 import subprocess
 import tempfile
+import time
 import unittest
 import zlib
 
@@ -109,6 +110,12 @@ class CliTest(unittest.TestCase):
 
     def run_on(self, source, *arguments, **options):
         return waymark("run", source, "-o", self.out, *arguments, **options)
+
+    def wait_until(self, is_true, timeout_s=120):
+        end = time.monotonic() + timeout_s
+        while not is_true():
+            self.assertLess(time.monotonic(), end, "waited in vain")
+            time.sleep(0.01)
 
     def summary(self):
         return json.loads((self.out / "summary.json").read_text())

@@ -2,13 +2,44 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """The contract of the command line: inputs, outputs, exit status, one-line errors."""
+import array
+import fcntl
 import os
+import pathlib
 import resource
+import shutil
 import signal
 import subprocess
+import termios
 import unittest
 
 from cli_support import NUM_FRAMES, PROGRAM, CliTest, png_size, truncate, waymark, write_png
+
+
+def bytes_in(pipe):
+    """What a pipe holds that nobody has read yet."""
+    count = array.array("i", [0])
+    fcntl.ioctl(pipe, termios.FIONREAD, count)
+    return count[0]
+
+
+def status_of(process):
+    """The fields of /proc/PID/status; none once the process has ended."""
+    try:
+        lines = pathlib.Path(f"/proc/{process.pid}/status").read_text().split("\n")
+    except (FileNotFoundError, ProcessLookupError):
+        return {}
+    return dict(line.split(":\t", 1) for line in lines if ":\t" in line)
+
+
+def is_asleep(process):
+    return status_of(process).get("State", "").startswith("S")
+
+
+def has_pending(process):
+    """Whether a signal has been sent but not yet handled."""
+    status = status_of(process)
+    return any(int(status.get(key, "0"), 16) for key in ("SigPnd", "ShdPnd"))
 
 
 class Usage(CliTest):
@@ -20,16 +51,19 @@ class Usage(CliTest):
             self.assertEqual(waymark(command, "--help").returncode, 0)
         text = waymark("run", "--help").stdout
         for option in ("--config", "--set", "--setup", "--out", "--timing", "--first", "--frames",
-                       "--every", "--mask", "--seed", "--quiet", "--verbose", "--log", "--format"):
+                       "--every", "--mask", "--pace", "--seed", "--quiet", "--verbose", "--log",
+                       "--format"):
             self.assertIn(option, text)
 
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
-        self.assert_fails(waymark("fly"), 2, "subcommand")
+        self.assert_fails(waymark("fly"), 2, "'fly'", "run, eval, simulate, config")
         self.assert_fails(waymark("run"), 2, "INPUT")
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
         self.assert_fails(waymark("run", self.folder, "--every", "0"), 2, "--every")
+        self.assert_fails(waymark("run", self.folder, "--pace=0"), 2, "--pace")
+        self.assert_fails(waymark("run", self.folder, "--quiet", "--verbose"), 2, "--quiet")
 
     def test_settings_are_printed_and_checked(self):
         printed = waymark("config")
@@ -56,9 +90,8 @@ class Inputs(CliTest):
         self.assertEqual(summary["setup"], "stereo")
 
     def test_one_camera_of_a_pair(self):
-        done = self.run_on(self.sequence("stereo"), "--setup", "mono")
-        self.assertIn(done.returncode, (0, 3), done.stderr)
-        self.assertEqual(self.summary()["setup"], "mono")
+        summary = self.assert_maps(self.sequence("stereo"), "--setup", "mono")
+        self.assertEqual(summary["setup"], "mono")
 
     def test_tum(self):
         source = self.sequence("rgbd")
@@ -67,18 +100,13 @@ class Inputs(CliTest):
         self.assertEqual(summary["setup"], "rgbd")
 
     def test_image_folder(self):
-        source = self.image_folder()
-        done = self.run_on(source, "-c", self.folder / "camchain.yaml")
-        self.assertIn(done.returncode, (0, 3), done.stderr)
-        self.assertEqual(self.summary()["frames"], NUM_FRAMES)
+        self.assert_maps(self.image_folder(), "-c", self.folder / "camchain.yaml")
 
     def test_video(self):
         source, video = self.image_folder(), self.folder / "walk.mkv"
         subprocess.run(["ffmpeg", "-v", "error", "-framerate", "20", "-i", source / "%06d.png",
                         "-c:v", "ffv1", video], check=True)
-        done = self.run_on(video, "-c", self.folder / "camchain.yaml")
-        self.assertIn(done.returncode, (0, 3), done.stderr)
-        self.assertEqual(self.summary()["frames"], NUM_FRAMES)
+        self.assert_maps(video, "-c", self.folder / "camchain.yaml")
 
     def test_part_of_an_input(self):
         done = self.run_on(self.sequence("stereo"), "--first", 4, "--frames", 6, "--every", 2)
@@ -122,17 +150,71 @@ class Outputs(CliTest):
         self.assertIn("ate_rmse_m", done.stdout)
         self.assertIn("<svg", plot.read_text())
 
-    def test_interrupt_finishes_early_and_saves(self):
-        with subprocess.Popen([PROGRAM, "run", self.sequence("stereo"), "-o", self.out, "--verbose"],
-                              stderr=subprocess.PIPE, text=True) as process:
-            for line in process.stderr:  # --verbose has a line per frame.
-                if "frame 3" in line:
-                    break
-            process.send_signal(signal.SIGINT)
-            process.stderr.read()
-            self.assertEqual(process.wait(timeout=120), 0)
-        self.assertLess(self.summary()["frames"], NUM_FRAMES)
-        self.assertTrue((self.out / "trajectory.txt").exists())
+    def test_log_has_every_message(self):
+        log = self.folder / "logs/run.log"
+        done = self.run_on(self.sequence("stereo"), "--frames", 3, "--quiet", "--log", log)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        text = log.read_text()
+        for words in ("EuRoC", "376x240", "frame 2", "results in"):
+            self.assertIn(words, text)
+        done = self.run_on(self.folder / "nowhere", "--log", log)
+        self.assertEqual(done.returncode, 2)
+        self.assertEqual(log.read_text(), done.stderr)
+
+    def test_verbosity(self):
+        source = self.sequence("stereo")
+        normal = self.run_on(source, "--frames", 3).stderr
+        self.assertIn("376x240", normal)
+        self.assertNotIn("frame 2: ", normal)
+        self.assertIn("frame 2: ", self.run_on(source, "--frames", 3, "--verbose").stderr)
+
+    def test_pace_feeds_no_faster_than_the_input_was_taken(self):
+        source = self.sequence("stereo")
+        for pace, slowest in ((["--pace"], 4 * 0.05), (["--pace", 0.5], 4 * 0.1)):
+            done = self.run_on(source, "--frames", 5, *pace)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertGreaterEqual(self.summary()["wall_s"], slowest)
+
+
+class Interrupts(CliTest):
+    def test_first_one_finishes_early_and_saves(self):
+        for which in (signal.SIGINT, signal.SIGTERM):
+            # At a tenth of its own rate the sequence takes long enough to be interrupted.
+            with subprocess.Popen([PROGRAM, "run", self.sequence("stereo"), "-o", self.out,
+                                   "--verbose", "--pace", "0.1"],
+                                  stderr=subprocess.PIPE, text=True) as process:
+                for line in process.stderr:  # --verbose has a line per frame.
+                    if "frame 3" in line:
+                        break
+                process.send_signal(which)
+                process.stderr.read()
+                self.assertEqual(process.wait(timeout=120), 0)
+            self.assertLess(self.summary()["frames"], NUM_FRAMES)
+            self.assertGreater(self.summary()["tracked"], 0)
+            self.assertTrue((self.out / "trajectory.txt").exists())
+            shutil.rmtree(self.folder / "input_stereo")
+            shutil.rmtree(self.out)
+
+    def test_second_one_stops_at_once(self):
+        # So many bad images that what is said of them fills the pipe: the program waits for its
+        # reader, who never reads, and cannot end in any other way.
+        source = self.image_folder()
+        times = []
+        for i in range(4000):
+            image = source / f"{i:06d}.png"
+            if i >= NUM_FRAMES:
+                image.write_bytes(b"")
+            times.append(f"{0.05 * i:.3f}\n")
+        (source / "times.txt").write_text("".join(times))
+        with subprocess.Popen([PROGRAM, "run", source, "-c", self.folder / "camchain.yaml", "-o",
+                               self.out], stderr=subprocess.PIPE) as process:
+            self.wait_until(lambda: bytes_in(process.stderr) > 0xE000 and is_asleep(process))
+            for which in (signal.SIGINT, signal.SIGTERM):
+                self.assertIsNone(process.poll())
+                process.send_signal(which)
+                self.wait_until(lambda: process.poll() is not None or not has_pending(process))
+            self.assertEqual(process.wait(timeout=60), 130)
+        self.assertFalse((self.out / "trajectory.txt").exists())
 
 
 class BadInput(CliTest):
@@ -204,6 +286,46 @@ class BadInput(CliTest):
         self.assert_fails(self.run_on(self.folder / "input_stereo", "--set",
                                       "features.cuont=900"), 2, "features.cuont", "features.count")
 
+    def test_nan_in_the_calibration_of_a_data_set(self):
+        source = self.sequence("stereo")
+        sensor = source / "mav0/cam1/sensor.yaml"
+        lines = [line if not line.startswith("intrinsics") else "intrinsics: [290, .nan, 187, 121]"
+                 for line in sensor.read_text().split("\n")]
+        sensor.write_text("\n".join(lines))
+        self.assert_fails(self.run_on(source), 2, "sensor.yaml", "intrinsics")
+
+    def test_malformed_yaml(self):
+        bad = self.config("cam0: [1,\n")
+        self.assert_fails(self.run_on(self.sequence("stereo"), "-c", bad), 2, bad)
+        self.assert_fails(waymark("config", bad), 2, bad)
+
+    def test_part_beyond_the_end(self):
+        done = self.run_on(self.sequence("stereo"), "--first", NUM_FRAMES)
+        self.assert_fails(done, 2, "--first", NUM_FRAMES)
+
+    def test_mask_that_is_no_image(self):
+        mask = self.config("no image", "mask.png")
+        self.assert_fails(self.run_on(self.sequence("stereo"), "--mask", mask), 2, mask)
+
+    def test_trajectories_that_cannot_be_evaluated(self):
+        truth = self.sequence("stereo") / "groundtruth.txt"
+        plot = self.folder / "plot.svg"
+        long_ago = "".join(f"{t} 0 0 0 0 0 0 1\n" for t in range(5))
+        for text in (None, "", "hello\n", "1 nan 0 0 0 0 0 1\n", "1 0 0 0 0 0 0 3\n", long_ago):
+            estimate = self.folder / "estimate.txt"
+            if text is not None:
+                estimate.write_text(text)
+            done = waymark("eval", estimate, truth, "--plot", plot)
+            self.assert_fails(done, 2, "evaluation" if text == long_ago else estimate)
+            self.assertFalse(plot.exists())
+
+    def test_worlds_that_cannot_be_simulated(self):
+        self.assert_fails(waymark("simulate", "moon", "-o", self.out), 2, "moon", "--list")
+        self.assert_fails(waymark("simulate", "room"), 2, "--out")
+        camera = self.config("cam0: {camera_model: pinhole}\n")
+        self.assert_fails(waymark("simulate", "room", "--camera", camera, "--setup", "mono", "-o",
+                                  self.out), 2, camera)
+
     def test_missing_config(self):
         done = self.run_on(self.sequence("stereo"), "-c", self.folder / "no.yaml")
         self.assert_fails(done, 2, "no.yaml")
@@ -231,18 +353,42 @@ class Example(CliTest):
 
 
 class BadOutput(CliTest):
+    @staticmethod
+    def no_room():
+        resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
+
     def test_full_disk(self):
-        def no_room():
-            resource.setrlimit(resource.RLIMIT_FSIZE, (512, 512))
-        done = self.run_on(self.sequence("stereo"), preexec_fn=no_room)
-        self.assert_fails(done, 1, str(self.out))
+        done = self.run_on(self.sequence("stereo"), preexec_fn=self.no_room)
+        self.assert_fails(done, 1, self.out)
+
+    def test_full_disk_leaves_earlier_results_as_they_were(self):
+        source = self.sequence("stereo")
+        self.assertEqual(self.run_on(source, "--frames", 5).returncode, 0)
+        before = {path.name: path.read_bytes() for path in self.out.iterdir()}
+        done = self.run_on(source, preexec_fn=self.no_room)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        self.assertEqual({path.name: path.read_bytes() for path in self.out.iterdir()}, before)
+
+    def test_full_disk_for_a_simulation_or_a_plot(self):
+        done = waymark("simulate", "room", "--frames", 2, "-o", self.out, preexec_fn=self.no_room)
+        self.assert_fails(done, 1, self.out)
+        truth = self.sequence("stereo") / "groundtruth.txt"
+        plot = self.out / "plot.svg"
+        done = waymark("eval", truth, truth, "--plot", plot, preexec_fn=self.no_room)
+        self.assert_fails(done, 1, plot)
 
     def test_a_file_in_the_way(self):
-        self.out.write_text("")
-        done = self.run_on(self.sequence("stereo"))
-        self.assertEqual(done.returncode, 1, done.stderr)
-        self.assertIn("error: ", done.stderr)
-        self.assertTrue(self.out.is_file())
+        source = self.sequence("stereo")
+        for out in (self.out, self.out / "below"):
+            self.out.write_text("mine")
+            done = waymark("run", source, "-o", out)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertTrue(done.stderr.rstrip("\n").split("\n")[-1].startswith(f"error: {out}"))
+            self.assertEqual(self.out.read_text(), "mine")
+
+    def test_a_log_that_cannot_be_written(self):
+        log = self.config("", "file") / "run.log"
+        self.assert_fails(self.run_on(self.sequence("stereo"), "--log", log), 1, log.parent)
 
 
 if __name__ == "__main__":
