@@ -90,6 +90,26 @@ TEST(Camchain, ReadsWhatKalibrWrites) {
   EXPECT_EQ(rig.cameras[1].camera->width_px(), 752);
 }
 
+TEST(Camchain, ReadsFisheyePairsAndWholeSpheres) {
+  const std::string fisheye =
+      "{camera_model: pinhole, intrinsics: [190.978, 190.973, 254.93, 256.897], "
+      "distortion_model: equidistant, "
+      "distortion_coeffs: [0.0034823894, 0.0007150348, -0.0020532361, 0.00020293673], "
+      "resolution: [512, 512]";
+  const auto pair = read("cam0: " + fisheye + "}\ncam1: " + fisheye +
+                         ", T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], "
+                         "[0, 0, 0, 1]]}\n");
+  const Rig rig = make_rig(pair.value());
+  EXPECT_EQ(rig.cameras[1].camera->model(), "fisheye");
+  const auto sphere = read("cam0: {camera_model: equirectangular, resolution: [1280, 640]}\n");
+  EXPECT_EQ(make_rig(sphere.value()).cameras[0].camera->wrap_width_px(), 1280.0);
+  EXPECT_THAT(
+      error_of("cam0: " + fisheye.substr(0, fisheye.find("equidistant")) +
+               "equidistant, resolution: [512, 512]}\n"),
+      EndsWith("cam0: distortion_coeffs has 0 numbers, expected 4 for equidistant: k1 k2 k3 "
+               "k4"));
+}
+
 TEST(Camchain, TransformationsChain) {
   const std::string step =
       ", T_cn_cnm1: [[0, -1, 0, 0.5], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]]";

@@ -15,7 +15,7 @@ namespace waymark {
 /// A camera model: a plain struct with its name and three functions for one point or pixel.
 ///
 ///   static constexpr std::string_view kName;                                // as in settings
-///   files std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_in_cam) const;
+///   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_in_cam) const;
 ///   std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const;  // unit length
 ///   Matrix23d jacobian(const Eigen::Vector3d& point_in_cam) const;          // d pixel / d point
 ///

@@ -11,63 +11,13 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/camera/perspective.h"
+#include "waymark/camera/builtin_models.h"
 
 namespace waymark {
 namespace {
 
 constexpr int kMinSizePx = 16;
 constexpr int kMaxSizePx = 20000;
-// Part of the image that a perspective camera may have beyond its field of view: extreme corners,
-// where polynomials are least certain.
-constexpr double kMaxInvalidPart = 0.05;
-
-/// Part of the image's pixels that have no direction.
-double invalid_part(const Camera& camera) {
-  constexpr int kNumPerAxis = 40;
-  std::vector<Eigen::Vector2d> pixels;
-  for (int i = 0; i < kNumPerAxis * kNumPerAxis; ++i) {
-    const double column = (i % kNumPerAxis + 0.5) / kNumPerAxis;
-    const double row = (i / kNumPerAxis + 0.5) / kNumPerAxis;
-    pixels.emplace_back(camera.width_px() * column - 0.5, camera.height_px() * row - 0.5);
-  }
-  std::vector<Eigen::Vector3d> bearings(pixels.size());
-  std::vector<std::uint8_t> is_valid(pixels.size());
-  camera.unproject(pixels, bearings, is_valid);
-  const auto num_invalid = std::count(is_valid.begin(), is_valid.end(), 0);
-  return static_cast<double>(num_invalid) / static_cast<double>(pixels.size());
-}
-
-std::shared_ptr<const Camera> make_pinhole(const CameraDescription& description) {
-  expect_intrinsics(description, "fu fv pu pv");
-  const std::vector<double>& coeffs = description.distortion_coeffs;
-  if (description.distortion_model == "none") {
-    expect_no_distortion(description);
-  } else if (description.distortion_model != "radtan") {
-    description.fail(fmt::format("distortion_model is {}, expected radtan or none",
-                                 description.distortion_model));
-  } else if (coeffs.size() != 4 && coeffs.size() != 5 && coeffs.size() != 8) {
-    description.fail(
-        fmt::format("distortion_coeffs has {} numbers, expected 4, 5 or 8 for radtan: k1 k2 p1 p2 "
-                    "[k3 [k4 k5 k6]]",
-                    coeffs.size()));
-  }
-  const std::vector<double>& intrinsics = description.intrinsics;
-  const PerspectiveModel model(
-      {intrinsics[0], intrinsics[1]}, {intrinsics[2], intrinsics[3]}, coeffs);
-  auto camera =
-      std::make_shared<const PerspectiveCamera>(model, description.width_px, description.height_px);
-  if (const double part = invalid_part(*camera); part > kMaxInvalidPart) {
-    const double end_px = model.focal_px().mean() * model.max_distorted_radius();
-    description.fail(fmt::format(
-        "distortion_coeffs fold the image back at {:.0f} px from the principal point, which leaves "
-        "{:.0f} % of the pixels without a direction, expected at most {:.0f} %",
-        end_px,
-        100.0 * part,
-        100.0 * kMaxInvalidPart));
-  }
-  return camera;
-}
 
 void expect_finite(const CameraDescription& description,
                    std::string_view name,
@@ -85,7 +35,7 @@ void CameraDescription::fail(const std::string& what) const { throw InputError(w
 
 CameraRegistry CameraRegistry::with_builtin_models() {
   CameraRegistry registry;
-  registry.add("pinhole", make_pinhole);
+  add_builtin_models(registry);
   return registry;
 }
 

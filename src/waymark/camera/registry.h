@@ -34,7 +34,7 @@ using CameraFactory = std::function<std::shared_ptr<const Camera>(const CameraDe
 /// The camera models that descriptions may name. A value: extend a copy and hand it on.
 class CameraRegistry {
  public:
-  /// The models of this library: pinhole.
+  /// The models of this library (builtin_models.h).
   static CameraRegistry with_builtin_models();
 
   /// Adds a model; its name must be new.

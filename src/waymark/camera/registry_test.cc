@@ -62,7 +62,8 @@ TEST(CameraRegistry, MakesAPerspectiveCamera) {
 TEST(CameraRegistry, EachFaultHasItsMessage) {
   const auto message = [](auto&& change) { return error_after(change); };
   EXPECT_EQ(message([](auto& d) { d.camera_model = "pinhol"; }),
-            "a.yaml:1: cam0: camera_model is pinhol, expected one of: pinhole");
+            "a.yaml:1: cam0: camera_model is pinhol, expected one of: division, ds, "
+            "equirectangular, eucm, omni, pinhole");
   EXPECT_EQ(message([](auto& d) { d.intrinsics.pop_back(); }),
             "a.yaml:1: cam0: intrinsics has 3 numbers, expected 4: fu fv pu pv");
   EXPECT_EQ(message([](auto& d) { d.intrinsics[1] = -3.0; }),
@@ -75,7 +76,7 @@ TEST(CameraRegistry, EachFaultHasItsMessage) {
   EXPECT_THAT(message([](auto& d) { d.distortion_coeffs.resize(6); }),
               HasSubstr("distortion_coeffs has 6 numbers, expected 4, 5 or 8"));
   EXPECT_THAT(message([](auto& d) { d.distortion_model = "plumb_bob"; }),
-              HasSubstr("distortion_model is plumb_bob, expected radtan or none"));
+              HasSubstr("distortion_model is plumb_bob, expected radtan, equidistant or none"));
   EXPECT_THAT(message([](auto& d) { d.distortion_model = "none"; }),
               HasSubstr("distortion_coeffs has 4 numbers, expected none"));
   EXPECT_THAT(message([](auto& d) { d.width_px = 0; }),
@@ -95,6 +96,81 @@ TEST(CameraRegistry, DistortionThatFoldsBackInTheImageIsRefused) {
               d.width_px = 640;
             }),
             "no error");
+}
+
+CameraDescription describe(const std::string& model, std::vector<double> intrinsics) {
+  CameraDescription description;
+  description.camera_model = model;
+  description.intrinsics = std::move(intrinsics);
+  description.width_px = description.height_px = 512;
+  description.where = "a.yaml:1: cam0";
+  return description;
+}
+
+TEST(CameraRegistry, MakesEveryModel) {
+  const CameraRegistry registry = CameraRegistry::with_builtin_models();
+  CameraDescription fisheye = describe("pinhole", {190.0, 190.0, 255.0, 257.0});
+  fisheye.distortion_model = "equidistant";
+  fisheye.distortion_coeffs = {0.003, 0.0007, -0.002, 0.0002};
+  EXPECT_EQ(registry.make_camera(fisheye)->model(), "fisheye");
+  CameraDescription omni = describe("omni", {1.2, 420.0, 420.0, 255.0, 257.0});
+  EXPECT_EQ(registry.make_camera(omni)->model(), "omni");
+  omni.distortion_model = "radtan";
+  omni.distortion_coeffs = {-0.1, 0.02, 0.0, 0.0};
+  EXPECT_EQ(registry.make_camera(omni)->model(), "omni");
+  const CameraDescription eucm = describe("eucm", {0.6, 1.1, 190.0, 190.0, 255.0, 257.0});
+  EXPECT_EQ(registry.make_camera(eucm)->model(), "eucm");
+  const CameraDescription ds = describe("ds", {-0.2, 0.6, 160.0, 160.0, 255.0, 257.0});
+  EXPECT_EQ(registry.make_camera(ds)->model(), "ds");
+  CameraDescription division = describe("division", {300.0, 300.0, 255.0, 257.0});
+  division.distortion_coeffs = {-0.2};
+  EXPECT_EQ(registry.make_camera(division)->model(), "division");
+  CameraDescription sphere = describe("equirectangular", {});
+  sphere.height_px = 256;
+  EXPECT_EQ(registry.make_camera(sphere)->wrap_width_px(), 512.0);
+}
+
+TEST(CameraRegistry, BadCalibrationsOfWideCamerasAreRefused) {
+  CameraDescription fisheye = describe("pinhole", {190.0, 190.0, 255.0, 257.0});
+  fisheye.distortion_model = "equidistant";
+  fisheye.distortion_coeffs = {0.1, 0.2};
+  EXPECT_EQ(error_of(fisheye),
+            "a.yaml:1: cam0: distortion_coeffs has 2 numbers, expected 4 for equidistant: k1 k2 k3 "
+            "k4");
+  fisheye.distortion_coeffs = {-0.6, 0.0, 0.0, 0.0};
+  EXPECT_EQ(error_of(fisheye),
+            "a.yaml:1: cam0: distortion_coeffs fold the image back at 94 px from the principal "
+            "point, 42 degrees off the axis, which leaves 90 % of the pixels without a direction, "
+            "expected at most 5 %");
+  fisheye.intrinsics[1] = 0.0;
+  EXPECT_THAT(error_of(fisheye), HasSubstr("focal length fv is 0, expected more than 0"));
+  EXPECT_THAT(error_of(describe("omni", {-0.1, 420.0, 420.0, 255.0, 257.0})),
+              HasSubstr("intrinsics[0] is -0.1, expected xi of at least 0"));
+  EXPECT_THAT(error_of(describe("omni", {420.0, 420.0, 255.0, 257.0})),
+              HasSubstr("intrinsics has 4 numbers, expected 5: xi fu fv pu pv"));
+  // So strong a mirror shrinks everything into a small circle.
+  EXPECT_THAT(error_of(describe("omni", {9.0, 800.0, 800.0, 255.0, 257.0})),
+              HasSubstr("xi and distortion_coeffs fold the image back at"));
+  CameraDescription omni = describe("omni", {1.0, 420.0, 420.0, 255.0, 257.0});
+  omni.distortion_model = "equidistant";
+  EXPECT_THAT(error_of(omni), HasSubstr("is equidistant, expected radtan or none"));
+  EXPECT_THAT(error_of(describe("eucm", {1.2, 1.0, 190.0, 190.0, 255.0, 257.0})),
+              HasSubstr("intrinsics[0] is 1.2, expected alpha from 0 to 1"));
+  EXPECT_THAT(error_of(describe("eucm", {0.5, 0.0, 190.0, 190.0, 255.0, 257.0})),
+              HasSubstr("intrinsics[1] is 0, expected beta of more than 0"));
+  EXPECT_THAT(error_of(describe("ds", {-1.0, 0.6, 160.0, 160.0, 255.0, 257.0})),
+              HasSubstr("intrinsics[0] is -1, expected xi of more than -1 and at most 1"));
+  EXPECT_THAT(error_of(describe("ds", {-0.2, 0.6, 0.0, 160.0, 255.0, 257.0})),
+              HasSubstr("focal length fu is 0"));
+  EXPECT_THAT(error_of(describe("division", {300.0, 300.0, 255.0, 257.0})),
+              HasSubstr("distortion_coeffs has 0 numbers, expected 1 for camera_model division"));
+  CameraDescription division = describe("division", {300.0, 300.0, 255.0, 257.0});
+  division.distortion_coeffs = {4.0};
+  EXPECT_THAT(error_of(division), HasSubstr("distortion_coeffs fold the image back at 146 px"));
+  EXPECT_THAT(error_of(describe("equirectangular", {})),
+              HasSubstr("resolution is [512, 512], expected twice the height as width"));
+  EXPECT_THAT(error_of(describe("equirectangular", {300.0})),
+              HasSubstr("intrinsics has 1 numbers, expected none for camera_model equirect"));
 }
 
 /// A camera model from outside of the library: r = f * angle, in all directions but backwards.
