@@ -2,9 +2,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/camera/pixel_angles.h"
 
+#include <algorithm>
+
 #include "waymark/camera/tangent.h"
 
 namespace waymark {
+namespace {
+
+std::vector<double> column_stretches(const Camera& camera,
+                                     const std::vector<Eigen::Vector2d>& pixels) {
+  std::vector<Eigen::Vector3d> bearings(pixels.size(), Eigen::Vector3d::UnitZ());
+  std::vector<Eigen::Vector2d> projected(pixels.size());
+  std::vector<Matrix23d> jacobians(pixels.size());
+  std::vector<std::uint8_t> is_valid(pixels.size()), is_visible(pixels.size());
+  camera.unproject(pixels, bearings, is_valid);
+  camera.project_with_jacobian(bearings, projected, jacobians, is_visible);
+  std::vector<double> stretches;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const bool is_known = is_valid[i] && is_visible[i];
+    const double ratio = is_known ? jacobians[i].row(0).norm() / jacobians[i].row(1).norm() : 1.0;
+    stretches.push_back(std::max(1.0, ratio));
+  }
+  return stretches;
+}
+
+}  // namespace
 
 PixelAngles::PixelAngles(const Camera& camera)
     : columns_((camera.width_px() + kCellPx - 1) / kCellPx) {
@@ -24,6 +46,7 @@ PixelAngles::PixelAngles(const Camera& camera)
     if (arrays.is_valid[i]) last_valid = arrays.size_rad[i];
     angles_rad_.push_back(last_valid);
   }
+  if (camera.wrap_width_px() > 0.0) column_stretches_ = column_stretches(camera, centres);
 }
 
 double central_pixel_angle(const Camera& camera) {

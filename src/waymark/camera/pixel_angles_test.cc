@@ -7,6 +7,7 @@
 #include <Eigen/Geometry>
 #include <cmath>
 
+#include "waymark/camera/equirectangular.h"
 #include "waymark/camera/perspective.h"
 
 namespace waymark {
@@ -41,6 +42,17 @@ TEST(PixelAngles, AreWhatUnprojectedRaysSpanNearby) {
 TEST(PixelAngles, AtTheCentreIsTheInverseOfTheFocalLength) {
   const PerspectiveCamera camera(PerspectiveModel({420.0, 420.0}, {319.5, 239.5}), 640, 480);
   EXPECT_NEAR(central_pixel_angle(camera), 1.0 / 420.0, 1e-5);
+}
+
+TEST(PixelAngles, ColumnsOfWholeSpheresStretchTowardsThePoles) {
+  const EquirectangularCamera camera(EquirectangularModel(1280, 640), 1280, 640);
+  const PixelAngles angles(camera);
+  EXPECT_NEAR(angles.column_stretch({-0.5, 319.5}), 1.0, 0.01);
+  // At the latitude of 60 degrees two columns span what a row does.
+  EXPECT_NEAR(angles.column_stretch({1279.4, 319.5 + 640.0 / 3.0}), 2.0, 0.15);
+  EXPECT_GT(angles.column_stretch({640.0, 0.0}), 10.0);
+  const PerspectiveCamera plain(PerspectiveModel({420.0, 420.0}, {319.5, 239.5}), 640, 480);
+  EXPECT_EQ(PixelAngles(plain).column_stretch({0.0, 0.0}), 1.0);
 }
 
 }  // namespace

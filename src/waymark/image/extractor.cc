@@ -62,14 +62,15 @@ double needed_density(const PaddedImage& image, int level, int count) {
   return share / area;
 }
 
-// The corners of a level that the mask lets through.
+// The corners of a level that the mask lets through: it counts the levels from 0 up.
 std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corners) {
   const auto nearest = [&](int coordinate_px, int size) {
     const double at = Pyramid::level0_from_level(coordinate_px, level) + 0.5;
     return std::min(static_cast<int>(at), size - 1);
   };
   const auto end = std::remove_if(corners.begin(), corners.end(), [&](const Corner& corner) {
-    return mask.at(nearest(corner.x_px, mask.width_px), nearest(corner.y_px, mask.height_px)) == 0;
+    return mask.at(nearest(corner.x_px, mask.width_px), nearest(corner.y_px, mask.height_px)) <=
+           level;
   });
   return corners.first(static_cast<std::size_t>(end - corners.begin()));
 }

@@ -43,7 +43,8 @@ class FeatureExtractor {
   /// Replaces the contents of keypoints and descriptors, which run in parallel, by the features of
   /// the image, ordered by level, row and column. There are settings.count of them, fewer only
   /// where the image has no more corners. The mask is empty or of the size of the image; there are
-  /// no features where it is 0. Throws InputError where the sizes differ.
+  /// no features of a level where it is not above the number of the level, none at all where it is
+  /// 0. Throws InputError where the sizes differ.
   void extract(ImageView image,
                ImageView mask,
                std::vector<Keypoint>& keypoints,

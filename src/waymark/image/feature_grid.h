@@ -23,7 +23,19 @@ class FeatureGrid {
   /// Calls visit(index) for each point in the cells that touch the square of half side radius_px
   /// around (x, y): a superset of the points within it.
   template <class Visit>
-  void visit_near(double x_px, double y_px, double radius_px, Visit visit) const;
+  void visit_near(double x_px, double y_px, double radius_px, Visit visit) const {
+    visit_window(x_px, y_px, radius_px, radius_px, visit);
+  }
+  /// The same for a rectangle of these half sides.
+  template <class Visit>
+  void visit_window(
+      double x_px, double y_px, double half_width_px, double half_height_px, Visit visit) const;
+
+  /// Distance between two columns, the shorter way round where they repeat.
+  double column_distance_px(double a_px, double b_px) const {
+    const double distance = std::abs(a_px - b_px);
+    return wrap_width_px_ > 0.0 ? std::min(distance, wrap_width_px_ - distance) : distance;
+  }
 
  private:
   static constexpr int kCellPx = 16;
@@ -78,12 +90,13 @@ void FeatureGrid::visit_columns(double left, double right, int row0, int row1, V
 }
 
 template <class Visit>
-void FeatureGrid::visit_near(double x_px, double y_px, double radius_px, Visit visit) const {
+void FeatureGrid::visit_window(
+    double x_px, double y_px, double half_width_px, double half_height_px, Visit visit) const {
   if (indices_.empty()) return;
-  const int row0 = row_of(y_px - radius_px);
-  const int row1 = row_of(y_px + radius_px);
-  const double left = x_px - radius_px;
-  const double right = x_px + radius_px;
+  const int row0 = row_of(y_px - half_height_px);
+  const int row1 = row_of(y_px + half_height_px);
+  const double left = x_px - half_width_px;
+  const double right = x_px + half_width_px;
   if (wrap_width_px_ <= 0.0) return visit_columns(left, right, row0, row1, visit);
   if (right - left >= wrap_width_px_ - kCellPx) {
     return visit_columns(0.0, wrap_width_px_, row0, row1, visit);

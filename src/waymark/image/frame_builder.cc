@@ -4,10 +4,13 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/image/brief.h"
 
 namespace waymark {
 namespace {
@@ -21,6 +24,13 @@ void check_size(const BasicImageView<T>& image, const Camera& camera, const char
                                image.height_px,
                                camera.width_px(),
                                camera.height_px()));
+}
+
+/// Columns repeated at the seam, so that the patches of all levels that are centred in the image
+/// lie within, with some room for rounding and cropped columns.
+int seam_margin_px(const Camera& camera) {
+  const double patch_px = (kBriefRadius + 2) * Pyramid::scale(Pyramid::kNumLevels - 1);
+  return std::min(static_cast<int>(std::ceil(patch_px)), camera.width_px());
 }
 
 class Stopwatch {
@@ -39,6 +49,11 @@ class Stopwatch {
 FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
     : rig_(std::move(rig)), settings_(settings), extractor_(settings.features) {
   WAYMARK_CHECK(!rig_.cameras.empty());
+  for (const RigCamera& camera : rig_.cameras) {
+    view_masks_.emplace_back(camera.camera, settings.view);
+  }
+  const Camera& camera0 = *rig_.cameras[0].camera;
+  if (camera0.wrap_width_px() > 0.0) seam_.emplace(seam_margin_px(camera0));
   if (rig_.cameras.size() == 2) stereo_.emplace(rig_, settings.stereo);
 }
 
@@ -56,7 +71,7 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
   times_.features_ms = features_time.elapsed_ms();
   const Stopwatch depth_time;
   if (!images.image1.is_empty()) {
-    add_stereo(images.image1, *features);
+    add_stereo(images, *features);
   } else if (!images.depth.is_empty()) {
     sample_depth(images.depth,
                  settings_.depth,
@@ -73,9 +88,28 @@ const TangentArrays& FrameBuilder::compute_tangents(const Camera& camera) {
   return tangent_computer_.compute(camera, pixels_, level_scales_);
 }
 
+void FrameBuilder::extract_keypoints(const FrameImages& images) {
+  view_masks_[0].learn(images.image0);
+  const ImageView mask = view_masks_[0].num_levels(images.mask);
+  if (!seam_) {
+    extractor_.extract(images.image0, mask, keypoints_, descriptors_);
+    return;
+  }
+  const int width = images.image0.width_px;
+  const ImageView wide_mask =
+      seam_->widen_mask(mask, width, images.image0.height_px, Pyramid::kNumLevels);
+  extractor_.extract(seam_->widen(images.image0), wide_mask, keypoints_, descriptors_);
+  for (Keypoint& keypoint : keypoints_) {
+    keypoint.x_px -= static_cast<float>(seam_->margin_px());
+    const auto right = static_cast<float>(width) - 0.5f;
+    if (keypoint.x_px < -0.5f) keypoint.x_px += static_cast<float>(width);
+    if (keypoint.x_px >= right) keypoint.x_px -= static_cast<float>(width);
+  }
+}
+
 /// Features without a usable bearing are dropped.
 void FrameBuilder::extract_primary(const FrameImages& images, Features& features) {
-  extractor_.extract(images.image0, images.mask, keypoints_, descriptors_);
+  extract_keypoints(images);
   pixels_.clear();
   level_scales_.clear();
   for (const Keypoint& keypoint : keypoints_) {
@@ -102,10 +136,12 @@ void FrameBuilder::extract_primary(const FrameImages& images, Features& features
       });
 }
 
-void FrameBuilder::add_stereo(ImageView image1, Features& features) {
-  pyramid1_.build(image1);
+void FrameBuilder::add_stereo(const FrameImages& images, Features& features) {
+  view_masks_[1].learn(images.image1);
+  pyramid1_.build(images.image1);
+  if (seam_) pyramid0_.build(images.image0);
   const std::span<const StereoMatch> matches =
-      stereo_->search(extractor_.pyramid(), pyramid1_, features);
+      stereo_->search(seam_ ? pyramid0_ : extractor_.pyramid(), pyramid1_, features);
   pixels_.clear();
   level_scales_.clear();
   for (const StereoMatch& match : matches) {
@@ -114,8 +150,8 @@ void FrameBuilder::add_stereo(ImageView image1, Features& features) {
   }
   const TangentArrays& tangents = compute_tangents(*rig_.cameras[1].camera);
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!tangents.is_valid[i]) continue;
     const StereoMatch& match = matches[i];
+    if (!tangents.is_valid[i] || !view_masks_[1].allows(match.pixel, match.level)) continue;
     Keypoint keypoint = features.keypoints[match.primary];
     keypoint.x_px = static_cast<float>(match.pixel.x());
     keypoint.y_px = static_cast<float>(match.pixel.y());

@@ -14,7 +14,9 @@
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
 #include "waymark/image/pyramid.h"
+#include "waymark/image/seam.h"
 #include "waymark/image/stereo.h"
+#include "waymark/image/view_mask.h"
 
 namespace waymark {
 
@@ -22,6 +24,7 @@ struct FrameSettings {
   FeatureSettings features = {};
   StereoSettings stereo = {};
   DepthSettings depth = {};
+  ViewSettings view = {};
 };
 
 /// The images of one moment. Borrowed for the call only.
@@ -39,7 +42,8 @@ struct FrameTimes {
 };
 
 /// Turns images into the immutable data of a frame: extraction, tangents, stereo or depth. Keeps
-/// its buffers; what is new per frame is the result.
+/// its buffers; what is new per frame is the result. The same images give the same frame once the
+/// surroundings of the image circle are known (ViewMask::learn).
 class FrameBuilder {
  public:
   FrameBuilder(Rig rig, const FrameSettings& settings);
@@ -52,7 +56,8 @@ class FrameBuilder {
 
  private:
   void extract_primary(const FrameImages& images, Features& features);
-  void add_stereo(ImageView image1, Features& features);
+  void extract_keypoints(const FrameImages& images);
+  void add_stereo(const FrameImages& images, Features& features);
   const TangentArrays& compute_tangents(const Camera& camera);
   static void reserve(Features& features, std::size_t count);
   static void append(Features& features,
@@ -63,8 +68,11 @@ class FrameBuilder {
   Rig rig_;
   FrameSettings settings_;
   FeatureExtractor extractor_;
+  std::vector<ViewMask> view_masks_;  // Per camera of the rig.
+  std::optional<SeamPadding> seam_;   // Where the columns of camera 0 repeat.
   std::optional<StereoSearch> stereo_;
   TangentComputer tangent_computer_;
+  Pyramid pyramid0_;  // Where the extractor's has a wider image.
   Pyramid pyramid1_;
   std::vector<Keypoint> keypoints_;
   std::vector<Descriptor> descriptors_;

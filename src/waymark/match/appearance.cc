@@ -54,7 +54,8 @@ std::span<const FeatureMatch> AppearanceMatcher::match_near(
     candidates_.clear();
     b.grid.visit_near(pixel.x(), pixel.y(), radius_px, [&](std::uint32_t feature) {
       const Keypoint& keypoint = b.keypoints[feature];
-      if (std::hypot(keypoint.x_px - pixel.x(), keypoint.y_px - pixel.y()) > radius_px) return;
+      const double across = b.grid.column_distance_px(keypoint.x_px, pixel.x());
+      if (std::hypot(across, keypoint.y_px - pixel.y()) > radius_px) return;
       const float ratio = b.size_rad[feature] / size;
       if (ratio < kMaxSizeRatio && ratio > 1.0f / kMaxSizeRatio) candidates_.push_back(feature);
     });

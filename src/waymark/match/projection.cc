@@ -67,18 +67,18 @@ void ProjectionMatcher::find_candidates(std::size_t landmark,
   const double size_rad = landmarks.sizes_m[landmark] / points_in_cam_[landmark].norm();
   const double scale = std::max(1.0, size_rad / pixel_angles_.at(pixel));
   const double radius = radius_px * scale;
-  const double wrap = rig_->cameras[0].camera->wrap_width_px();
-  features.grid.visit_near(pixel.x(), pixel.y(), radius, [&](std::uint32_t feature) {
+  const double stretch = pixel_angles_.column_stretch(pixel);
+  const auto consider = [&](std::uint32_t feature) {
     const Keypoint& keypoint = features.keypoints[feature];
-    double dx = std::abs(keypoint.x_px - pixel.x());
+    const double dx = features.grid.column_distance_px(keypoint.x_px, pixel.x()) / stretch;
     const double dy = keypoint.y_px - pixel.y();
-    if (wrap > 0.0) dx = std::min(dx, wrap - dx);
     if (dx * dx + dy * dy > radius * radius) return;
     const double ratio = features.size_rad[feature] / size_rad;
     if (ratio > kMaxSizeRatio || ratio < 1.0 / kMaxSizeRatio) return;
     if (!is_taken.empty() && is_taken[feature]) return;
     candidates_.push_back(feature);
-  });
+  };
+  features.grid.visit_window(pixel.x(), pixel.y(), radius * stretch, radius, consider);
 }
 
 void ProjectionMatcher::choose(std::size_t landmark,

@@ -17,6 +17,7 @@ struct Settings {
   FeatureSettings features;
   StereoSettings stereo;
   DepthSettings depth;
+  ViewSettings view;
   TrackingSettings tracking;
   MappingSettings mapping;
 
@@ -35,6 +36,7 @@ struct Settings {
     field("features", self.features, SettingInfo{.help = "Corners and descriptors."});
     field("stereo", self.stereo, SettingInfo{.help = "Search in the second camera's image."});
     field("depth", self.depth, SettingInfo{.help = "Depth images."});
+    field("view", self.view, SettingInfo{.help = "Which directions are used."});
     field("tracking", self.tracking, SettingInfo{.help = "Pose of each frame."});
     field("mapping", self.mapping, SettingInfo{.help = "Landmarks and keyframes."});
   }

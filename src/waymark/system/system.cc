@@ -40,7 +40,7 @@ class System::Impl {
       : rig_(std::make_shared<const Rig>(std::move(rig))),
         settings_(settings),
         timing_(checked(timing)),
-        builder_(*rig_, {settings.features, settings.stereo, settings.depth}),
+        builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         mapper_(rig_, settings.mapping),
         worker_(timing, [this](const MapperMessage& message) { return process(message); }) {}
 

@@ -1,0 +1,182 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/image/view_mask.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <vector>
+
+#include "waymark/image/brief.h"
+#include "waymark/image/distance_transform.h"
+#include "waymark/image/pyramid.h"
+
+namespace waymark {
+namespace {
+
+/// Lenses with a visible image circle show more than this at the corners of the image.
+constexpr double kWideRad = std::numbers::pi / 3.0;
+/// Surroundings are darker than this, save for this share of a ring's pixels.
+constexpr int kBlack = 20;
+constexpr double kMaxBrightShare = 0.02;
+constexpr int kMaxBrightPixels = 2;
+/// The edge of the circle is as soft as this.
+constexpr double kSoftEdgePx = 2.0;
+/// A smaller circle, relative to the largest in the image, is a dark scene.
+constexpr double kMinCircle = 0.5;
+/// Surroundings of fewer rings are no circle's.
+constexpr int kMinRings = 4;
+
+constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+
+/// 1 where a pixel fulfils the test of its bearing, else 0; empty if all do.
+template <class Test>
+Image test_bearings(const Camera& camera, Test test) {
+  Image result(camera.width_px(), camera.height_px());
+  std::vector<Eigen::Vector2d> pixels(static_cast<std::size_t>(camera.width_px()));
+  std::vector<Eigen::Vector3d> bearings(pixels.size());
+  std::vector<std::uint8_t> is_valid(pixels.size());
+  bool are_all = true;
+  for (int y = 0; y < camera.height_px(); ++y) {
+    for (std::size_t x = 0; x < pixels.size(); ++x) pixels[x] = {static_cast<double>(x), y};
+    camera.unproject(pixels, bearings, is_valid);
+    for (std::size_t x = 0; x < pixels.size(); ++x) {
+      const bool is_good = test(is_valid[x] ? &bearings[x] : nullptr);
+      result.row(y)[x] = is_good;
+      are_all = are_all && is_good;
+    }
+  }
+  return are_all ? Image() : result;
+}
+
+Image directions_in_use(const Camera& camera, const ViewSettings& settings) {
+  const ViewSettings unlimited;
+  if (settings.max_angle_deg >= unlimited.max_angle_deg && settings.top_deg <= 0.0 &&
+      settings.bottom_deg <= 0.0) {
+    return {};
+  }
+  const double min_z = std::cos(settings.max_angle_deg * kRadPerDeg);
+  const double min_y = -std::cos(settings.top_deg * kRadPerDeg);
+  const double max_y = std::cos(settings.bottom_deg * kRadPerDeg);
+  return test_bearings(camera, [&](const Eigen::Vector3d* bearing) {
+    return bearing == nullptr ||
+           (bearing->z() >= min_z && bearing->y() >= min_y && bearing->y() <= max_y);
+  });
+}
+
+Eigen::Vector2d principal_point(const Camera& camera) {
+  const Eigen::Vector3d ahead(0.0, 0.0, 1.0);
+  Eigen::Vector2d pixel(0.5 * camera.width_px() - 0.5, 0.5 * camera.height_px() - 0.5);
+  Eigen::Vector2d projected;
+  std::uint8_t is_visible = 0;
+  camera.project({&ahead, 1}, {&projected, 1}, {&is_visible, 1});
+  return is_visible ? projected : pixel;
+}
+
+bool is_wide(const Camera& camera) {
+  if (camera.wrap_width_px() > 0.0) return false;
+  const double right = camera.width_px() - 1.0, bottom = camera.height_px() - 1.0;
+  const std::vector<Eigen::Vector2d> corners = {
+      {0.0, 0.0}, {right, 0.0}, {0.0, bottom}, {right, bottom}};
+  std::vector<Eigen::Vector3d> bearings(4);
+  std::vector<std::uint8_t> is_valid(4);
+  camera.unproject(corners, bearings, is_valid);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!is_valid[i] || bearings[i].z() < std::cos(kWideRad)) return true;
+  }
+  return false;
+}
+
+/// Radius of the smallest circle outside of which the image is black; beyond the corners if it is
+/// not.
+double lit_radius(ImageView image, const Eigen::Vector2d& center) {
+  std::vector<int> num_pixels, num_bright;
+  for (int y = 0; y < image.height_px; ++y) {
+    for (int x = 0; x < image.width_px; ++x) {
+      const auto ring = static_cast<std::size_t>(std::hypot(x - center.x(), y - center.y()));
+      if (ring >= num_pixels.size()) {
+        num_pixels.resize(ring + 1, 0);
+        num_bright.resize(ring + 1, 0);
+      }
+      ++num_pixels[ring];
+      num_bright[ring] += image.at(x, y) > kBlack;
+    }
+  }
+  std::size_t end = num_pixels.size();
+  while (end > 0 && num_bright[end - 1] <=
+                        std::max<double>(kMaxBrightPixels, kMaxBrightShare * num_pixels[end - 1])) {
+    --end;
+  }
+  return end + kMinRings > num_pixels.size() ? INFINITY : static_cast<double>(end);
+}
+
+}  // namespace
+
+ViewMask::ViewMask(std::shared_ptr<const Camera> camera, const ViewSettings& settings)
+    : camera_(std::move(camera)),
+      center_px_(principal_point(*camera_)),
+      may_have_circle_(is_wide(*camera_)),
+      has_bearing_(test_bearings(*camera_, [](const Eigen::Vector3d* b) { return b != nullptr; })),
+      is_direction_(directions_in_use(*camera_, settings)) {
+  update();
+}
+
+void ViewMask::learn(ImageView image) {
+  if (!may_have_circle_ || num_learned_ == kNumLearned) return;
+  ++num_learned_;
+  const double radius = lit_radius(image, center_px_);
+  if (radius < kMinCircle * 0.5 * std::min(image.width_px, image.height_px)) return;
+  if (radius <= circle_radius_px_) return;
+  circle_radius_px_ = radius;
+  update();
+}
+
+void ViewMask::update() {
+  num_levels_ = Image();
+  const bool has_circle = circle_radius_px_ > 0.0 && std::isfinite(circle_radius_px_);
+  const bool has_surroundings = has_circle || !has_bearing_.values.empty();
+  if (!has_surroundings && is_direction_.values.empty()) return;
+  num_levels_ = Image(camera_->width_px(), camera_->height_px());
+  Image is_scene = has_bearing_;
+  if (is_scene.values.empty()) {
+    is_scene = Image(camera_->width_px(), camera_->height_px());
+    std::fill(is_scene.values.begin(), is_scene.values.end(), std::uint8_t{1});
+  }
+  for (int y = 0; has_circle && y < is_scene.height_px; ++y) {
+    for (int x = 0; x < is_scene.width_px; ++x) {
+      const double radius = std::hypot(x - center_px_.x(), y - center_px_.y());
+      if (radius > circle_radius_px_ - kSoftEdgePx) is_scene.row(y)[x] = 0;
+    }
+  }
+  const std::vector<float> distances = distances_to_zero(is_scene.view());
+  for (std::size_t i = 0; i < distances.size(); ++i) {
+    int count = 0;
+    while (count < Pyramid::kNumLevels && distances[i] > kBriefRadius * Pyramid::scale(count)) {
+      ++count;
+    }
+    if (!is_direction_.values.empty() && is_direction_.values[i] == 0) count = 0;
+    num_levels_.values[i] = static_cast<std::uint8_t>(count);
+  }
+}
+
+ImageView ViewMask::num_levels(ImageView other) {
+  if (other.is_empty()) return num_levels_.values.empty() ? ImageView() : num_levels_.view();
+  if (combined_.values.empty()) combined_ = Image(camera_->width_px(), camera_->height_px());
+  for (int y = 0; y < combined_.height_px; ++y) {
+    const std::uint8_t* const allowed = num_levels_.values.empty() ? nullptr : num_levels_.row(y);
+    for (int x = 0; x < combined_.width_px; ++x) {
+      const std::uint8_t levels = allowed ? allowed[x] : Pyramid::kNumLevels;
+      combined_.row(y)[x] = other.at(x, y) == 0 ? 0 : levels;
+    }
+  }
+  return combined_.view();
+}
+
+bool ViewMask::allows(const Eigen::Vector2d& pixel, int level) const {
+  if (num_levels_.values.empty()) return true;
+  const int x = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, camera_->width_px() - 1);
+  const int y = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, camera_->height_px() - 1);
+  return num_levels_.view().at(x, y) > level;
+}
+
+}  // namespace waymark

@@ -1,0 +1,81 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+
+#include "waymark/base/settings.h"
+#include "waymark/camera/camera.h"
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+/// Directions that are not used, for what moves with the camera.
+struct ViewSettings {
+  double max_angle_deg = 180.0;
+  double top_deg = 0.0;
+  double bottom_deg = 0.0;
+
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field("max_angle_deg",
+          self.max_angle_deg,
+          SettingInfo{.low = 1.0,
+                      .high = 180.0,
+                      .unit = "degrees",
+                      .help = "No features farther than this off the optical axis."});
+    field("top_deg",
+          self.top_deg,
+          SettingInfo{.low = 0.0,
+                      .high = 90.0,
+                      .unit = "degrees",
+                      .help = "No features closer than this to straight up (-y of the camera)."});
+    field("bottom_deg",
+          self.bottom_deg,
+          SettingInfo{.low = 0.0,
+                      .high = 90.0,
+                      .unit = "degrees",
+                      .help = "No features closer than this to straight down (+y), where whoever "
+                              "carries a 360 degree camera is."});
+  }
+};
+
+/// Where in the images of a camera features may be. Kept free are pixels without a bearing, the
+/// black surroundings of a lens's image circle, and directions that the settings exclude.
+class ViewMask {
+ public:
+  /// The first images that are searched for black surroundings; an image may be dark all over.
+  static constexpr int kNumLearned = 10;
+
+  ViewMask(std::shared_ptr<const Camera> camera, const ViewSettings& settings);
+
+  /// Looks for the black surroundings of the image circle: the smallest circle around the principal
+  /// point outside of which no image so far shows anything. Does so for the first kNumLearned
+  /// images of a camera that is wide enough to have one; returns at once afterwards.
+  void learn(ImageView image);
+
+  /// How many pyramid levels may have features at each pixel: a feature's patch does not touch the
+  /// surroundings. 0 as well where the other mask, empty or of the same size, is 0. Empty where
+  /// there are no limits. Stays valid until the next call.
+  ImageView num_levels(ImageView other);
+
+  /// Whether a feature of the level may be at a pixel of the image.
+  bool allows(const Eigen::Vector2d& pixel, int level) const;
+
+ private:
+  void update();
+
+  std::shared_ptr<const Camera> camera_;
+  Eigen::Vector2d center_px_;
+  bool may_have_circle_;
+  double circle_radius_px_ = 0.0;  // 0: not found.
+  int num_learned_ = 0;
+  Image has_bearing_;   // 1 or 0; empty: all have.
+  Image is_direction_;  // 1 or 0 by the settings; empty: all are used.
+  Image num_levels_;    // Empty: no limits.
+  Image combined_;
+};
+
+}  // namespace waymark
