@@ -9,8 +9,13 @@
 
 namespace waymark {
 
+/// Standard deviation of stereo parallax in pixels of the feature's level. On rendered images 80 %
+/// of the errors are below 0.11 and 95 % below 0.25; lenses, motion and compression add to that.
+inline constexpr double kStereoSigmaPx = 0.4;
+
 /// Standard deviation of the range of a primary feature relative to the range itself: from the
-/// depth sensor's model, or from one pixel of stereo parallax. Nothing where there is no range.
+/// depth sensor's model, or from stereo parallax with kStereoSigmaPx. Nothing where there is no
+/// range.
 inline std::optional<double> relative_range_sigma(const Rig& rig,
                                                   const Features& features,
                                                   std::uint32_t feature) {
@@ -26,7 +31,8 @@ inline std::optional<double> relative_range_sigma(const Rig& rig,
   const Eigen::Vector3d centre1 = cam1_from_cam0.origin_in_source();
   // Only the part of the baseline across the ray gives parallax.
   const double across = centre1.cross(features.bearings[feature].cast<double>()).norm();
-  return across > 0.0 ? std::optional(range * features.size_rad[partner] / across) : std::nullopt;
+  if (!(across > 0.0)) return std::nullopt;
+  return kStereoSigmaPx * range * features.size_rad[partner] / across;
 }
 
 /// Ranges better than this make landmarks and count as near.
