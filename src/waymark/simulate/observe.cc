@@ -198,13 +198,14 @@ void append(const Camera& camera,
 }
 
 /// Distance along bearing0 where it meets bearing1 best: the component of b1 x (r R b0 + t) = 0
-/// along b1 x R b0; 0 where the rays do not meet in front.
+/// along b1 x t, which is what the epipolar plane holds; noise across the plane says nothing of the
+/// distance. 0 where the rays do not meet in front.
 float stereo_range(const Rigid3& cam1_from_cam0,
                    const Vector3d& bearing0,
                    const Vector3d& bearing1) {
-  const Vector3d across = bearing1.cross(cam1_from_cam0.rotation * bearing0);
+  const Vector3d normal = bearing1.cross(cam1_from_cam0.translation);
   const double range =
-      -across.dot(bearing1.cross(cam1_from_cam0.translation)) / across.squaredNorm();
+      -normal.squaredNorm() / normal.dot(bearing1.cross(cam1_from_cam0.rotation * bearing0));
   return std::isfinite(range) && range > 0.0 ? static_cast<float>(range) : 0.0f;
 }
 
