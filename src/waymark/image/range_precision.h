@@ -38,6 +38,9 @@ inline std::optional<double> relative_range_sigma(const Rig& rig,
 /// Ranges better than this make landmarks and count as near.
 inline constexpr double kReliableRangeSigma = 0.1;
 
+/// Ranges better than this are told from infinity by two standard deviations.
+inline constexpr double kFiniteRangeSigma = 0.5;
+
 inline bool has_reliable_range(const Rig& rig, const Features& features, std::uint32_t feature) {
   const std::optional<double> sigma = relative_range_sigma(rig, features, feature);
   return sigma && *sigma < kReliableRangeSigma;

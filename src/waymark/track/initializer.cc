@@ -22,6 +22,29 @@ constexpr std::uint32_t kReferenceInterval = 3;
 constexpr double kMinParallaxPx = 12.0;
 constexpr double kSearchRadiusPx = 60.0;
 
+/// Primary features whose range has at most this relative standard deviation.
+std::vector<std::uint32_t> features_with_range(const Rig& rig,
+                                               const Features& features,
+                                               double max_relative_sigma) {
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    const std::optional<double> sigma = relative_range_sigma(rig, features, i);
+    if (sigma && *sigma < max_relative_sigma) chosen.push_back(i);
+  }
+  return chosen;
+}
+
+/// Features to start a map from. Those with a reliable range, and where the baseline is too short
+/// for the scene to have enough of them, all whose range is finite: an error of sigma pixels in the
+/// stereo parallax moves a landmark by sigma * d / b pixels in a view at distance d from the first,
+/// b being the baseline, however far the landmark is. So far ones serve to track the first frames
+/// as well as near ones, and later views refine them.
+std::vector<std::uint32_t> features_to_start_from(const Rig& rig, const Features& features) {
+  std::vector<std::uint32_t> chosen = features_with_range(rig, features, kReliableRangeSigma);
+  if (chosen.size() >= kMinLandmarks) return chosen;
+  return features_with_range(rig, features, kFiniteRangeSigma);
+}
+
 std::vector<Eigen::Vector2f> pixels_of(const Features& features) {
   std::vector<Eigen::Vector2f> pixels;
   for (std::size_t i = 0; i < features.num_primary; ++i) {
@@ -159,8 +182,7 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
   start.submap.is_metric = true;
   start.submap.keyframes.push_back({frame.id, frame.timestamp_ns, Rigid3{}, frame.features});
   const Rigid3 world_from_cam = rig_->cameras[0].cam_from_rig.inverse();
-  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
-    if (!has_reliable_range(*rig_, features, i)) continue;
+  for (const std::uint32_t i : features_to_start_from(*rig_, features)) {
     const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
     start.submap.landmarks.push_back({world_from_cam * point, {i}});
   }

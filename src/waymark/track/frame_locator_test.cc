@@ -1,0 +1,121 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/frame_locator.h"
+
+#include <gtest/gtest.h>
+
+#include <Eigen/Cholesky>
+
+#include "waymark/track/test_map.h"
+
+namespace waymark {
+namespace {
+
+/// Two keyframes, and a view between them to be located.
+class FrameLocatorTest : public ::testing::TestWithParam<int> {
+ protected:
+  FrameLocatorTest() : scene_(GetParam(), cloud_ahead(), {.seed = 5}, true), locator_(scene_.rig) {
+    scene_.add_keyframe(pose_at(0.0));
+    scene_.add_keyframe(pose_at(0.5));
+    view_ = scene_.look(truth_, 100);
+    landmarks_ = scene_.true_associations(view_);
+  }
+
+  LocatedFrame locate() {
+    const Rigid3 guess =
+        Rigid3::exp((Vector6d() << 0.05, -0.03, 0.04, 0.01, -0.02, 0.01).finished()) *
+        truth_.inverse();
+    return locator_.locate(*view_.features, scene_.map, guess, landmarks_);
+  }
+
+  const Rigid3 truth_ = pose_at(0.3, 0.1, 0.2, 0.03);
+  TestMap scene_;
+  FrameLocator locator_;
+  PointObservation view_;
+  std::vector<LandmarkId> landmarks_;  ///< Of the view, as the matcher would find them.
+};
+
+TEST_P(FrameLocatorTest, FindsThePoseWithinItsCovariance) {
+  const LocatedFrame located = locate();
+  const Vector6d error = (located.rig_from_world * truth_).log();
+  EXPECT_LT(error.head<3>().norm(), 0.02);
+  EXPECT_LT(error.tail<3>().norm(), 0.004);
+  // 99.99 % of chi-square with 6 degrees of freedom.
+  EXPECT_LT(error.dot(located.covariance.ldlt().solve(error)), 27.9);
+  EXPECT_GT(located.num_inliers, 200);
+  EXPECT_GE(located.num_matches, located.num_inliers);
+}
+
+TEST_P(FrameLocatorTest, ClearsWrongAssociationsAndKeepsRightOnes) {
+  const std::vector<LandmarkId> truth = landmarks_;
+  std::vector<std::uint32_t> with_landmark;
+  for (std::uint32_t i = 0; i < view_.features->num_primary; ++i) {
+    if (truth[i].is_valid()) with_landmark.push_back(i);
+  }
+  // Each fourth gets the landmark of one that is far away in the list, hence in the image.
+  const std::size_t half = with_landmark.size() / 2;
+  std::vector<std::uint32_t> wrong;
+  for (std::size_t k = 0; k < half; k += 4) {
+    wrong.push_back(with_landmark[k]);
+    landmarks_[with_landmark[k]] = truth[with_landmark[k + half]];
+    landmarks_[with_landmark[k + half]] = LandmarkId{};
+  }
+  const LocatedFrame located = locate();
+  std::size_t num_wrong_kept = 0;
+  for (const std::uint32_t i : wrong) num_wrong_kept += landmarks_[i].is_valid();
+  EXPECT_LE(num_wrong_kept, wrong.size() / 20);
+  std::size_t num_right_kept = 0;
+  int num_valid = 0;
+  for (const std::uint32_t i : with_landmark) {
+    num_right_kept += landmarks_[i].is_valid() && landmarks_[i] == truth[i];
+    num_valid += landmarks_[i].is_valid();
+  }
+  // The gate keeps 95 % of those with 1 px of noise, hence more of these.
+  const std::size_t num_right = with_landmark.size() - 2 * wrong.size();
+  EXPECT_GE(num_right_kept, num_right * 95 / 100);
+  EXPECT_EQ(located.num_inliers, num_valid);
+  EXPECT_LT((located.rig_from_world * truth_).log().head<3>().norm(), 0.02);
+}
+
+TEST_P(FrameLocatorTest, PartnersFollowTheirPrimaries) {
+  auto damaged = std::make_shared<Features>(*view_.features);
+  std::vector<std::uint32_t> bad_partners;
+  for (std::uint32_t i = 0; i < damaged->num_primary; i += 10) {
+    if (damaged->partner[i] == kNoFeature || !landmarks_[i].is_valid()) continue;
+    bad_partners.push_back(damaged->partner[i]);
+    Eigen::Vector3f& bearing = damaged->bearings[damaged->partner[i]];
+    bearing = (bearing + Eigen::Vector3f(0.1f, 0.0f, 0.0f)).normalized();
+  }
+  view_.features = damaged;
+  locate();
+  std::size_t num_set = 0;
+  for (std::uint32_t i = 0; i < damaged->num_primary; ++i) {
+    const std::uint32_t partner = damaged->partner[i];
+    if (partner == kNoFeature || !landmarks_[partner].is_valid()) continue;
+    EXPECT_EQ(landmarks_[partner], landmarks_[i]);
+    ++num_set;
+  }
+  if (GetParam() == 1) {
+    EXPECT_EQ(num_set, 0u);
+    return;
+  }
+  EXPECT_GT(num_set, 100u);
+  ASSERT_FALSE(bad_partners.empty());
+  for (const std::uint32_t partner : bad_partners) EXPECT_FALSE(landmarks_[partner].is_valid());
+}
+
+TEST_P(FrameLocatorTest, WithoutLandmarksTheGuessComesBack) {
+  landmarks_.assign(landmarks_.size(), LandmarkId{});
+  const Rigid3 guess = truth_.inverse();
+  const LocatedFrame located = locator_.locate(*view_.features, scene_.map, guess, landmarks_);
+  EXPECT_EQ(located.num_matches, 0);
+  EXPECT_EQ(located.num_inliers, 0);
+  EXPECT_TRUE(located.rig_from_world.matrix().isApprox(guess.matrix(), 1e-12));
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras, FrameLocatorTest, ::testing::Values(1, 2), [](const auto& info) {
+  return info.param == 1 ? "mono" : "stereo";
+});
+
+}  // namespace
+}  // namespace waymark

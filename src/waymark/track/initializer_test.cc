@@ -1,0 +1,223 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/initializer.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <functional>
+
+#include "waymark/image/range_precision.h"
+#include "waymark/track/test_map.h"
+
+namespace waymark {
+namespace {
+
+using Path = std::function<Rigid3(std::uint32_t)>;
+
+/// What the frames of a path see.
+struct Scene {
+  std::shared_ptr<const Rig> rig;
+  PointCloud cloud;
+  PointNoise noise;
+  Path world_from_rig;
+
+  PointObservation look(std::uint32_t frame) const {
+    return observe(cloud, *rig, world_from_rig(frame), noise, frame);
+  }
+  Frame frame(std::uint32_t number) const {
+    return {FrameId{number}, 50'000'000 * std::int64_t{number}, look(number).features};
+  }
+};
+
+struct Started {
+  std::optional<Initialization> start;
+  std::uint32_t at = 0;
+  FrameReason reason = FrameReason::kNone;
+};
+
+Started run(const Scene& scene, bool has_range, std::uint32_t num_frames) {
+  Initializer initializer(scene.rig, has_range, 7);
+  Started started;
+  for (; started.at < num_frames; ++started.at) {
+    started.start = initializer.add(scene.frame(started.at));
+    started.reason = initializer.reason();
+    if (started.start) break;
+  }
+  return started;
+}
+
+Scene mono_scene(Path path) {
+  return {make_test_rig(1), cloud_ahead(), {.seed = 2, .outlier_share = 0.1}, std::move(path)};
+}
+
+Path sideways() {
+  return [](std::uint32_t i) { return pose_at(0.04 * i, 0.002 * i, 0.01 * i, 0.002 * i); };
+}
+
+TEST(Initializer, MonoStartsWithTheTrueMotionUpToScale) {
+  const Scene scene = mono_scene(sideways());
+  const Started started = run(scene, false, 40);
+  ASSERT_TRUE(started.start);
+  const NewSubmap& submap = started.start->submap;
+  EXPECT_FALSE(submap.is_metric);
+  ASSERT_EQ(submap.keyframes.size(), 2u);
+  EXPECT_EQ(submap.keyframes[1].frame, FrameId{started.at});
+  EXPECT_TRUE(submap.keyframes[0].rig_from_world.matrix().isIdentity(1e-12));
+  EXPECT_EQ(started.start->rig_from_world.matrix(), submap.keyframes[1].rig_from_world.matrix());
+  const Rigid3 world_from_first = scene.world_from_rig(submap.keyframes[0].frame.value);
+  const Rigid3 truth = scene.world_from_rig(started.at).inverse() * world_from_first;
+  const Rigid3& estimate = submap.keyframes[1].rig_from_world;
+  EXPECT_LT(estimate.rotation.angularDistance(truth.rotation), 0.01);
+  EXPECT_GT(estimate.translation.normalized().dot(truth.translation.normalized()), 0.995);
+
+  // The landmarks lie where the points are, in units of their median distance.
+  const double scale = truth.translation.norm() / estimate.translation.norm();
+  const PointObservation first = scene.look(submap.keyframes[0].frame.value);
+  std::vector<double> errors, distances;
+  for (const InitialLandmark& landmark : submap.landmarks) {
+    distances.push_back(landmark.position_in_world.norm());
+    const std::uint32_t index = first.landmark_of_feature[landmark.features[0]];
+    if (index == kNoLandmark) continue;
+    const Eigen::Vector3d point =
+        world_from_first.inverse() * scene.cloud.landmarks[index].position;
+    errors.push_back((scale * landmark.position_in_world - point).norm() / point.norm());
+  }
+  std::sort(errors.begin(), errors.end());
+  std::sort(distances.begin(), distances.end());
+  EXPECT_NEAR(distances[distances.size() / 2], 1.0, 1e-9);
+  ASSERT_GT(errors.size(), submap.landmarks.size() * 9 / 10);
+  // 12 px of parallax with 0.5 px of noise in both views tell a distance to 6 %.
+  EXPECT_LT(errors[errors.size() / 2], 0.06);
+}
+
+TEST(Initializer, MonoFillsTheFramesItSkipped) {
+  const Scene scene = mono_scene(sideways());
+  const Started started = run(scene, false, 40);
+  ASSERT_TRUE(started.start);
+  ASSERT_GT(started.at, 1u);
+  const NewSubmap& submap = started.start->submap;
+  const Rigid3 world_from_first = scene.world_from_rig(submap.keyframes[0].frame.value);
+  const double scale =
+      (scene.world_from_rig(started.at).inverse() * world_from_first).translation.norm() /
+      submap.keyframes[1].rig_from_world.translation.norm();
+  std::vector<bool> is_filled(started.at, false);
+  for (const FilledPose& filled : started.start->filled) {
+    ASSERT_LT(filled.frame.value, started.at);
+    EXPECT_FALSE(is_filled[filled.frame.value]) << "twice: " << filled.frame.value;
+    is_filled[filled.frame.value] = true;
+    EXPECT_EQ(filled.pose.reference, KeyframeId{0});
+    const Rigid3 truth = scene.world_from_rig(filled.frame.value).inverse() * world_from_first;
+    Rigid3 estimate = filled.pose.rig_from_reference;
+    estimate.translation *= scale;
+    const Vector6d error = (estimate * truth.inverse()).log();
+    EXPECT_LT(error.head<3>().norm(), 0.08) << filled.frame.value;
+    EXPECT_LT(error.tail<3>().norm(), 0.012) << filled.frame.value;
+  }
+  EXPECT_EQ(std::count(is_filled.begin(), is_filled.end(), false), 0);
+}
+
+TEST(Initializer, MonoWaitsWhileTheCameraOnlyTurns) {
+  const Scene scene = mono_scene([](std::uint32_t i) {
+    return make_test_pose({}, {0.0, 0.01 * i, 0.002 * i});
+  });
+  const Started started = run(scene, false, 25);
+  EXPECT_FALSE(started.start);
+  EXPECT_EQ(started.reason, FrameReason::kTooLittleParallax);
+}
+
+TEST(Initializer, MonoStartsOnceTurningBecomesMoving) {
+  const Scene scene = mono_scene([](std::uint32_t i) {
+    return i < 15 ? pose_at(0.0, 0.0, 0.0, 0.01 * i) : pose_at(0.05 * (i - 14), 0.0, 0.0, 0.15);
+  });
+  const Started started = run(scene, false, 50);
+  ASSERT_TRUE(started.start);
+  EXPECT_GE(started.at, 15u);
+}
+
+TEST(Initializer, MonoRefusesViewsThatHaveNothingInCommon) {
+  Scene scene = mono_scene(sideways());
+  scene.world_from_rig = [](std::uint32_t i) { return pose_at(0.0, 0.0, 0.0, 2.1 * i); };
+  scene.cloud = scatter_in({-9.0, -3.0, -9.0}, {9.0, 3.0, 9.0}, 6000, 6.0, 3);
+  const Started started = run(scene, false, 3);
+  EXPECT_FALSE(started.start);
+  EXPECT_EQ(started.reason, FrameReason::kTooFewMatches);
+}
+
+TEST(Initializer, SaysWhenThereAreNoFeatures) {
+  for (const bool has_range : {false, true}) {
+    Scene scene = mono_scene(sideways());
+    scene.rig = make_test_rig(has_range ? 2 : 1);
+    scene.noise.max_features = 10;
+    const Started started = run(scene, has_range, 3);
+    EXPECT_FALSE(started.start);
+    EXPECT_EQ(started.reason, FrameReason::kNoFeatures);
+  }
+}
+
+TEST(Initializer, SameSeedSameBits) {
+  const Started once = run(mono_scene(sideways()), false, 40);
+  const Started again = run(mono_scene(sideways()), false, 40);
+  ASSERT_TRUE(once.start && again.start);
+  EXPECT_EQ(once.at, again.at);
+  EXPECT_EQ(once.start->rig_from_world.matrix(), again.start->rig_from_world.matrix());
+  ASSERT_EQ(once.start->submap.landmarks.size(), again.start->submap.landmarks.size());
+}
+
+Scene stereo_scene(double near_m) {
+  PointCloud cloud =
+      scatter_in({-near_m, -near_m / 2, near_m}, {near_m, near_m / 2, 2 * near_m}, 1500, near_m, 3);
+  return {make_test_rig(2), std::move(cloud), {.seed = 2}, sideways()};
+}
+
+TEST(Initializer, RangeStartsAtOnceWithTheReliableOnes) {
+  const Scene scene = stereo_scene(2.0);
+  const Started started = run(scene, true, 1);
+  ASSERT_TRUE(started.start);
+  const NewSubmap& submap = started.start->submap;
+  EXPECT_TRUE(submap.is_metric);
+  ASSERT_EQ(submap.keyframes.size(), 1u);
+  const PointObservation view = scene.look(0);
+  std::size_t num_reliable = 0;
+  for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
+    num_reliable += has_reliable_range(*scene.rig, *view.features, i);
+  }
+  EXPECT_EQ(submap.landmarks.size(), num_reliable);
+  for (const InitialLandmark& landmark : submap.landmarks) {
+    const std::uint32_t index = view.landmark_of_feature[landmark.features[0]];
+    ASSERT_NE(index, kNoLandmark);
+    const Eigen::Vector3d point =
+        scene.world_from_rig(0).inverse() * scene.cloud.landmarks[index].position;
+    // Reliable means 10 % with one pixel of noise; here there is half of that in both views.
+    EXPECT_LT((landmark.position_in_world - point).norm(), 0.4 * point.norm());
+  }
+}
+
+// 50 px per metre of inverse range: at 15 to 30 m, 1.7 to 3.4 px.
+TEST(Initializer, ABaselineShortForTheSceneStillStarts) {
+  const Scene scene = stereo_scene(15.0);
+  const PointObservation view = scene.look(0);
+  for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
+    ASSERT_FALSE(has_reliable_range(*scene.rig, *view.features, i));
+  }
+  const Started started = run(scene, true, 1);
+  ASSERT_TRUE(started.start);
+  EXPECT_TRUE(started.start->submap.is_metric);
+  for (const InitialLandmark& landmark : started.start->submap.landmarks) {
+    const std::optional<double> sigma =
+        relative_range_sigma(*scene.rig, *view.features, landmark.features[0]);
+    ASSERT_TRUE(sigma);
+    EXPECT_LT(*sigma, kFiniteRangeSigma);
+  }
+}
+
+TEST(Initializer, RangeThatIsNotThereStartsNothing) {
+  Scene scene = stereo_scene(2.0);
+  scene.rig = make_test_rig(1);  // Features as of a stereo frame whose right image is black.
+  const Started started = run(scene, true, 3);
+  EXPECT_FALSE(started.start);
+  EXPECT_EQ(started.reason, FrameReason::kTooFewMatches);
+}
+
+}  // namespace
+}  // namespace waymark

@@ -1,0 +1,181 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/tracker.h"
+
+#include <gtest/gtest.h>
+
+#include <variant>
+
+#include "waymark/track/test_map.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kMaxFrames = 40;
+
+/// Slowly to the side, looking ahead. The world is the first frame.
+Rigid3 path(double frame) { return pose_at(0.02 * frame, 0.0, 0.0, 0.001 * frame); }
+
+/// A stereo rig before a cloud, and a map as a mapper without mistakes would make it of the
+/// tracker's messages: every feature of a keyframe is associated with what it shows.
+class TrackerTest : public ::testing::Test {
+ protected:
+  TrackerTest() : scene_(2, cloud(), {.seed = 4}, true), tracker_(make_tracker()) {}
+
+  static PointCloud cloud() { return scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 3); }
+
+  Tracker make_tracker() const { return {scene_.rig, true, TrackingSettings{}, 1}; }
+
+  TrackOutcome track(std::uint32_t number, const Features& features) {
+    StageTimes times;
+    const Frame frame{FrameId{number},
+                      50'000'000 * std::int64_t{number},
+                      std::make_shared<const Features>(features)};
+    return tracker_.track(frame, map_, times);
+  }
+
+  /// Tracks a view and lets the mapper answer.
+  TrackOutcome track(std::uint32_t number, const Rigid3& world_from_rig) {
+    TrackOutcome outcome = track(number, *scene_.look(world_from_rig, number).features);
+    if (outcome.message) {
+      scene_.add_keyframe(world_from_rig);
+      map_ = scene_.map.freeze();
+    }
+    return outcome;
+  }
+
+  /// Tracks along the path and ends before a frame.
+  void follow_path(std::uint32_t end) {
+    for (std::uint32_t i = 0; i < end; ++i) {
+      ASSERT_EQ(track(i, path(i)).state, FrameState::kTracked) << i;
+    }
+  }
+
+  static void expect_pose(const TrackOutcome& outcome, const Rigid3& world_from_rig) {
+    ASSERT_TRUE(outcome.pose);
+    const Vector6d error = (outcome.rig_from_world * world_from_rig).log();
+    EXPECT_LT(error.head<3>().norm(), 0.02);
+    EXPECT_LT(error.tail<3>().norm(), 0.005);
+  }
+
+  TestMap scene_;
+  Tracker tracker_;
+  std::shared_ptr<const Map> map_ = std::make_shared<const Map>();
+};
+
+TEST_F(TrackerTest, StartsASubmapAndThenFollows) {
+  const TrackOutcome first = track(0, path(0));
+  EXPECT_EQ(first.state, FrameState::kTracked);
+  ASSERT_TRUE(first.message);
+  EXPECT_TRUE(std::holds_alternative<NewSubmap>(*first.message));
+  for (std::uint32_t i = 1; i < kMaxFrames; ++i) {
+    const TrackOutcome outcome = track(i, path(i));
+    ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
+    EXPECT_EQ(outcome.reason, FrameReason::kNone);
+    expect_pose(outcome, path(i));
+    EXPECT_GE(outcome.num_matches, outcome.num_inliers);
+    EXPECT_GT(outcome.covariance.trace(), 0.0);
+    // The pose is the same by reference.
+    const Rigid3 again = map_->rig_from_world(
+        outcome.pose->reference, outcome.pose->rig_from_reference, outcome.pose->reference_scale);
+    EXPECT_TRUE(again.matrix().isApprox(outcome.rig_from_world.matrix(), 1e-9));
+  }
+}
+
+TEST_F(TrackerTest, AsksForKeyframesWithConsecutiveIdsAndTrueAssociations) {
+  std::uint32_t num_keyframes = 1;
+  int num_right = 0, num_wrong = 0;
+  track(0, path(0));
+  for (std::uint32_t i = 1; i < 2 * kMaxFrames; ++i) {
+    const Rigid3 pose = path(2.0 * i);  // Twice as fast.
+    const PointObservation view = scene_.look(pose, i);
+    const std::vector<LandmarkId> truth = scene_.true_associations(view);
+    const TrackOutcome outcome = track(i, pose);
+    ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
+    ASSERT_EQ(outcome.message.has_value(), outcome.keyframe.has_value());
+    if (!outcome.message) continue;
+    EXPECT_EQ(*outcome.keyframe, KeyframeId{num_keyframes++});
+    const auto& message = std::get<NewKeyframe>(*outcome.message);
+    EXPECT_EQ(message.frame, FrameId{i});
+    ASSERT_EQ(message.landmarks.size(), view.features->size());
+    for (std::uint32_t k = 0; k < view.features->num_primary; ++k) {
+      if (!message.landmarks[k].is_valid()) continue;
+      (message.landmarks[k] == truth[k] ? num_right : num_wrong) += 1;
+    }
+    for (std::size_t k = 1; k < message.sightings.size(); ++k) {
+      EXPECT_LT(message.sightings[k - 1].landmark, message.sightings[k].landmark);
+    }
+    for (const Sighting& sighting : message.sightings) {
+      EXPECT_GT(sighting.num_visible + sighting.num_found, 0u);
+    }
+  }
+  EXPECT_GE(num_keyframes, 3u) << "3 metres past a scene 2 to 5 metres away";
+  EXPECT_GT(num_right, 300);
+  EXPECT_LT(num_wrong, num_right / 50);
+}
+
+TEST_F(TrackerTest, MovesWithTheMap) {
+  follow_path(10);
+  // The mapper finds that everything stands elsewhere.
+  const Rigid3 moved = make_test_pose({1.0, -2.0, 0.5}, {0.1, 0.4, -0.2});
+  std::vector<std::pair<KeyframeId, Rigid3>> poses;
+  map_->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    poses.emplace_back(id, keyframe.rig_from_world * moved.inverse());
+  });
+  std::vector<std::pair<LandmarkId, Eigen::Vector3d>> points;
+  map_->landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+    points.emplace_back(id, moved * landmark.position_in_world);
+  });
+  for (const auto& [id, pose] : poses) scene_.map.move_keyframe(id, pose);
+  for (const auto& [id, point] : points) {
+    scene_.map.move_landmark(id, point);
+    Appearance appearance = scene_.map.landmarks().at(id).appearance;
+    appearance.direction = moved.rotation * appearance.direction;
+    scene_.map.set_appearance(id, appearance);
+  }
+  map_ = scene_.map.freeze();
+  const TrackOutcome outcome = track(10, *scene_.look(path(10), 10).features);
+  ASSERT_EQ(outcome.state, FrameState::kTracked);
+  expect_pose(outcome, moved * path(10));
+}
+
+TEST_F(TrackerTest, IsLostWhereItSeesNothingKnownAndRecoversWhereItDoes) {
+  follow_path(10);
+  const TrackOutcome away = track(10, pose_at(0.2, 0.0, 0.0, 3.1));
+  EXPECT_EQ(away.state, FrameState::kLost);
+  EXPECT_NE(away.reason, FrameReason::kNone);
+  EXPECT_FALSE(away.pose);
+  EXPECT_FALSE(away.message);
+  // Back, but not where the motion would have led.
+  const TrackOutcome back = track(11, pose_at(0.05, 0.05, -0.1, -0.03));
+  ASSERT_EQ(back.state, FrameState::kTracked);
+  expect_pose(back, pose_at(0.05, 0.05, -0.1, -0.03));
+  EXPECT_EQ(track(12, path(3)).state, FrameState::kTracked);
+}
+
+TEST_F(TrackerTest, SaysThatAFrameHasNoFeatures) {
+  follow_path(5);
+  const TrackOutcome outcome = track(5, Features{});
+  EXPECT_EQ(outcome.state, FrameState::kLost);
+  EXPECT_EQ(outcome.reason, FrameReason::kNoFeatures);
+  EXPECT_EQ(track(6, path(6)).state, FrameState::kTracked);
+}
+
+TEST_F(TrackerTest, FollowsASuddenTurn) {
+  follow_path(10);
+  // 40 px: more than the motion model expects, less than the widest search.
+  const Rigid3 turned = pose_at(0.2, 0.0, 0.0, 0.01 + 30.0 / 420.0);
+  const TrackOutcome outcome = track(10, turned);
+  ASSERT_EQ(outcome.state, FrameState::kTracked);
+  expect_pose(outcome, turned);
+}
+
+TEST_F(TrackerTest, StaysInitializingWhileThereAreNoFeatures) {
+  const TrackOutcome outcome = track(0, Features{});
+  EXPECT_EQ(outcome.state, FrameState::kInitializing);
+  EXPECT_EQ(outcome.reason, FrameReason::kNoFeatures);
+  EXPECT_EQ(track(1, path(1)).state, FrameState::kTracked);
+}
+
+}  // namespace
+}  // namespace waymark
