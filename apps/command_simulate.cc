@@ -18,6 +18,7 @@
 #include "waymark/io/atomic_file.h"
 #include "waymark/io/input.h"
 #include "waymark/simulate/dataset.h"
+#include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/suite.h"
 
 namespace waymark {
@@ -26,12 +27,21 @@ namespace {
 struct SimulateOptions {
   std::string name;  ///< Of a world, or of a sequence of the suite.
   std::filesystem::path out;
-  std::filesystem::path camera;  ///< Camchain file; empty: the cameras below.
+  std::string camera;  ///< Camchain file or name; empty: the default.
   Setup setup = Setup::kStereo;
   SequenceSpec spec;
   bool is_list = false;
   bool is_quiet = false;
 };
+
+CameraChain chain_of(const SimulateOptions& options) {
+  if (options.camera.empty()) return default_camera_chain(options.setup);
+  const std::vector<std::string> names = camera_names();
+  if (std::find(names.begin(), names.end(), options.camera) != names.end()) {
+    return named_camera_chain(options.camera, options.setup);
+  }
+  return read_camera_chain(options.camera, options.setup);
+}
 
 SequenceSpec spec_of(const SimulateOptions& options) {
   const std::vector<std::string> worlds = world_names();
@@ -44,14 +54,14 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   }
   SequenceSpec spec = options.spec;
   spec.name = spec.world = options.name;
-  spec.chain = options.camera.empty() ? default_camera_chain(options.setup)
-                                      : read_camera_chain(options.camera, options.setup);
+  spec.chain = chain_of(options);
   return spec;
 }
 
 int list_choices() {
   for (const std::string& world : world_names()) fmt::print("world {}\n", world);
   for (const std::string& motion : motion_names()) fmt::print("motion {}\n", motion);
+  for (const std::string& camera : camera_names()) fmt::print("camera {}\n", camera);
   for (const SuiteEntry& entry : simulated_suite()) {
     fmt::print("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
   }
@@ -88,7 +98,9 @@ void add_simulate_command(CLI::App& program, Command& command) {
       "WORLD", options->name, "A world, or a sequence of the evaluation suite; see --list");
   simulation.add_option("-o,--out", options->out, "Folder for the data set");
   simulation.add_option(
-      "--camera", options->camera, "Camchain file [640x480 pinhole, a pair 11 cm apart]");
+      "--camera",
+      options->camera,
+      "Camchain file, or a name, see --list [640x480 pinhole, a pair 11 cm apart]");
   add_choice<Setup>(simulation,
                     "--setup",
                     options->setup,

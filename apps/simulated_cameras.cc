@@ -8,12 +8,14 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
+#include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/sequence.h"
 
 namespace waymark {
 namespace {
 
 constexpr double kDepthFactor = 5000.0;
+constexpr int kHeightPx = 480;
 
 /// A moderately distorted camera; the second of a pair is neither parallel to the first nor like
 /// it.
@@ -35,18 +37,29 @@ Rigid3 default_cam1_from_cam0() {
   return Rigid3::exp(motion);
 }
 
+CameraChain make_chain(Setup setup,
+                       const CameraDescription& camera0,
+                       const CameraDescription& camera1) {
+  switch (setup) {
+    case Setup::kMono:
+      return mono_chain(camera0);
+    case Setup::kStereo:
+      return stereo_chain(camera0, camera1, default_cam1_from_cam0());
+    case Setup::kRgbd:
+      return rgbd_chain(camera0, kDepthFactor);
+  }
+  return {};
+}
+
 }  // namespace
 
 CameraChain default_camera_chain(Setup setup) {
-  switch (setup) {
-    case Setup::kMono:
-      return mono_chain(default_camera(0));
-    case Setup::kStereo:
-      return stereo_chain(default_camera(0), default_camera(1), default_cam1_from_cam0());
-    case Setup::kRgbd:
-      return rgbd_chain(default_camera(0), kDepthFactor);
-  }
-  return {};
+  return make_chain(setup, default_camera(0), default_camera(1));
+}
+
+CameraChain named_camera_chain(const std::string& name, Setup setup) {
+  const CameraDescription camera = named_camera(name, kHeightPx);
+  return make_chain(setup, camera, camera);
 }
 
 CameraChain read_camera_chain(const std::filesystem::path& file, Setup setup) {
