@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "waymark/base/check.h"
+#include "waymark/image/pyramid.h"
 
 namespace waymark {
 namespace {
@@ -24,7 +25,10 @@ constexpr std::size_t kMaxSamples = (2 * kRadiusPx + 1) * (2 * kRadiusPx + 1);
 /// Fewer pixels than that are no surface but stray values.
 constexpr std::size_t kMinSurfacePixels = 3;
 
-/// Between neighbours on one surface the depth changes by less than this share, up to a slant of
+/// Pixels whose rays are closer than this to sideways have no usable depth along z.
+constexpr double kMinZPerRange = 0.05;
+
+/// Between neighbours on one surface the range changes by less than this share, up to a slant of
 /// about 80 degrees at the resolution of usual sensors; by more where one surface ends.
 constexpr double kMaxRelativeStep = 0.02;
 
@@ -32,7 +36,7 @@ constexpr double kMaxRelativeStep = 0.02;
 constexpr double kCornerSigmaPx = 0.5;
 
 struct Sample {
-  double inverse_depth;
+  double inverse_range;
   double dx_px;  ///< From the keypoint.
   double dy_px;
 };
@@ -42,7 +46,26 @@ struct Neighbourhood {
   std::size_t count = 0;
 };
 
-struct InverseDepth {
+/// The z of unit bearings around a keypoint: what makes a range of a depth. To first order, which
+/// also bends no straight wall: the inverse range of a plane is linear in the bearing.
+struct ZPerRange {
+  double at_keypoint;
+  Eigen::Vector2d per_px;  ///< Change per pixel of level 0.
+
+  double at(double dx_px, double dy_px) const {
+    return at_keypoint + per_px.x() * dx_px + per_px.y() * dy_px;
+  }
+};
+
+ZPerRange z_per_range(const Keypoint& keypoint,
+                      const Eigen::Vector3f& bearing,
+                      const Matrix23f& w) {
+  const Eigen::Matrix2d gram = (w * w.transpose()).cast<double>();
+  const Eigen::Vector2d per_level_px = gram.ldlt().solve(w.col(2).cast<double>());
+  return {bearing.z(), per_level_px / Pyramid::scale(keypoint.level)};
+}
+
+struct InverseRange {
   double value;
   double sigma;
 };
@@ -51,14 +74,17 @@ struct InverseDepth {
 /// are sorted fastest by insertion, which unlike std::stable_sort allocates nothing.
 void insert(const Sample& sample, Neighbourhood& around) {
   std::size_t at = around.count++;
-  for (; at > 0 && around.samples[at - 1].inverse_depth < sample.inverse_depth; --at) {
+  for (; at > 0 && around.samples[at - 1].inverse_range < sample.inverse_range; --at) {
     around.samples[at] = around.samples[at - 1];
   }
   around.samples[at] = sample;
 }
 
 /// Measured pixels around the keypoint, the nearest surface first.
-Neighbourhood look_around(DepthView depth, double factor, const Keypoint& keypoint) {
+Neighbourhood look_around(DepthView depth,
+                          double factor,
+                          const Keypoint& keypoint,
+                          const ZPerRange& z) {
   Neighbourhood around;
   const int center_x = static_cast<int>(std::lround(keypoint.x_px));
   const int center_y = static_cast<int>(std::lround(keypoint.y_px));
@@ -68,7 +94,10 @@ Neighbourhood look_around(DepthView depth, double factor, const Keypoint& keypoi
     const std::uint16_t* row = depth.row(y);
     for (int x = std::max(center_x - kRadiusPx, 0); x <= last_x; ++x) {
       if (row[x] == 0) continue;
-      insert({factor / static_cast<double>(row[x]), x - keypoint.x_px, y - keypoint.y_px}, around);
+      const double dx = x - keypoint.x_px, dy = y - keypoint.y_px;
+      const double z_here = z.at(dx, dy);
+      if (z_here < kMinZPerRange) continue;
+      insert({factor / static_cast<double>(row[x]) * z_here, dx, dy}, around);
     }
   }
   return around;
@@ -78,8 +107,8 @@ Neighbourhood look_around(DepthView depth, double factor, const Keypoint& keypoi
 std::span<const Sample> nearest_surface(const Neighbourhood& around) {
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= around.count; ++i) {
-    const double nearer = around.samples[i - 1].inverse_depth;
-    const bool ends = i == around.count || nearer - around.samples[i].inverse_depth >
+    const double nearer = around.samples[i - 1].inverse_range;
+    const bool ends = i == around.count || nearer - around.samples[i].inverse_range >
                                                kMaxRelativeStep * nearer + 3.0 * kSensorSigma;
     if (!ends) continue;
     if (i - begin >= kMinSurfacePixels) return {around.samples.data() + begin, i - begin};
@@ -88,17 +117,17 @@ std::span<const Sample> nearest_surface(const Neighbourhood& around) {
   return {};
 }
 
-/// Inverse depth at the keypoint. A plane in space is a plane in inverse depth too; its slope times
+/// Inverse range at the keypoint. A plane in space is a plane in inverse range too; its slope times
 /// the uncertainty of the corner, and what the plane leaves over, add to the sensor's noise.
 /// Noise of neighbours is correlated, so that it does not average out.
-InverseDepth fit_surface(std::span<const Sample> surface, double quantum_m) {
+InverseRange fit_surface(std::span<const Sample> surface, double quantum_m, double z) {
   const double count = static_cast<double>(surface.size());
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
-  for (const Sample& s : surface) mean += Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_depth);
+  for (const Sample& s : surface) mean += Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_range);
   mean /= count;
   Eigen::Matrix3d scatter = Eigen::Matrix3d::Zero();
   for (const Sample& s : surface) {
-    const Eigen::Vector3d d = Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_depth) - mean;
+    const Eigen::Vector3d d = Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_range) - mean;
     scatter += d * d.transpose() / count;
   }
   // The prior keeps the slope of a surface seen along a line or by a few pixels only at zero.
@@ -109,17 +138,22 @@ InverseDepth fit_surface(std::span<const Sample> surface, double quantum_m) {
   const double left_over = std::max(0.0, scatter(2, 2) - slope.dot(scatter.topRightCorner<2, 1>()));
 
   const double value = mean.z() - slope.dot(mean.head<2>());
-  const double quantum_sigma = quantum_m * value * value / std::sqrt(12.0);
-  const double variance = kSensorSigma * kSensorSigma + quantum_sigma * quantum_sigma + left_over +
-                          slope.squaredNorm() * kCornerSigmaPx * kCornerSigmaPx;
+  const double inverse_depth = value / z;
+  const double quantum_sigma = quantum_m * inverse_depth * inverse_depth / std::sqrt(12.0);
+  const double depth_variance = kSensorSigma * kSensorSigma + quantum_sigma * quantum_sigma;
+  const double variance =
+      z * z * depth_variance + left_over + slope.squaredNorm() * kCornerSigmaPx * kCornerSigmaPx;
   return {value, std::sqrt(variance)};
 }
 
-std::optional<InverseDepth> measure(DepthView depth, double factor, const Keypoint& keypoint) {
-  const Neighbourhood around = look_around(depth, factor, keypoint);
+std::optional<InverseRange> measure(DepthView depth,
+                                    double factor,
+                                    const Keypoint& keypoint,
+                                    const ZPerRange& z) {
+  const Neighbourhood around = look_around(depth, factor, keypoint, z);
   const std::span<const Sample> surface = nearest_surface(around);
   if (surface.empty()) return std::nullopt;
-  const InverseDepth fitted = fit_surface(surface, 1.0 / factor);
+  const InverseRange fitted = fit_surface(surface, 1.0 / factor, z.at_keypoint);
   if (!(fitted.value > 0.0)) return std::nullopt;
   return fitted;
 }
@@ -130,18 +164,20 @@ void sample_depth(DepthView depth,
                   const DepthSettings& settings,
                   std::span<const Keypoint> keypoints,
                   std::span<const Eigen::Vector3f> bearings,
+                  std::span<const Matrix23f> level_pixel_from_bearing,
                   std::vector<float>& range_m,
                   std::vector<float>& inverse_range_sigma) {
   WAYMARK_CHECK(bearings.size() == keypoints.size());
+  WAYMARK_CHECK(level_pixel_from_bearing.size() == keypoints.size());
   range_m.assign(keypoints.size(), 0.0f);
   inverse_range_sigma.assign(keypoints.size(), 0.0f);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    const double z_per_range = bearings[i].z();
-    if (z_per_range <= 0.0) continue;
-    const std::optional<InverseDepth> inverse = measure(depth, settings.factor, keypoints[i]);
+    if (bearings[i].z() < kMinZPerRange) continue;
+    const ZPerRange z = z_per_range(keypoints[i], bearings[i], level_pixel_from_bearing[i]);
+    const std::optional<InverseRange> inverse = measure(depth, settings.factor, keypoints[i], z);
     if (!inverse) continue;
-    range_m[i] = static_cast<float>(1.0 / (inverse->value * z_per_range));
-    inverse_range_sigma[i] = static_cast<float>(inverse->sigma * z_per_range);
+    range_m[i] = static_cast<float>(1.0 / inverse->value);
+    inverse_range_sigma[i] = static_cast<float>(inverse->sigma);
   }
 }
 

@@ -27,11 +27,13 @@ struct DepthSettings {
 
 /// Range along its bearing of each keypoint, from a depth image that is registered to the camera
 /// (depth along z), and the standard deviation of the inverse range. Both are 0 where the image
-/// has no measurement. A corner at the edge of a surface belongs to the nearer side.
+/// has no measurement, or not in front. A corner at the edge of a surface belongs to the nearer
+/// side. keypoints, bearings and level_pixel_from_bearing are those of Features, in parallel.
 void sample_depth(DepthView depth,
                   const DepthSettings& settings,
                   std::span<const Keypoint> keypoints,
                   std::span<const Eigen::Vector3f> bearings,
+                  std::span<const Matrix23f> level_pixel_from_bearing,
                   std::vector<float>& range_m,
                   std::vector<float>& inverse_range_sigma);
 

@@ -77,6 +77,7 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
                  settings_.depth,
                  features->keypoints,
                  features->bearings,
+                 features->level_pixel_from_bearing,
                  features->range_m,
                  features->inverse_range_sigma);
   }

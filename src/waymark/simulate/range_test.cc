@@ -1,7 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// Stereo search on rendered pairs of wide cameras, parallel and verged, against the true distances.
+// Stereo search on rendered pairs of wide cameras, parallel and verged, and their depth images,
+// against the true distances.
 #include <gtest/gtest.h>
 
 #include <algorithm>
@@ -10,7 +11,9 @@
 
 #include "waymark/camera/registry.h"
 #include "waymark/image/frame_builder.h"
+#include "waymark/simulate/effects.h"
 #include "waymark/simulate/motion.h"
+#include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/render.h"
 
 namespace waymark {
@@ -82,6 +85,51 @@ TEST_P(StereoRange, IsThatOfTheWorld) {
   EXPECT_LT(quantile(0.5), 0.1);
   EXPECT_LT(quantile(0.95), 0.4);
 }
+
+class MeasuredRange : public testing::TestWithParam<std::string> {};
+
+TEST_P(MeasuredRange, ErrsByItsSigma) {
+  constexpr double kUnits = 5000.0;
+  const auto camera =
+      CameraRegistry::with_builtin_models().make_camera(named_camera(GetParam(), 480));
+  const auto world = make_world("room", 3);
+  const Renderer renderer(world, camera);
+  ThreadPool pool(2);
+  FrameBuilder builder({{{camera, Rigid3()}}},
+                       {.features = {.count = 1000}, .depth = {.factor = kUnits}});
+  ImageEffects effects;
+  effects.inverse_depth_sigma = 0.0014;
+  std::vector<double> errors;
+  for (const double time_s : {1.0, 4.3, 7.7}) {
+    const Rigid3 world_from_cam = make_motion("room", "loop", 10.0).world_from_rig(time_s);
+    const Image image = renderer.image(world_from_cam, pool);
+    DepthImage depth = renderer.depth(world_from_cam, kUnits, pool);
+    Rng rng(1, 1);
+    apply_depth_noise(effects, kUnits, rng, depth);
+    const auto features = builder.build({.image0 = image.view(), .depth = depth.view()});
+    for (std::size_t i = 0; i < features->num_primary; ++i) {
+      if (!(features->range_m[i] > 0.0f)) continue;
+      const Eigen::Vector3d bearing = features->bearings[i].cast<double>();
+      const auto hit =
+          world->intersect(world_from_cam.translation, world_from_cam.rotation * bearing);
+      if (!hit) continue;
+      const double error = 1.0 / features->range_m[i] - 1.0 / hit->hit.distance;
+      errors.push_back(std::abs(error) / features->inverse_range_sigma[i]);
+    }
+  }
+  std::sort(errors.begin(), errors.end());
+  const auto quantile = [&](double q) {
+    return errors[static_cast<std::size_t>(q * static_cast<double>(errors.size()))];
+  };
+  // Averaged over a few pixels, hence better than stated.
+  EXPECT_GT(errors.size(), 2500u);
+  EXPECT_LT(quantile(0.68), 1.0);
+  EXPECT_LT(quantile(0.95), 2.0);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras,
+                         MeasuredRange,
+                         testing::Values("perspective", "fisheye", "fisheye_200"));
 
 INSTANTIATE_TEST_SUITE_P(
     Cameras,
