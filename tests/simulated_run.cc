@@ -3,9 +3,12 @@
 #include "simulated_run.h"
 
 #include <bit>
+#include <cmath>
 #include <optional>
 #include <thread>
 #include <utility>
+
+#include "waymark/simulate/render.h"
 
 namespace waymark {
 namespace {
@@ -106,6 +109,25 @@ Recording simulate(const SequenceSpec& spec) {
     if (spec.chain.depth_factor) frame.depth = std::move(simulated.depth);
     recording.frames.push_back(std::move(frame));
     recording.groundtruth.push_back({simulated.timestamp_ns, simulated.world_from_rig});
+  }
+  return recording;
+}
+
+Recording simulate(const CameraDescription& camera, const Motion& motion) {
+  constexpr double kRateHz = 20.0;
+  Recording recording;
+  recording.rig = make_rig(mono_chain(camera));
+  const Renderer renderer(make_world("room", 0), recording.rig.cameras[0].camera);
+  ThreadPool pool(std::thread::hardware_concurrency());
+  const int num_frames = static_cast<int>(motion.duration_s() * kRateHz);
+  for (int i = 0; i < num_frames; ++i) {
+    const Rigid3 world_from_rig = motion.world_from_rig(i / kRateHz);
+    InputFrame frame;
+    frame.index = static_cast<std::size_t>(i);
+    frame.timestamp_ns = std::llround(1e9 * i / kRateHz);
+    frame.images.push_back(renderer.image(world_from_rig, pool));
+    recording.groundtruth.push_back({frame.timestamp_ns, world_from_rig});
+    recording.frames.push_back(std::move(frame));
   }
   return recording;
 }

@@ -11,6 +11,7 @@
 #include "waymark/evaluate/evaluation.h"
 #include "waymark/io/input.h"
 #include "waymark/io/trajectory.h"
+#include "waymark/simulate/motion.h"
 #include "waymark/simulate/sequence.h"
 #include "waymark/system/settings.h"
 
@@ -30,6 +31,9 @@ struct Recording {
 SequenceSpec small_sequence(Setup setup, int num_frames);
 
 Recording simulate(const SequenceSpec& spec);
+
+/// What one camera sees of the room along a motion, 20 times a second.
+Recording simulate(const CameraDescription& camera, const Motion& motion);
 
 /// Feeds the whole recording to a new System.
 SessionResults map_recording(const Recording& recording, Timing timing);
