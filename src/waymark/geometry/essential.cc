@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/geometry/essential.h"
 
+#include <Eigen/Cholesky>
 #include <cmath>
 #include <numbers>
 
@@ -232,6 +233,57 @@ Eigen::Vector3d null_vector(const MatrixInZ& matrix, double z) {
   return longest;
 }
 
+using EssentialVector = Eigen::Matrix<double, 9, 1>;
+using RowMajorMatrix = Eigen::Matrix<double, 3, 3, Eigen::RowMajor>;
+using Constraints = Eigen::Matrix<double, 10, 1>;
+
+/// The ten constraints above at a matrix, and their derivative by a change of it.
+Constraints constraints_at(const Eigen::Matrix3d& e) {
+  Constraints values;
+  const Eigen::Matrix3d gram = e * e.transpose();
+  Eigen::Map<Eigen::Matrix3d>(values.data()) = gram * e - 0.5 * gram.trace() * e;
+  values[9] = e.col(0).dot(e.col(1).cross(e.col(2)));
+  return values;
+}
+
+Constraints constraints_derivative(const Eigen::Matrix3d& e, const Eigen::Matrix3d& change) {
+  Constraints values;
+  const Eigen::Matrix3d gram = e * e.transpose();
+  const Eigen::Matrix3d half = change * e.transpose();
+  const Eigen::Matrix3d gram_change = half + half.transpose();
+  Eigen::Map<Eigen::Matrix3d>(values.data()) =
+      gram_change * e + gram * change - 0.5 * gram_change.trace() * e - 0.5 * gram.trace() * change;
+  values[9] = change.col(0).dot(e.col(1).cross(e.col(2))) +
+              change.col(1).dot(e.col(2).cross(e.col(0))) +
+              change.col(2).dot(e.col(0).cross(e.col(1)));
+  return values;
+}
+
+// Takes back the digits that the elimination loses, most of all without rotation and past a plane:
+// Gauss-Newton on the constraints themselves, over the unit vectors of coordinates in the basis.
+EssentialVector polish(const NullSpace& basis, const Eigen::Vector4d& coordinates) {
+  constexpr int kMaxSteps = 3;
+  Eigen::Vector4d c = coordinates.normalized();
+  EssentialVector entries = basis * c;
+  for (int step = 0; step < kMaxSteps; ++step) {
+    const Eigen::Matrix3d e = Eigen::Map<const RowMajorMatrix>(entries.data());
+    Eigen::Matrix<double, 10, 4> jacobian;
+    for (int k = 0; k < 4; ++k) {
+      const EssentialVector direction = basis.col(k);
+      jacobian.col(k) =
+          constraints_derivative(e, Eigen::Map<const RowMajorMatrix>(direction.data()));
+    }
+    // Along c itself nothing changes but the length.
+    const Eigen::Matrix4d normal = jacobian.transpose() * jacobian + c * c.transpose();
+    const Eigen::Vector4d change = normal.ldlt().solve(jacobian.transpose() * constraints_at(e));
+    if (!(change.squaredNorm() < 1e-2)) break;
+    c = (c - change).normalized();
+    entries = basis * c;
+    if (change.squaredNorm() < 1e-24) break;
+  }
+  return entries;
+}
+
 }  // namespace
 
 Eigen::Matrix3d essential_from_pose(const Rigid3& b_from_a) {
@@ -250,13 +302,10 @@ std::vector<Eigen::Matrix3d> solve_five_point(std::span<const Eigen::Vector3d, 5
   essentials.reserve(kMaxPolynomialDegree);
   for (const double z : real_roots({polynomial.data(), 11})) {
     const Eigen::Vector3d xy1 = null_vector(matrix, z);
-    const Eigen::Matrix<double, 9, 1> entries =
-        basis * Eigen::Vector4d(xy1.x(), xy1.y(), xy1.z() * z, xy1.z());
-    const double norm = entries.norm();
-    if (!(norm > 0.0) || !std::isfinite(norm)) continue;
-    essentials.emplace_back(
-        Eigen::Map<const Eigen::Matrix<double, 3, 3, Eigen::RowMajor>>(entries.data()) *
-        (std::numbers::sqrt2 / norm));
+    const Eigen::Vector4d coordinates(xy1.x(), xy1.y(), xy1.z() * z, xy1.z());
+    if (!(coordinates.norm() > 0.0) || !coordinates.allFinite()) continue;
+    const EssentialVector entries = polish(basis, coordinates);
+    essentials.emplace_back(std::numbers::sqrt2 * Eigen::Map<const RowMajorMatrix>(entries.data()));
   }
   return essentials;
 }

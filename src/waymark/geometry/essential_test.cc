@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <Eigen/LU>
+#include <Eigen/SVD>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -14,6 +15,7 @@
 #include <vector>
 
 #include "waymark/base/rng.h"
+#include "waymark/geometry/relative_pose.h"
 #include "waymark/geometry/test_scenes.h"
 
 namespace waymark {
@@ -46,6 +48,25 @@ std::vector<Eigen::Matrix3d> solve(const TwoViewScene& scene) {
                           FiveBearings(scene.bearings_b.data(), 5));
 }
 
+// How far rounding alone can move the true matrix: the constraints b^T E a are known to about one
+// rounding error, and the essential matrix changes by as much over the least singular value of
+// their derivative by the motion (taken numerically).
+double rounding_error(const TwoViewScene& scene) {
+  constexpr double kStep = 1e-6;
+  const Rigid3 motion(scene.b_from_a.rotation, scene.b_from_a.translation.normalized());
+  Eigen::Matrix<double, 5, 5> jacobian;
+  for (int k = 0; k < 5; ++k) {
+    const Vector5d step = kStep * Vector5d::Unit(k);
+    const Eigen::Matrix3d change = essential_from_pose(perturb_relative_pose(motion, step)) -
+                                   essential_from_pose(perturb_relative_pose(motion, -step));
+    for (int i = 0; i < 5; ++i) {
+      jacobian(i, k) = scene.bearings_b[i].dot(change * scene.bearings_a[i]) / (2.0 * kStep);
+    }
+  }
+  const Eigen::VectorXd singular = Eigen::MatrixXd(jacobian).jacobiSvd().singularValues();
+  return std::numeric_limits<double>::epsilon() / singular[4];
+}
+
 Eigen::Vector3d point_all_round(Rng& rng) { return rng.uniform(1.0, 5.0) * random_direction(rng); }
 
 Eigen::Vector3d point_ahead(Rng& rng) {
@@ -68,9 +89,9 @@ TEST(FivePoint, SolutionsAreEssentialMatricesThatFitTheSample) {
     for (const Eigen::Matrix3d& e : solve(scene)) {
       ++num_solutions;
       EXPECT_NEAR(e.norm(), std::sqrt(2.0), 1e-12);
-      EXPECT_NEAR(e.determinant(), 0.0, 1e-6);
+      EXPECT_NEAR(e.determinant(), 0.0, 1e-9);
       const Eigen::Matrix3d gram = e * e.transpose();
-      EXPECT_LT((gram * e - 0.5 * gram.trace() * e).norm(), 1e-5);
+      EXPECT_LT((gram * e - 0.5 * gram.trace() * e).norm(), 1e-9);
       for (int i = 0; i < 5; ++i) {
         EXPECT_NEAR(scene.bearings_b[i].dot(e * scene.bearings_a[i]), 0.0, 1e-12);
       }
@@ -88,11 +109,11 @@ TEST(FivePoint, FindsTheTrueMatrix) {
     const TwoViewScene scene =
         is_all_round ? make_scene(b_from_a, View{true}, 5, 0.0, 0.0, rng, point_all_round)
                      : make_scene(b_from_a, View{}, 5, 0.0, 0.0, rng, point_ahead);
-    errors.push_back(nearest_distance(solve(scene), essential_from_pose(b_from_a)));
+    errors.push_back(nearest_distance(solve(scene), essential_from_pose(b_from_a)) /
+                     rounding_error(scene));
   }
-  EXPECT_LT(testing::quantile(errors, 0.5), 1e-10);
-  EXPECT_LT(testing::quantile(errors, 0.95), 1e-6);
-  EXPECT_LT(testing::quantile(errors, 0.99), 1e-3);
+  EXPECT_LT(testing::quantile(errors, 0.5), 1.0);
+  EXPECT_LT(testing::quantile(errors, 0.99), 10.0);
 }
 
 TEST(FivePoint, FindsTheTrueMatrixOfAPlaneAndOfPureForwardMotion) {
@@ -104,9 +125,12 @@ TEST(FivePoint, FindsTheTrueMatrixOfAPlaneAndOfPureForwardMotion) {
       const Eigen::Vector3d ray = testing::random_bearing(r, View{});
       return Eigen::Vector3d(5.0 / (ray.z() + 0.3 * ray.x()) * ray);
     });
-    errors.push_back(nearest_distance(solve(scene), essential_from_pose(b_from_a)));
+    errors.push_back(nearest_distance(solve(scene), essential_from_pose(b_from_a)) /
+                     rounding_error(scene));
   }
-  EXPECT_LT(testing::quantile(errors, 0.95), 1e-3);
+  EXPECT_LT(testing::quantile(errors, 0.5), 1.0);
+  // In the others two roots all but meet, so that rounding makes them complex: no solution.
+  EXPECT_LT(testing::quantile(errors, 0.95), 10.0);
 }
 
 // OpenCV's own five-point solver, given just five points, returns its solutions as stacked 3x3.

@@ -53,6 +53,8 @@ struct Summary {
   int num_wrong = 0;  // claimed to be right, but more than 5 degrees off
   std::vector<int> num_by_status = std::vector<int>(5, 0);
   std::vector<double> rotation_errors, direction_errors, inlier_recalls, inlier_precisions;
+
+  int count(TwoViewStatus status) const { return num_by_status[static_cast<std::size_t>(status)]; }
 };
 
 void add(const TwoViewScene& scene, const TwoViewResult& result, Summary& summary) {
@@ -78,11 +80,13 @@ void add(const TwoViewScene& scene, const TwoViewResult& result, Summary& summar
 }
 
 constexpr int kTrials = 15;
+/// Where chance plays no part, or many matches make a trial slow: then all of them must do.
+constexpr int kFewTrials = 5;
 
 template <class DrawScene>
-Summary run_trials(std::uint64_t seed, DrawScene&& draw_scene) {
+Summary run_trials(std::uint64_t seed, DrawScene&& draw_scene, int num_trials = kTrials) {
   Summary summary;
-  for (int trial = 0; trial < kTrials; ++trial) {
+  for (int trial = 0; trial < num_trials; ++trial) {
     Rng rng(seed, static_cast<std::uint64_t>(trial));
     const TwoViewScene scene = draw_scene(rng);
     add(scene, estimate_two_view(scene.matches(), {.seed = seed}), summary);
@@ -139,25 +143,26 @@ TEST(TwoView, FewMatches) {
 }
 
 TEST(TwoView, HalfOfManyMatchesWrong) {
-  const Summary summary = run_trials(15, [](Rng& rng) {
+  const auto draw_scene = [](Rng& rng) {
     const Rigid3 b_from_a(small_rotation(rng), 0.6 * random_direction(rng));
     return make_scene(b_from_a, View{}, 1000, kSigma, 0.5, rng, points_in_view(View{}, 2, 8));
-  });
-  expect_accurate(summary, 0.004, 0.03);
+  };
+  expect_accurate(run_trials(15, draw_scene, kFewTrials), 0.004, 0.03, kFewTrials);
 }
 
 // Real noise is never quite what the caller says.
 TEST(TwoView, NoiseOffByAFactorOfTwo) {
   for (const double factor : {0.5, 2.0}) {
-    const Summary summary = run_trials(16, [&](Rng& rng) {
+    const auto draw_scene = [&](Rng& rng) {
       const Rigid3 b_from_a(small_rotation(rng), {0.4, 0.0, 0.2});
       TwoViewScene scene =
           make_scene(b_from_a, View{}, 400, kSigma, 0.3, rng, points_in_view(View{}, 2, 8));
       for (double& sigma : scene.sigmas_rad_a) sigma *= factor;
       for (double& sigma : scene.sigmas_rad_b) sigma *= factor;
       return scene;
-    });
-    EXPECT_GE(summary.num_ok, kTrials - 1);
+    };
+    const Summary summary = run_trials(16, draw_scene, kFewTrials);
+    EXPECT_EQ(summary.num_ok, kFewTrials);
     EXPECT_EQ(summary.num_wrong, 0);
   }
 }
@@ -180,17 +185,21 @@ TEST(TwoView, AmbiguousPlaneIsNeverWrong) {
     return make_scene(b_from_a, View{}, 400, kSigma, 0.3, rng, points);
   });
   EXPECT_EQ(summary.num_wrong, 0);
-  EXPECT_GE(summary.num_by_status[static_cast<std::size_t>(TwoViewStatus::kAmbiguous)],
-            kTrials - 3);
+  EXPECT_GE(summary.count(TwoViewStatus::kAmbiguous), kTrials - 3);
 }
 
+// Whether 15 % of points off the plane tell the motion from the plane's other one is a matter of
+// chance: given the true motion, the rival of the true homography and which matches are wrong, both
+// refined on all matches, the test of Vuong finds the truth better by three standard deviations in
+// 54 of 60 such scenes. Of 15 with a chance of 0.9 each, 11 or more are found in 99 of 100 cases.
 TEST(TwoView, NearlyPlanar) {
   const Summary summary = run_trials(7, [](Rng& rng) {
     const Rigid3 b_from_a(small_rotation(rng), {0.1, 0.1, -0.9});
     const auto points = points_on_plane(View{}, {0.4, 0.2, 1.0}, 0.15, 0.5);
     return make_scene(b_from_a, View{}, 500, kSigma, 0.3, rng, points);
   });
-  expect_accurate(summary, 0.006, 0.05, 10);  // the others are called ambiguous
+  expect_accurate(summary, 0.006, 0.05, 11);
+  EXPECT_EQ(summary.num_ok + summary.count(TwoViewStatus::kAmbiguous), kTrials);
 }
 
 TEST(TwoView, LowParallaxIsRightOrRefused) {
@@ -204,23 +213,23 @@ TEST(TwoView, LowParallaxIsRightOrRefused) {
 TEST(TwoView, PureRotationHasNoParallax) {
   for (const bool sees_all : {false, true}) {
     const View view{sees_all};
-    const Summary summary = run_trials(9, [&](Rng& rng) {
+    const auto draw_scene = [&](Rng& rng) {
       const Rigid3 b_from_a(so3_exp(0.1 * random_vector(rng)), Eigen::Vector3d::Zero());
       return make_scene(b_from_a, view, 300, kSigma, 0.3, rng, [&](Rng& r) {
         return Eigen::Vector3d(5.0 * random_bearing(r, view));
       });
-    });
-    EXPECT_EQ(summary.num_by_status[static_cast<std::size_t>(TwoViewStatus::kTooLittleParallax)],
-              kTrials);
+    };
+    EXPECT_EQ(run_trials(9, draw_scene, kFewTrials).count(TwoViewStatus::kTooLittleParallax),
+              kFewTrials);
   }
 }
 
 TEST(TwoView, NoiseAloneHasTooFewInliers) {
-  const Summary summary = run_trials(10, [](Rng& rng) {
+  const auto draw_scene = [](Rng& rng) {
     return make_scene(Rigid3{}, View{}, 200, kSigma, 1.0, rng, points_in_view(View{}, 2, 8));
-  });
-  EXPECT_EQ(summary.num_by_status[static_cast<std::size_t>(TwoViewStatus::kTooFewInliers)],
-            kTrials);
+  };
+  EXPECT_EQ(run_trials(10, draw_scene, kFewTrials).count(TwoViewStatus::kTooFewInliers),
+            kFewTrials);
 }
 
 TEST(TwoView, PointsAndParallaxAreThoseOfTheScene) {
