@@ -14,6 +14,8 @@ namespace waymark {
 namespace {
 
 constexpr int kMinLandmarks = 80;
+/// So many that a pose can rest on them even if the next frame finds just one in ten again.
+constexpr std::size_t kPlentyOfLandmarks = 200;
 constexpr std::size_t kMaxReferences = 8;
 /// A new reference is kept every so many frames, so that slow and fast motion find a partner.
 constexpr std::uint32_t kReferenceInterval = 3;
@@ -35,13 +37,13 @@ std::vector<std::uint32_t> features_with_range(const Rig& rig,
 }
 
 /// Features to start a map from. Those with a reliable range, and where the baseline is too short
-/// for the scene to have enough of them, all whose range is finite: an error of sigma pixels in the
+/// for the scene to have plenty of them, all whose range is finite: an error of sigma pixels in the
 /// stereo parallax moves a landmark by sigma * d / b pixels in a view at distance d from the first,
 /// b being the baseline, however far the landmark is. So far ones serve to track the first frames
 /// as well as near ones, and later views refine them.
 std::vector<std::uint32_t> features_to_start_from(const Rig& rig, const Features& features) {
   std::vector<std::uint32_t> chosen = features_with_range(rig, features, kReliableRangeSigma);
-  if (chosen.size() >= kMinLandmarks) return chosen;
+  if (chosen.size() >= kPlentyOfLandmarks) return chosen;
   return features_with_range(rig, features, kFiniteRangeSigma);
 }
 

@@ -119,7 +119,7 @@ TEST(Initializer, MonoFillsTheFramesItSkipped) {
 
 TEST(Initializer, MonoWaitsWhileTheCameraOnlyTurns) {
   const Scene scene = mono_scene([](std::uint32_t i) {
-    return make_test_pose({}, {0.0, 0.01 * i, 0.002 * i});
+    return make_test_pose({0.0, 0.0, 0.0}, {0.0, 0.01 * i, 0.002 * i});
   });
   const Started started = run(scene, false, 25);
   EXPECT_FALSE(started.start);
@@ -188,14 +188,15 @@ TEST(Initializer, RangeStartsAtOnceWithTheReliableOnes) {
     ASSERT_NE(index, kNoLandmark);
     const Eigen::Vector3d point =
         scene.world_from_rig(0).inverse() * scene.cloud.landmarks[index].position;
-    // Reliable means 10 % with one pixel of noise; here there is half of that in both views.
-    EXPECT_LT((landmark.position_in_world - point).norm(), 0.4 * point.norm());
+    // Reliable means 10 %; the noise here is nearly twice what the stereo search has.
+    EXPECT_LT((landmark.position_in_world - point).norm(), 0.8 * point.norm());
   }
 }
 
-// 50 px per metre of inverse range: at 15 to 30 m, 1.7 to 3.4 px.
+// 50 px per metre of inverse range: at 25 to 50 m, 1 to 2 px.
 TEST(Initializer, ABaselineShortForTheSceneStillStarts) {
-  const Scene scene = stereo_scene(15.0);
+  Scene scene = stereo_scene(25.0);
+  scene.noise.pixel_sigma = 0.15;
   const PointObservation view = scene.look(0);
   for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
     ASSERT_FALSE(has_reliable_range(*scene.rig, *view.features, i));
