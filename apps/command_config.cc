@@ -7,9 +7,13 @@
 #include <memory>
 #include <vector>
 
+#include "choice_option.h"
 #include "commands.h"
+#include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/io/foreign_calibration.h"
+#include "waymark/simulate/dataset.h"
 #include "waymark/system/settings.h"
 
 namespace waymark {
@@ -35,6 +39,19 @@ int check_settings(const std::vector<std::filesystem::path>& files) {
   return kDone;
 }
 
+using CalibrationReader = CameraChain (*)(const ConfigSource& source);
+
+int print_camchain(CalibrationReader read, const std::vector<std::filesystem::path>& files) {
+  if (files.size() != 1) {
+    throw InputError("command line",
+                     fmt::format("--from has {} files, expected one calibration", files.size()));
+  }
+  const CameraChain chain = read(ConfigSource::from_file(files[0]));
+  for (const std::string& note : chain.notes) fmt::print(stderr, "note: {}\n", note);
+  fmt::print("{}", format_camchain(chain));
+  return kDone;
+}
+
 }  // namespace
 
 void add_config_command(CLI::App& program, Command& command) {
@@ -42,8 +59,19 @@ void add_config_command(CLI::App& program, Command& command) {
   CLI::App& config = *program.add_subcommand(
       "config", "Check settings files; without FILE print all settings with default, range, help");
   config.add_option("FILE", *files, "YAML files with cameras and settings, later ones override");
-  config.callback([files, &command] {
-    command = [files] { return files->empty() ? print_settings() : check_settings(*files); };
+  const auto read = std::make_shared<CalibrationReader>(nullptr);
+  add_choice<CalibrationReader>(config,
+                                "--from",
+                                *read,
+                                {{"opencv", read_opencv_calibration},
+                                 {"ros", read_ros_calibration},
+                                 {"colmap", read_colmap_calibration}},
+                                "FILE is a calibration of opencv, ros or colmap: print a camchain");
+  config.callback([files, read, &command] {
+    command = [files, read] {
+      if (*read != nullptr) return print_camchain(*read, *files);
+      return files->empty() ? print_settings() : check_settings(*files);
+    };
   });
 }
 

@@ -55,6 +55,19 @@ class Usage(CliTest):
                        "--format"):
             self.assertIn(option, text)
 
+    def test_config_makes_a_camchain_of_other_calibrations(self):
+        cameras = self.folder / "cameras.txt"
+        cameras.write_text("1 OPENCV 640 480 500 501 320 240 -0.1 0.01 0 0\n")
+        result = waymark("config", "--from", "colmap", cameras)
+        self.assertEqual(result.returncode, 0)
+        self.assertIn("intrinsics: [500, 501, 319.5, 239.5]", result.stdout)
+        camchain = self.folder / "camchain.yaml"
+        camchain.write_text(result.stdout)
+        self.assertIn("valid: 1 cameras", waymark("config", camchain).stdout)
+        self.assert_fails(waymark("config", "--from", "ros", cameras), 2, "cameras.txt")
+        self.assert_fails(waymark("config", "--from", "kalibr", cameras), 2, "--from")
+        self.assert_fails(waymark("config", "--from", "ros"), 2, "expected one calibration")
+
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
         self.assert_fails(waymark("fly"), 2, "'fly'", "run, eval, simulate, config")

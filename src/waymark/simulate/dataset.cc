@@ -36,7 +36,7 @@ Layout layout_of(const CameraChain& chain) {
 }
 
 std::string numbers(const std::vector<double>& values) {
-  return fmt::format("[{:.17g}]", fmt::join(values, ", "));
+  return fmt::format("[{}]", fmt::join(values, ", "));
 }
 
 std::string size_of(const CameraDescription& camera) {
@@ -180,7 +180,7 @@ std::string format_camchain(const CameraChain& chain) {
       text += fmt::format("  - {}\n", matrix_row(from_previous, row));
     }
   }
-  if (chain.depth_factor) text += fmt::format("depth: {{factor: {:.17g}}}\n", *chain.depth_factor);
+  if (chain.depth_factor) text += fmt::format("depth: {{factor: {}}}\n", *chain.depth_factor);
   return text;
 }
 
