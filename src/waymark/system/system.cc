@@ -9,6 +9,7 @@
 #include "waymark/image/frame_builder.h"
 #include "waymark/mapping/mapper.h"
 #include "waymark/system/map_worker.h"
+#include "waymark/track/map_view.h"
 #include "waymark/track/tracker.h"
 
 namespace waymark {
@@ -19,6 +20,7 @@ struct FrameMemory {
   std::int64_t timestamp_ns = 0;
   FrameState state = FrameState::kLost;
   RelativePose pose;  ///< Where state is kTracked or kFilled.
+  MapView view;       ///< Until the pose is settled; empty where it follows from something else.
 };
 
 Timing checked(Timing timing) {
@@ -27,6 +29,10 @@ Timing checked(Timing timing) {
   }
   return timing;
 }
+
+/// Frames whose view is kept, so that they can be located once more when the mapper has been around
+/// them; some 30 kB each.
+constexpr std::size_t kUnsettledFrames = 1000;
 
 bool has_pose(FrameState state) {
   return state == FrameState::kTracked || state == FrameState::kFilled;
@@ -55,6 +61,7 @@ class System::Impl {
   void send(FrameId frame, MapperMessage message);
   std::shared_ptr<const Map> process(const MapperMessage& message);
   void remember(const Frame& frame, const TrackOutcome& outcome);
+  void settle(FrameMemory& memory);
 
   // Fixed after construction.
   const std::shared_ptr<const Rig> rig_;
@@ -65,6 +72,7 @@ class System::Impl {
   FrameBuilder builder_;
   std::optional<Tracker> tracker_;
   std::vector<FrameMemory> memory_;
+  PoseWorkspace workspace_;
   std::shared_ptr<const Map> visible_map_ = std::make_shared<const Map>();
   bool is_finished_ = false;
 
@@ -120,11 +128,25 @@ void System::Impl::remember(const Frame& frame, const TrackOutcome& outcome) {
   RelativePose pose = outcome.pose.value_or(RelativePose{});
   // A keyframe is its own reference, so that it moves as the map moves it.
   if (outcome.keyframe) pose = {*outcome.keyframe, Rigid3{}, pose.reference_scale};
-  memory_.push_back({frame.timestamp_ns, outcome.state, pose});
+  // A frame's pose was found in a map that had not seen what comes after it.
+  const bool is_provisional = outcome.pose && !outcome.keyframe && !outcome.message;
+  memory_.push_back({frame.timestamp_ns,
+                     outcome.state,
+                     pose,
+                     is_provisional ? view_of(*frame.features, tracker_->landmarks()) : MapView{}});
+  if (memory_.size() > kUnsettledFrames) settle(memory_[memory_.size() - kUnsettledFrames - 1]);
   for (const FilledPose& filled : outcome.filled) {
     memory_.at(filled.frame.value).state = FrameState::kFilled;
     memory_.at(filled.frame.value).pose = filled.pose;
   }
+}
+
+void System::Impl::settle(FrameMemory& memory) {
+  if (memory.view.is_empty()) return;
+  if (const auto pose = locate_again(memory.view, *visible_map_, *rig_, memory.pose, workspace_)) {
+    memory.pose = *pose;
+  }
+  memory.view = {};
 }
 
 void System::Impl::send(FrameId frame, MapperMessage message) {
@@ -148,6 +170,7 @@ void System::Impl::finish() {
   worker_.finish();
   mapper_.refine_globally();
   visible_map_ = mapper_.freeze();
+  for (FrameMemory& memory : memory_) settle(memory);
 }
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {

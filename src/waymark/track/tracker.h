@@ -49,6 +49,10 @@ class Tracker {
   /// map: the newest one that this frame may see; null before the first sub-map.
   TrackOutcome track(const Frame& frame, std::shared_ptr<const Map> map, StageTimes& times);
 
+  /// The landmark of each feature of the frame just tracked, invalid where it has none; nothing
+  /// where that frame started a sub-map.
+  const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
+
  private:
   enum class Mode { kInitializing, kTracking, kLost };
 
