@@ -14,6 +14,11 @@
 namespace waymark {
 namespace {
 
+// Where the bounds of simulated sequences come from, in metres. With the same camera and motion, 1
+// px of noise and perfect associations, adjusting all frames at once leaves an error of 0.006
+// (mono) or 0.007 (stereo): the least that any mapper has (see mapper_test.cc). The covariances
+// that are announced add 0.009 (mono), 0.0024 (stereo) or 0.0027 (RGB-D) for what a single frame
+// sees. Twice both together are 0.022 (mono) and 0.015 (the others).
 TEST(Accuracy, Stereo) {
   const Recording recording = simulate(small_sequence(Setup::kStereo, 60));
   const SessionResults results = map_recording(recording, Timing::kLockstep);
