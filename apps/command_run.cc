@@ -78,9 +78,30 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             options.out.string()));
 }
 
+void report_focal_check(Reporter& reporter, const FocalCheck& check) {
+  const std::string found =
+      fmt::format("by the residuals the focal length is {:.1f} % (+- {:.1f} %) {} than stated",
+                  100.0 * std::abs(check.factor - 1.0),
+                  100.0 * check.sigma,
+                  check.factor < 1.0 ? "shorter" : "longer");
+  if (check.is_off()) {
+    reporter.warning("calibration: " + found);
+  } else {
+    reporter.detail(found);
+  }
+}
+
 SessionResults map_input(Session& session, const RunOptions& options, Reporter& reporter) {
   catch_interrupts();
-  const FrameObserver observer = report_frames(reporter, session.input->info());
+  const FrameObserver report = report_frames(reporter, session.input->info());
+  bool is_focal_checked = false;
+  const FrameObserver observer = [&](const FrameRecord& record) {
+    report(record);
+    const FocalCheck* check = is_focal_checked ? nullptr : session.system->focal_check();
+    if (check == nullptr) return;
+    is_focal_checked = true;
+    report_focal_check(reporter, *check);
+  };
   if (options.pace > 0.0) {
     PacedInput paced(*session.input, options.pace, is_interrupted);
     return run_session(paced, *session.system, is_interrupted, observer);

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <vector>
 
+#include "waymark/camera/scaled_camera.h"
 #include "waymark/image/brief.h"
 #include "waymark/image/distance_transform.h"
 #include "waymark/image/pyramid.h"
@@ -62,15 +63,6 @@ Image directions_in_use(const Camera& camera, const ViewSettings& settings) {
     return bearing == nullptr ||
            (bearing->z() >= min_z && bearing->y() >= min_y && bearing->y() <= max_y);
   });
-}
-
-Eigen::Vector2d principal_point(const Camera& camera) {
-  const Eigen::Vector3d ahead(0.0, 0.0, 1.0);
-  Eigen::Vector2d pixel(0.5 * camera.width_px() - 0.5, 0.5 * camera.height_px() - 0.5);
-  Eigen::Vector2d projected;
-  std::uint8_t is_visible = 0;
-  camera.project({&ahead, 1}, {&projected, 1}, {&is_visible, 1});
-  return is_visible ? projected : pixel;
 }
 
 bool is_wide(const Camera& camera) {

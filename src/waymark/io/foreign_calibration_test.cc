@@ -186,7 +186,7 @@ TEST(ForeignCalibration, HostileFilesEndInOneLine) {
             static_cast<std::size_t>(rng.uniform(0.0, static_cast<double>(broken.size())));
         switch (round % 3) {
           case 0:
-            broken[at] = static_cast<char>(rng.uniform(0.0, 256.0));
+            broken[at] = static_cast<char>(rng.uniform(-128.0, 128.0));
             break;
           case 1:
             broken.erase(at, static_cast<std::size_t>(rng.uniform(0.0, 40.0)));

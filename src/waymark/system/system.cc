@@ -34,6 +34,14 @@ Timing checked(Timing timing) {
 /// them; some 30 kB each.
 constexpr std::size_t kUnsettledFrames = 1000;
 
+/// Whether a map comes late enough for the check of the focal length.
+bool has_focal_check(const Map& map) {
+  constexpr std::uint32_t kFrame = 200;
+  if (map.keyframes().size() == 0) return false;
+  const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});
+  return newest.is_valid() && map.keyframes().at(newest).frame.value >= kFrame;
+}
+
 bool has_pose(FrameState state) {
   return state == FrameState::kTracked || state == FrameState::kFilled;
 }
@@ -56,6 +64,7 @@ class System::Impl {
   std::vector<FrameState> frame_states() const;
   std::shared_ptr<const Map> map() const { return visible_map_; }
   SystemStatistics statistics() const;
+  const FocalCheck* focal_check() const;
 
  private:
   void send(FrameId frame, MapperMessage message);
@@ -79,6 +88,10 @@ class System::Impl {
   // The mapper's thread, and the caller's once that has ended.
   Mapper mapper_;
   std::vector<double> mapping_ms_;
+
+  // Written once by the mapper's thread, before the first map that has_focal_check() is published.
+  std::optional<FocalCheck> focal_check_;
+  bool is_focal_checked_ = false;  // The mapper's thread only.
 
   // Between the two; last, so that its thread ends before what it works on.
   MapWorker worker_;
@@ -161,7 +174,18 @@ std::shared_ptr<const Map> System::Impl::process(const MapperMessage& message) {
   std::visit([&](const auto& content) { mapper_.add(content); }, message);
   mapping_ms_.push_back(
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  return mapper_.freeze();
+  auto map = mapper_.freeze();
+  if (!is_focal_checked_ && has_focal_check(*map)) {
+    is_focal_checked_ = true;
+    focal_check_ = check_focal_length(*map);
+  }
+  return map;
+}
+
+const FocalCheck* System::Impl::focal_check() const {
+  // The map first: seeing it is what makes the result readable here.
+  if (!has_focal_check(*visible_map_) || !focal_check_) return nullptr;
+  return &*focal_check_;
 }
 
 void System::Impl::finish() {
@@ -215,6 +239,7 @@ TrackingResult System::feed(const FrameInput& input) { return impl_->feed(input)
 void System::finish() { impl_->finish(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
+const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
 std::shared_ptr<const Map> System::map() const { return impl_->map(); }
 SystemStatistics System::statistics() const { return impl_->statistics(); }
 

@@ -12,6 +12,7 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
+#include "waymark/mapping/focal_check.h"
 #include "waymark/system/settings.h"
 #include "waymark/track/stage_times.h"
 
@@ -84,6 +85,10 @@ class System {
 
   /// State of every frame fed so far, including those filled in after the fact.
   std::vector<FrameState> frame_states() const;
+
+  /// What the residuals say of the calibration's focal length, once some 200 frames are mapped and
+  /// where the motion tells; null before.
+  const FocalCheck* focal_check() const;
 
   /// The newest finished map, immutable.
   std::shared_ptr<const Map> map() const;

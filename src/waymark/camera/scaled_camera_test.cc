@@ -1,0 +1,41 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/camera/scaled_camera.h"
+
+#include "waymark/camera/fisheye.h"
+#include "waymark/camera/perspective.h"
+#include "waymark/camera/testing/camera_test.h"
+
+namespace waymark {
+namespace {
+
+const std::vector<double> kCoeffs = {-0.2, 0.05, 3e-4, -2e-4};
+
+TEST(ScaledCamera, IsSound) {
+  const ImagePlane plane{{191.0, 190.5}, {254.9, 256.8}};
+  const auto fisheye =
+      std::make_shared<FisheyeCamera>(FisheyeModel(plane, {3.5e-3, 7e-4, -2e-3, 2e-4}), 512, 512);
+  expect_camera_is_sound(ScaledCamera(fisheye, 1.1));
+  expect_camera_is_sound(ScaledCamera(fisheye, 0.95));
+}
+
+TEST(ScaledCamera, IsTheCameraOfThatFocalLength) {
+  const auto camera = std::make_shared<PerspectiveCamera>(
+      PerspectiveModel({400.0, 402.0}, {319.0, 241.0}, kCoeffs), 640, 480);
+  const PerspectiveCamera longer(
+      PerspectiveModel({440.0, 442.2}, {319.0, 241.0}, kCoeffs), 640, 480);
+  const ScaledCamera scaled(camera, 1.1);
+  const std::vector<Eigen::Vector3d> points = random_points_for_test(2000, 9);
+  const CameraTestProjection a = project_for_test(scaled, points);
+  const CameraTestProjection b = project_for_test(longer, points);
+  int num_seen = 0;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (!a.is_visible[i] || !b.is_visible[i]) continue;
+    ++num_seen;
+    EXPECT_LT((a.pixels[i] - b.pixels[i]).norm(), 1e-9);
+  }
+  EXPECT_GT(num_seen, 100);
+}
+
+}  // namespace
+}  // namespace waymark
