@@ -42,6 +42,8 @@ int run_program(int argc, char** argv) {
   program.require_subcommand(1);
   program.set_version_flag("--version", std::string("waymark ") + WAYMARK_VERSION);
   program.get_formatter()->column_width(34);
+  program.footer(
+      "Exit status: 0 done, 1 could not finish, 2 bad usage, settings or input, 3 no pose");
 
   Command command;
   add_run_command(program, command);

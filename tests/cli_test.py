@@ -46,6 +46,7 @@ class Usage(CliTest):
     def test_help_is_complete(self):
         top = waymark("--help")
         self.assertEqual(top.returncode, 0)
+        self.assertIn("Exit status", top.stdout)
         for command in ("run", "eval", "simulate", "config"):
             self.assertIn(command, top.stdout)
             self.assertEqual(waymark(command, "--help").returncode, 0)
