@@ -9,19 +9,11 @@
 #include "waymark/image/frame_builder.h"
 #include "waymark/mapping/mapper.h"
 #include "waymark/system/map_worker.h"
-#include "waymark/track/map_view.h"
+#include "waymark/system/trajectory_memory.h"
 #include "waymark/track/tracker.h"
 
 namespace waymark {
 namespace {
-
-/// What is remembered of a frame for the trajectory.
-struct FrameMemory {
-  std::int64_t timestamp_ns = 0;
-  FrameState state = FrameState::kLost;
-  RelativePose pose;  ///< Where state is kTracked or kFilled.
-  MapView view;       ///< Until the pose is settled; empty where it follows from something else.
-};
 
 Timing checked(Timing timing) {
   if (timing == Timing::kRealtime) {
@@ -29,10 +21,6 @@ Timing checked(Timing timing) {
   }
   return timing;
 }
-
-/// Frames whose view is kept, so that they can be located once more when the mapper has been around
-/// them; some 30 kB each.
-constexpr std::size_t kUnsettledFrames = 1000;
 
 /// Whether a map comes late enough for the check of the focal length.
 bool has_focal_check(const Map& map) {
@@ -55,6 +43,7 @@ class System::Impl {
         settings_(settings),
         timing_(checked(timing)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
+        memory_(rig_),
         mapper_(rig_, settings.mapping),
         worker_(timing, [this](const MapperMessage& message) { return process(message); }) {}
 
@@ -69,8 +58,6 @@ class System::Impl {
  private:
   void send(FrameId frame, MapperMessage message);
   std::shared_ptr<const Map> process(const MapperMessage& message);
-  void remember(const Frame& frame, const TrackOutcome& outcome);
-  void settle(FrameMemory& memory);
 
   // Fixed after construction.
   const std::shared_ptr<const Rig> rig_;
@@ -80,8 +67,7 @@ class System::Impl {
   // The caller's thread.
   FrameBuilder builder_;
   std::optional<Tracker> tracker_;
-  std::vector<FrameMemory> memory_;
-  PoseWorkspace workspace_;
+  TrajectoryMemory memory_;
   std::shared_ptr<const Map> visible_map_ = std::make_shared<const Map>();
   bool is_finished_ = false;
 
@@ -99,12 +85,13 @@ class System::Impl {
 
 TrackingResult System::Impl::feed(const FrameInput& input) {
   WAYMARK_CHECK(!is_finished_);
-  if (!memory_.empty() && input.timestamp_ns <= memory_.back().timestamp_ns) {
-    throw InputError("frame " + std::to_string(memory_.size()),
+  const auto& past = memory_.entries();
+  if (!past.empty() && input.timestamp_ns <= past.back().timestamp_ns) {
+    throw InputError("frame " + std::to_string(past.size()),
                      "time stamp is not later than that of the frame before");
   }
   TrackingResult result;
-  const auto id = FrameId{static_cast<std::uint32_t>(memory_.size())};
+  const auto id = FrameId{static_cast<std::uint32_t>(past.size())};
   Frame frame{id,
               input.timestamp_ns,
               builder_.build({input.image0, input.image1, input.depth, input.mask})};
@@ -120,7 +107,7 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
     if (auto map = worker_.for_frame(id)) visible_map_ = std::move(map);
   }
   TrackOutcome outcome = tracker_->track(frame, visible_map_, result.stages);
-  remember(frame, outcome);
+  memory_.add(frame, outcome, *visible_map_);
   result.frame = id;
   result.state = outcome.state;
   result.reason = outcome.reason;
@@ -135,31 +122,6 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
     send(id, std::move(*outcome.message));
   }
   return result;
-}
-
-void System::Impl::remember(const Frame& frame, const TrackOutcome& outcome) {
-  RelativePose pose = outcome.pose.value_or(RelativePose{});
-  // A keyframe is its own reference, so that it moves as the map moves it.
-  if (outcome.keyframe) pose = {*outcome.keyframe, Rigid3{}, pose.reference_scale};
-  // A frame's pose was found in a map that had not seen what comes after it.
-  const bool is_provisional = outcome.pose && !outcome.keyframe && !outcome.message;
-  memory_.push_back({frame.timestamp_ns,
-                     outcome.state,
-                     pose,
-                     is_provisional ? view_of(*frame.features, tracker_->landmarks()) : MapView{}});
-  if (memory_.size() > kUnsettledFrames) settle(memory_[memory_.size() - kUnsettledFrames - 1]);
-  for (const FilledPose& filled : outcome.filled) {
-    memory_.at(filled.frame.value).state = FrameState::kFilled;
-    memory_.at(filled.frame.value).pose = filled.pose;
-  }
-}
-
-void System::Impl::settle(FrameMemory& memory) {
-  if (memory.view.is_empty()) return;
-  if (const auto pose = locate_again(memory.view, *visible_map_, *rig_, memory.pose, workspace_)) {
-    memory.pose = *pose;
-  }
-  memory.view = {};
 }
 
 void System::Impl::send(FrameId frame, MapperMessage message) {
@@ -194,13 +156,13 @@ void System::Impl::finish() {
   worker_.finish();
   mapper_.refine_globally();
   visible_map_ = mapper_.freeze();
-  for (FrameMemory& memory : memory_) settle(memory);
+  memory_.settle(*visible_map_);
 }
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {
   std::vector<TrajectoryFrame> frames;
-  for (std::uint32_t i = 0; i < memory_.size(); ++i) {
-    const FrameMemory& memory = memory_[i];
+  for (std::uint32_t i = 0; i < memory_.entries().size(); ++i) {
+    const TrajectoryMemory::Entry& memory = memory_.entries()[i];
     const KeyframeId reference = memory.pose.reference;
     // The newest frames may refer to a keyframe that the visible map does not contain yet.
     if (!has_pose(memory.state) || reference >= visible_map_->keyframes().end_id()) continue;
@@ -218,7 +180,7 @@ std::vector<TrajectoryFrame> System::Impl::trajectory() const {
 
 std::vector<FrameState> System::Impl::frame_states() const {
   std::vector<FrameState> states;
-  for (const FrameMemory& memory : memory_) states.push_back(memory.state);
+  for (const auto& memory : memory_.entries()) states.push_back(memory.state);
   return states;
 }
 

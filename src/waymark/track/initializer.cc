@@ -267,7 +267,8 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
 
 void Initializer::fill(const Reference& reference, Initialization& start) {
   const LandmarkSet landmarks = landmark_set(start.submap);
-  start.filled.push_back({reference.frame.id, {KeyframeId{0}, Rigid3{}, 1.0}});
+  start.filled.push_back(
+      {reference.frame.id, {KeyframeId{0}, Rigid3{}, 1.0}, reference.frame.features});
   const auto middle = std::find_if(passed_.begin(), passed_.end(), [&](const Frame& passed) {
     return passed.id >= reference.frame.id;
   });
@@ -275,7 +276,7 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
     const std::optional<Rigid3> rig_from_world = locate(passed, guess, landmarks);
     if (!rig_from_world) return;
     guess = *rig_from_world;
-    start.filled.push_back({passed.id, {KeyframeId{0}, *rig_from_world, 1.0}});
+    start.filled.push_back({passed.id, {KeyframeId{0}, *rig_from_world, 1.0}, passed.features});
   };
   Rigid3 guess;
   for (auto it = middle; it != passed_.end(); ++it) {

@@ -21,6 +21,7 @@ namespace waymark {
 struct FilledPose {
   FrameId frame;
   RelativePose pose;
+  std::shared_ptr<const Features> features;
 };
 
 /// A new sub-map and what follows from it for the frames seen meanwhile.

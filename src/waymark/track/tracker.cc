@@ -204,6 +204,7 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
   outcome.covariance = located.covariance;
   outcome.num_matches = located.num_matches;
   outcome.num_inliers = located.num_inliers;
+  outcome.seen = seen_landmarks(*frame.features, landmarks_);
   const Keyframe& reference = map_->keyframes().at(local_.reference);
   outcome.pose = RelativePose{local_.reference,
                               located.rig_from_world * reference.rig_from_world.inverse(),

@@ -17,6 +17,7 @@
 #include "waymark/track/local_map.h"
 #include "waymark/track/messages.h"
 #include "waymark/track/motion_model.h"
+#include "waymark/track/pose_refiner.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
@@ -33,6 +34,7 @@ struct TrackOutcome {
   std::optional<MapperMessage> message;  ///< For the mapper; a frame with a message is a keyframe.
   std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
   std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
+  std::vector<SeenLandmark> seen;        ///< What the pose rests on.
 };
 
 /// Follows the camera through the map, frame by frame (Klein and Murray 2007; Mur-Artal et al.
@@ -48,10 +50,6 @@ class Tracker {
 
   /// map: the newest one that this frame may see; null before the first sub-map.
   TrackOutcome track(const Frame& frame, std::shared_ptr<const Map> map, StageTimes& times);
-
-  /// The landmark of each feature of the frame just tracked, invalid where it has none; nothing
-  /// where that frame started a sub-map.
-  const std::vector<LandmarkId>& landmarks() const { return landmarks_; }
 
  private:
   enum class Mode { kInitializing, kTracking, kLost };

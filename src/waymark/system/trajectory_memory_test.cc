@@ -1,0 +1,94 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/trajectory_memory.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/track/test_map.h"
+
+namespace waymark {
+namespace {
+
+class TrajectoryMemoryTest : public ::testing::Test {
+ protected:
+  TrajectoryMemoryTest() : scene_(1, cloud_ahead(), {.seed = 5}, false), memory_(scene_.rig) {
+    scene_.add_keyframe(pose_at(0.0));
+    scene_.add_keyframe(pose_at(0.5));
+    view_ = scene_.look(truth_, 100);
+    memory_.add(frame(0), TrackOutcome{}, scene_.map);  // What became the first keyframe.
+  }
+
+  /// Adds a frame that was located relative to the first keyframe when the map was smaller.
+  void add_stale(std::uint32_t number) {
+    TrackOutcome outcome;
+    outcome.state = FrameState::kTracked;
+    outcome.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
+    outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
+    memory_.add(frame(number), outcome, scene_.map);
+  }
+
+  Frame frame(std::uint32_t number) const {
+    return {FrameId{number}, std::int64_t{number} * 1000, view_.features};
+  }
+
+  Rigid3 stale() const {
+    Rigid3 pose = truth_.inverse();
+    pose.translation *= 0.9;
+    return pose;
+  }
+
+  double error_m(std::uint32_t number) const {
+    const RelativePose& pose = memory_.entries().at(number).pose;
+    const Rigid3 rig_from_world =
+        scene_.map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
+    return (rig_from_world.origin_in_source() - truth_.translation).norm();
+  }
+
+  const Rigid3 truth_ = pose_at(0.3, 0.1, 0.2, 0.03);
+  TestMap scene_;
+  TrajectoryMemory memory_;
+  PointObservation view_;
+};
+
+TEST_F(TrajectoryMemoryTest, SettlesFramesInTheFinalMap) {
+  add_stale(1);
+  add_stale(2);
+  ASSERT_GT(error_m(2), 0.03);
+  memory_.settle(scene_.map);
+  EXPECT_LT(error_m(2), 0.01);
+}
+
+TEST_F(TrajectoryMemoryTest, SettlesFilledFramesByWhatTheirFeaturesShow) {
+  memory_.add(frame(1), TrackOutcome{}, scene_.map);
+  memory_.add(frame(2), TrackOutcome{}, scene_.map);
+  TrackOutcome start;
+  start.state = FrameState::kTracked;
+  start.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
+  start.filled = {{FrameId{2}, {KeyframeId{0}, stale(), 1.0}, view_.features}};
+  memory_.add(frame(3), start, scene_.map);
+  EXPECT_EQ(memory_.entries()[2].state, FrameState::kFilled);
+  memory_.settle(scene_.map);
+  EXPECT_LT(error_m(2), 0.01);
+}
+
+TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
+  TrackOutcome outcome;
+  outcome.state = FrameState::kTracked;
+  outcome.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
+  outcome.keyframe = KeyframeId{1};
+  outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
+  memory_.add(frame(1), outcome, scene_.map);  // The second keyframe was made from frame 1.
+  memory_.settle(scene_.map);
+  EXPECT_EQ(memory_.entries()[1].pose.reference, KeyframeId{1});
+  EXPECT_EQ(memory_.entries()[1].pose.rig_from_reference.translation.norm(), 0.0);
+}
+
+TEST_F(TrajectoryMemoryTest, SettlesTheOldestOnceThereAreMany) {
+  memory_.add(frame(1), TrackOutcome{}, scene_.map);
+  for (std::uint32_t i = 0; i <= TrajectoryMemory::kMaxUnsettled; ++i) add_stale(2 + i);
+  EXPECT_LT(error_m(2), 0.01);
+  EXPECT_GT(error_m(3), 0.03);
+}
+
+}  // namespace
+}  // namespace waymark

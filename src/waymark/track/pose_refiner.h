@@ -1,0 +1,59 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "waymark/map/map.h"
+#include "waymark/match/projection.h"
+#include "waymark/optimize/pose.h"
+
+namespace waymark {
+
+/// What a feature measured of a landmark, without the rest of the frame.
+struct SeenLandmark {
+  LandmarkId landmark;
+  Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();      ///< Unit, in the observing camera.
+  Matrix23f level_pixel_from_bearing = Matrix23f::Zero();  ///< W of Features.
+  float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
+  float inverse_range_sigma = 0.0f;  ///< 1/m; 0 where there is no measurement.
+  std::uint8_t camera = 0;           ///< Index in the rig.
+};
+
+/// The features of a frame that show a landmark. landmarks: per feature, invalid where none.
+std::vector<SeenLandmark> seen_landmarks(const Features& features,
+                                         std::span<const LandmarkId> landmarks);
+
+/// Finds the poses of past frames again, in a map that has changed since. A frame between keyframes
+/// is known relative to one of them, and the map may have been a few percent too small or bent
+/// where and when it was tracked; moving the frame with its keyframe does not mend that, locating
+/// it anew does. Keeps its buffers.
+class PoseRefiner {
+ public:
+  explicit PoseRefiner(std::shared_ptr<const Rig> rig);
+
+  /// Pose of a frame from what it saw of landmarks that still live; nothing if too few do, or too
+  /// few agree on a pose near the given one.
+  std::optional<Rigid3> refine(const Map& map,
+                               std::span<const SeenLandmark> seen,
+                               const Rigid3& rig_from_world);
+
+  /// What a frame near a keyframe sees of that keyframe's landmarks, given about its pose.
+  std::vector<SeenLandmark> find(const Map& map,
+                                 KeyframeId keyframe,
+                                 const Features& features,
+                                 const Rigid3& rig_from_world);
+
+ private:
+  std::shared_ptr<const Rig> rig_;
+  ProjectionMatcher matcher_;
+  PoseObservations observations_;
+  PoseWorkspace workspace_;
+};
+
+}  // namespace waymark
