@@ -63,17 +63,12 @@ std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window) {
   return fixed;
 }
 
-/// Holds the gauge: without anchors the oldest keyframe is fixed, in mono the next one too, which
-/// fixes the scale.
-void fix_gauge(const Map& map, BundleWindow& window) {
-  const bool is_metric =
-      map.submaps()[map.keyframes().at(window.moving.front()).submap.value].is_metric;
-  const std::size_t num_needed = is_metric ? 1 : 2;
-  while (window.fixed.size() < num_needed && window.moving.size() > 1) {
-    window.fixed.push_back(window.moving.front());
-    window.moving.erase(window.moving.begin());
-  }
-  std::sort(window.fixed.begin(), window.fixed.end());
+/// Holds the gauge: without anchors the oldest keyframe is fixed. In mono the scale stays free, and
+/// damping keeps it near where it was: to fix a second pose would fix the error of a short baseline.
+void fix_gauge(BundleWindow& window) {
+  if (!window.fixed.empty() || window.moving.size() < 2) return;
+  window.fixed.push_back(window.moving.front());
+  window.moving.erase(window.moving.begin());
 }
 
 struct WindowProblem {
@@ -148,7 +143,7 @@ BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_ke
   window.fixed = anchors(map, window);
   const KeyframeId root = map.submaps()[map.keyframes().at(centre).submap.value].root;
   if (std::erase(window.moving, root) > 0) window.fixed.push_back(root);
-  if (!window.moving.empty()) fix_gauge(map, window);
+  if (!window.moving.empty()) fix_gauge(window);
   std::sort(window.fixed.begin(), window.fixed.end());
   return window;
 }
@@ -163,7 +158,7 @@ BundleWindow whole_submap(const Map& map, SubmapId submap) {
   map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
     if (landmark.submap == submap) window.landmarks.push_back(id);
   });
-  if (!window.moving.empty()) fix_gauge(map, window);
+  if (!window.moving.empty()) fix_gauge(window);
   return window;
 }
 

@@ -101,6 +101,14 @@ TEST_P(BundleWindowTest, NeverMovesTheRoot) {
   EXPECT_EQ(whole.landmarks.size(), scene_.map.landmarks().size());
 }
 
+TEST_P(BundleWindowTest, HoldsOneKeyframeWhereNothingElseDoes) {
+  // In mono too: to hold the second one would hold the error of the first, short baseline.
+  const BundleWindow whole = whole_submap(scene_.map, scene_.submap);
+  EXPECT_EQ(whole.fixed, std::vector<KeyframeId>{KeyframeId{0}});
+  const BundleWindow window = choose_window(scene_.map, last(), kNumKeyframes);
+  EXPECT_EQ(window.fixed, std::vector<KeyframeId>{KeyframeId{0}});
+}
+
 TEST_P(BundleWindowTest, BringsAMovedKeyframeBack) {
   Rng rng(1, 0);
   move_pose(last(), rng, 0.01);
