@@ -64,7 +64,8 @@ std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window) {
 }
 
 /// Holds the gauge: without anchors the oldest keyframe is fixed. In mono the scale stays free, and
-/// damping keeps it near where it was: to fix a second pose would fix the error of a short baseline.
+/// damping keeps it near where it was: to fix a second pose would fix the error of a short
+/// baseline.
 void fix_gauge(BundleWindow& window) {
   if (!window.fixed.empty() || window.moving.size() < 2) return;
   window.fixed.push_back(window.moving.front());

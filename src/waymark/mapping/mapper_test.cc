@@ -10,8 +10,8 @@
 #include "waymark/match/test_scene.h"
 #include "waymark/optimize/bundle.h"
 #include "waymark/simulate/motion.h"
-#include "waymark/track/map_view.h"
 #include "waymark/track/tracker.h"
+#include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
 namespace {
@@ -54,16 +54,6 @@ PointNoise make_noise(const Setup& setup) {
   return noise;
 }
 
-/// Frames are located once more in the final map.
-void settle(const std::vector<MapView>& views, const Rig& rig, Session& session) {
-  PoseWorkspace workspace;
-  for (std::size_t i = 0; i < views.size(); ++i) {
-    if (views[i].is_empty()) continue;
-    const auto pose = locate_again(views[i], *session.map, rig, session.poses[i], workspace);
-    if (pose) session.poses[i] = *pose;
-  }
-}
-
 /// Tracker and mapper by hand, with the map visible kLatency frames after each message.
 Session run(const Setup& setup) {
   const auto rig = make_test_rig(setup.num_cameras);
@@ -76,7 +66,7 @@ Session run(const Setup& setup) {
   std::vector<std::pair<std::uint32_t, std::shared_ptr<const Map>>> published;
   std::shared_ptr<const Map> visible = std::make_shared<const Map>();
   Session session;
-  std::vector<MapView> views;
+  TrajectoryMemory memory(rig);
   for (std::uint32_t i = 0; i < kNumFrames; ++i) {
     while (!published.empty() && published.front().first <= i) {
       visible = published.front().second;
@@ -84,18 +74,11 @@ Session run(const Setup& setup) {
     }
     const PointObservation seen = observe(cloud, *rig, truth(static_cast<int>(i)), noise, i);
     StageTimes times;
-    TrackOutcome outcome =
-        tracker.track({FrameId{i}, 50'000'000 * std::int64_t{i}, seen.features}, visible, times);
-    session.states.push_back(outcome.state);
-    session.poses.push_back(outcome.pose.value_or(RelativePose{}));
+    const Frame frame{FrameId{i}, 50'000'000 * std::int64_t{i}, seen.features};
+    TrackOutcome outcome = tracker.track(frame, visible, times);
+    memory.add(frame, outcome, *visible);
     if (outcome.num_inliers > 0 && !outcome.covariance.isZero()) {
       session.position_variances.push_back(outcome.covariance.topLeftCorner<3, 3>().trace());
-    }
-    const bool is_provisional = outcome.pose && !outcome.message;
-    views.push_back(is_provisional ? view_of(*seen.features, tracker.landmarks()) : MapView{});
-    for (const FilledPose& filled : outcome.filled) {
-      session.states[filled.frame.value] = FrameState::kFilled;
-      session.poses[filled.frame.value] = filled.pose;
     }
     if (!outcome.message) continue;
     const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);
@@ -106,7 +89,11 @@ Session run(const Setup& setup) {
   mapper.refine_globally();
   session.broken.push_back(mapper.map().broken_invariants());
   session.map = mapper.freeze();
-  settle(views, *rig, session);
+  memory.settle(*session.map);
+  for (const TrajectoryMemory::Entry& entry : memory.entries()) {
+    session.states.push_back(entry.state);
+    session.poses.push_back(entry.pose);
+  }
   return session;
 }
 

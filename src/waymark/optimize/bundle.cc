@@ -2,14 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/optimize/bundle.h"
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
 #include "waymark/base/check.h"
 #include "waymark/optimize/ceres_solver.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/schur_solver.h"
 
 namespace waymark {
-
 namespace {
+
+/// Wide enough to be nearly as efficient as least squares on what is Gaussian.
+constexpr double kHuberSigmas = 2.0;
+/// Corners are not located better than this, whatever few residuals say.
+constexpr double kMinNoisePx = 0.15;
 
 void check(const BundleProblem& problem) {
   WAYMARK_CHECK(problem.rig != nullptr);
@@ -37,6 +45,33 @@ double squared_residual(const BundleProblem& problem, const BundleObservation& o
   return is_ahead(sighting, observation.bearing) ? squared : kGrossSquaredResidual;
 }
 
+/// Standard deviation of a residual component as the used observations show it: the median length
+/// of Gaussian residuals in the plane is 1.177 sigma. Robust as a median is, so that the loss
+/// narrows on what is noise and leaves out what is wrong.
+std::optional<double> measured_noise_px(const BundleProblem& problem,
+                                        const std::vector<std::uint8_t>& is_used) {
+  std::vector<double> squared;
+  for (std::size_t i = 0; i < is_used.size(); ++i) {
+    if (is_used[i]) squared.push_back(squared_residual(problem, problem.observations[i]));
+  }
+  if (squared.empty()) return std::nullopt;
+  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
+  std::nth_element(squared.begin(), middle, squared.end());
+  return std::sqrt(*middle) / 1.177;
+}
+
+/// Options of a round: the loss as narrow as the noise allows.
+BundleOptions narrowed(const BundleOptions& options,
+                       const BundleProblem& problem,
+                       const std::vector<std::uint8_t>& is_used) {
+  BundleOptions result = options;
+  if (const auto noise_px = measured_noise_px(problem, is_used)) {
+    result.huber_px =
+        std::clamp(kHuberSigmas * *noise_px, kHuberSigmas * kMinNoisePx, options.huber_px);
+  }
+  return result;
+}
+
 bool has_usable_range(const BundleObservation& observation) {
   return !(observation.inverse_range_sigma > 0.0f) ||
          (std::isfinite(observation.inverse_range) &&
@@ -57,9 +92,10 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   BundleResult result;
   const double gate = options.gate_px * options.gate_px;
   for (int round = 0; round < options.num_rounds; ++round) {
+    const BundleOptions round_options = narrowed(options, problem, is_used);
     const BundleRound done = options.solver == BundleSolver::kSchur
-                                 ? minimize_with_schur(problem, is_used, options)
-                                 : minimize_with_ceres(problem, is_used, options);
+                                 ? minimize_with_schur(problem, is_used, round_options)
+                                 : minimize_with_ceres(problem, is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;

@@ -39,8 +39,11 @@ struct BundleOptions {
   /// round before (the first: over all), then every observation meets the gate again.
   int num_rounds = 2;
   int max_iterations_per_round = 10;
-  double huber_px = 2.0;  ///< Residual length where the loss turns linear; of ranges, in sigmas.
-  double gate_px = 2.45;  ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
+  /// Residual length where the loss turns linear, at most: each round takes twice the noise that
+  /// its residuals show, if that is less.
+  double huber_px = 2.0;
+  double range_huber = 1.0;  ///< The same for residuals of ranges, in sigmas.
+  double gate_px = 2.45;     ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
   /// A round ends early when an iteration lowers the cost by less than this part of it.
   double relative_cost_tolerance = 1e-5;
 };
@@ -48,7 +51,7 @@ struct BundleOptions {
 struct BundleResult {
   std::vector<std::uint8_t> is_outlier;  ///< Per observation, judged with the result.
   double initial_cost = 0.0;  ///< Half the robust sum over all observations before the first round.
-  double final_cost = 0.0;    ///< The same over the observations of the last round, after it.
+  double final_cost = 0.0;    ///< That of the last round over its observations, after it.
   int num_iterations = 0;     ///< Of all rounds.
 };
 

@@ -167,6 +167,7 @@ void add_residuals(const BundleProblem& problem,
                    std::vector<PoseBlock>& poses,
                    std::vector<Eigen::Vector3d>& points,
                    ceres::LossFunction* loss,
+                   ceres::LossFunction* range_loss,
                    ceres::Problem& ceres_problem) {
   for (std::size_t i = 0; i < is_used.size(); ++i) {
     if (!is_used[i]) continue;
@@ -178,7 +179,7 @@ void add_residuals(const BundleProblem& problem,
         new ObservationCost<2>(observation, cam_from_rig), loss, pose, point);
     if (!(observation.inverse_range_sigma > 0.0f)) continue;
     ceres_problem.AddResidualBlock(
-        new ObservationCost<1>(observation, cam_from_rig), loss, pose, point);
+        new ObservationCost<1>(observation, cam_from_rig), range_loss, pose, point);
   }
 }
 
@@ -191,11 +192,12 @@ BundleRound minimize_with_ceres(BundleProblem& problem,
   for (const Rigid3& pose : problem.rig_from_world) poses.push_back(block_from(pose));
   LeftPerturbation manifold;
   ceres::HuberLoss loss(options.huber_px);
+  ceres::HuberLoss range_loss(options.range_huber);
   ceres::Problem ceres_problem(problem_options());
   const auto ordering = std::make_shared<ceres::ParameterBlockOrdering>();
   const int num_free =
       add_blocks(problem, is_used, poses, problem.points, &manifold, ceres_problem, *ordering);
-  add_residuals(problem, is_used, poses, problem.points, &loss, ceres_problem);
+  add_residuals(problem, is_used, poses, problem.points, &loss, &range_loss, ceres_problem);
 
   ceres::Solver::Options solver_options;
   solver_options.num_threads = 1;

@@ -157,7 +157,7 @@ double SchurSolver::cost(const State& state) const {
     if (observation.inverse_range_sigma > 0.0f) {
       const double range =
           range_residual(sighting, observation.inverse_range, observation.inverse_range_sigma);
-      sum += huber(range * range, options_.huber_px).loss;
+      sum += huber(range * range, options_.range_huber).loss;
     }
   }
   return 0.5 * sum;
@@ -205,7 +205,7 @@ void SchurSolver::linearize_observation(std::size_t entry, std::size_t k) {
   }
   const double sigma = observation.inverse_range_sigma;
   const double range = range_residual(sighting, observation.inverse_range, sigma);
-  const double range_root = std::sqrt(huber(range * range, options_.huber_px).weight);
+  const double range_root = std::sqrt(huber(range * range, options_.range_huber).weight);
   Rows<3> rows;
   rows.residual << root * residual, range_root * range;
   rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(sighting, sigma);

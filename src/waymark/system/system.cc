@@ -9,8 +9,8 @@
 #include "waymark/image/frame_builder.h"
 #include "waymark/mapping/mapper.h"
 #include "waymark/system/map_worker.h"
-#include "waymark/system/trajectory_memory.h"
 #include "waymark/track/tracker.h"
+#include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
 namespace {

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/system/trajectory_memory.h"
+#include "waymark/track/trajectory_memory.h"
 
 #include <utility>
 
