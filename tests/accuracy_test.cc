@@ -80,7 +80,10 @@ INSTANTIATE_TEST_SUITE_P(
     testing::Values(RecordedCase{"euroc_mh01_stereo", Setup::kStereo, 1.0, 0.0045},
                     RecordedCase{"euroc_mh01_stereo", Setup::kMono, 0.98, 0.0085},
                     RecordedCase{"kitti_00_stereo", Setup::kStereo, 1.0, 0.28},
-                    RecordedCase{"tum_fr1_rpy_rgbd", Setup::kRgbd, 1.0, 0.026}),
+                    RecordedCase{"tum_fr1_rpy_rgbd", Setup::kRgbd, 1.0, 0.026},
+                    RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kStereo, 1.0, 0.10},
+                    RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kMono, 0.98, 0.12},
+                    RecordedCase{"sim_atrium_360", Setup::kMono, 0.98, 0.025}),
     [](const testing::TestParamInfo<RecordedCase>& info) {
       return std::string(info.param.name) + "_" + std::string(to_string(info.param.setup));
     });

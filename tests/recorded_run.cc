@@ -26,7 +26,10 @@ RecordedResults map_recorded(const std::filesystem::path& folder,
   options.timing = timing;
   options.reading.setup = setup;
   options.reading.frames = num_frames;
-  if (setup == Setup::kRgbd) options.configs = {folder / "camchain.yaml"};
+  // EuRoC and KITTI carry their calibration.
+  if (!std::filesystem::exists(folder / "mav0") && !std::filesystem::exists(folder / "calib.txt")) {
+    options.configs = {folder / "camchain.yaml"};
+  }
   Session session = open_session(options);
 
   RecordedResults results;
