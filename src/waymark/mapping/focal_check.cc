@@ -116,9 +116,11 @@ void measure_anew(const Rig& rig, double log_factor, Scene& scene) {
 
 double least_cost(const Rig& rig, double log_factor, Scene scene) {
   measure_anew(rig, log_factor, scene);
-  return adjust_bundle(
-             scene.problem,
-             {.num_rounds = 1, .max_iterations_per_round = 25, .relative_cost_tolerance = 1e-6})
+  return adjust_bundle(scene.problem,
+                       {.num_rounds = 1,
+                        .max_iterations_per_round = 25,
+                        .follows_noise = false,
+                        .relative_cost_tolerance = 1e-6})
       .final_cost;
 }
 

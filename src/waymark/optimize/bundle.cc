@@ -65,6 +65,7 @@ BundleOptions narrowed(const BundleOptions& options,
                        const BundleProblem& problem,
                        const std::vector<std::uint8_t>& is_used) {
   BundleOptions result = options;
+  if (!options.follows_noise) return result;
   if (const auto noise_px = measured_noise_px(problem, is_used)) {
     result.huber_px =
         std::clamp(kHuberSigmas * *noise_px, kHuberSigmas * kMinNoisePx, options.huber_px);
