@@ -1,0 +1,301 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/optimize/similarity.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <span>
+
+#include "waymark/geometry/alignment.h"
+#include "waymark/optimize/residual.h"
+#include "waymark/optimize/robust_loss.h"
+
+namespace waymark {
+namespace {
+
+/// Fewer do not determine a similarity.
+constexpr std::size_t kMinMatches = 3;
+/// Scales of the losses in units of the noise.
+constexpr double kFinalScale = 3.0;
+constexpr double kHuberScale = 2.5;
+/// The scale shrinks by this factor from stage to stage.
+constexpr double kAnnealing = 0.5;
+constexpr int kIterationsPerStage = 3;
+constexpr int kIterationsPerRound = 10;
+constexpr int kNumRounds = 3;
+/// Iterations end when the next step would lower the cost by less than this, in units of the
+/// squared noise.
+constexpr double kNegligibleDecrease = 1e-6;
+/// Noise of the logarithm of a ratio of ranges: as assumed until it is measured, and its bounds.
+constexpr double kAssumedRangeNoise = 0.1;
+constexpr double kMinRangeNoise = 0.002;
+constexpr double kMaxRangeNoise = 0.5;
+/// Standard deviation of a normal distribution by its median absolute deviation.
+constexpr double kSigmaFromMedian = 1.4826;
+/// Prior information that keeps the covariance finite.
+constexpr double kPriorInformation = 1e-6;
+
+using Indices = std::span<const std::uint32_t>;
+
+/// Robust value of a squared residual in squared pixels.
+struct Loss {
+  RobustValue (*function)(double squared_residual, double scale);
+  double scale_px;
+
+  RobustValue operator()(double squared_residual) const {
+    return function(squared_residual, scale_px);
+  }
+};
+
+struct NormalEquations {
+  Matrix7d hessian = Matrix7d::Zero();
+  Vector7d gradient = Vector7d::Zero();
+  double cost = 0.0;
+};
+
+/// Reorders the values; there must be some.
+double median(std::vector<double>& values) {
+  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
+  std::nth_element(values.begin(), middle, values.end());
+  return *middle;
+}
+
+/// The similarity of one set of matches.
+class SimilaritySolver {
+ public:
+  SimilaritySolver(const LandmarkMatches& matches, const SimilarityOptions& options)
+      : matches_(matches), options_(options) {}
+
+  NormalEquations linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
+    NormalEquations equations;
+    for (const std::uint32_t index : indices) {
+      const auto residual = similarity_residual(b_from_a, matches_, index);
+      if (!residual) {
+        const double num_parts = options_.is_scale_free ? 2.0 : 1.0;
+        equations.cost += num_parts * loss(kGrossSquaredResidual).loss;
+        continue;
+      }
+      const RobustValue robust = loss(residual->value.squaredNorm());
+      equations.hessian.noalias() +=
+          robust.weight * residual->jacobian.transpose() * residual->jacobian;
+      equations.gradient.noalias() +=
+          robust.weight * residual->jacobian.transpose() * residual->value;
+      equations.cost += robust.loss;
+      if (options_.is_scale_free) add_range(*residual, loss, equations);
+    }
+    if (!options_.is_scale_free) {
+      equations.hessian.row(6).setZero();
+      equations.hessian.col(6).setZero();
+      equations.gradient[6] = 0.0;
+    }
+    return equations;
+  }
+
+  /// Levenberg-Marquardt with the damping of Madsen, Nielsen & Tingleff 2004, 3.2; returns the
+  /// equations at the similarity reached.
+  NormalEquations minimize(Sim3& b_from_a,
+                           Indices indices,
+                           const Loss& loss,
+                           int max_iterations) const {
+    const double negligible = kNegligibleDecrease * options_.noise_px * options_.noise_px;
+    NormalEquations equations = linearize(b_from_a, indices, loss);
+    double damping = 1e-6;
+    double growth = 2.0;
+    for (int iteration = 0; iteration < max_iterations; ++iteration) {
+      const Vector7d scale = equations.hessian.diagonal().array() + kPriorInformation;
+      Matrix7d damped = equations.hessian;
+      damped.diagonal() += damping * scale;
+      damped.diagonal().array() += kPriorInformation;
+      const Vector7d step = -damped.ldlt().solve(equations.gradient);
+      const double decrease = step.dot(damping * scale.cwiseProduct(step) - equations.gradient);
+      if (!(decrease > negligible) || !step.allFinite()) break;
+      const Sim3 candidate = Sim3::exp(step) * b_from_a;
+      const NormalEquations next = linearize(candidate, indices, loss);
+      const double gain = (equations.cost - next.cost) / decrease;
+      if (gain > 0.0) {
+        b_from_a = candidate;
+        equations = next;
+        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
+        growth = 2.0;
+      } else {
+        damping *= growth;
+        growth *= 2.0;
+      }
+    }
+    return equations;
+  }
+
+  /// Runs through Geman-McClure losses from the width of the residuals at hand to that of the
+  /// noise.
+  void anneal(Sim3& b_from_a, Indices indices) const {
+    const double final_scale = kFinalScale * options_.noise_px;
+    double scale = std::max(final_scale, median_residual(b_from_a, indices));
+    for (; scale > final_scale; scale *= kAnnealing) {
+      minimize(b_from_a, indices, {geman_mcclure, scale}, kIterationsPerStage);
+    }
+    minimize(b_from_a, indices, {geman_mcclure, final_scale}, kIterationsPerRound);
+  }
+
+  std::vector<std::uint32_t> inliers(const Sim3& b_from_a) const {
+    const double gate = options_.gate_chi2 * options_.noise_px * options_.noise_px;
+    const Sim3 a_from_b = b_from_a.inverse();
+    std::vector<std::uint32_t> result;
+    for (std::uint32_t i = 0; i < matches_.size(); ++i) {
+      if (squared_similarity_residual(b_from_a, a_from_b, matches_, i) < gate) result.push_back(i);
+    }
+    return result;
+  }
+
+  /// Measures the noise of the ratios of ranges and returns it.
+  double measure_range_noise(const Sim3& b_from_a, Indices indices) {
+    std::vector<double> ratios;
+    for (const std::uint32_t index : indices) {
+      const auto residual = similarity_residual(b_from_a, matches_, index);
+      if (residual) ratios.push_back(residual->log_range_ratio);
+    }
+    if (ratios.empty()) return range_noise_;
+    const double middle = median(ratios);
+    for (double& ratio : ratios) ratio = std::abs(ratio - middle);
+    range_noise_ = std::clamp(kSigmaFromMedian * median(ratios), kMinRangeNoise, kMaxRangeNoise);
+    return range_noise_;
+  }
+
+ private:
+  /// In units of the bearings' noise, and under the same loss.
+  void add_range(const SimilarityResidual& residual,
+                 const Loss& loss,
+                 NormalEquations& equations) const {
+    const double factor = options_.noise_px / range_noise_;
+    const double value = factor * residual.log_range_ratio;
+    const Vector7d by_similarity = factor * residual.log_range_jacobian.transpose();
+    const RobustValue robust = loss(value * value);
+    equations.hessian.noalias() += robust.weight * by_similarity * by_similarity.transpose();
+    equations.gradient.noalias() += robust.weight * value * by_similarity;
+    equations.cost += robust.loss;
+  }
+
+  double median_residual(const Sim3& b_from_a, Indices indices) const {
+    const Sim3 a_from_b = b_from_a.inverse();
+    std::vector<double> values;
+    for (const std::uint32_t index : indices) {
+      values.push_back(squared_similarity_residual(b_from_a, a_from_b, matches_, index));
+    }
+    return std::sqrt(median(values));
+  }
+
+  const LandmarkMatches& matches_;
+  const SimilarityOptions& options_;
+  double range_noise_ = kAssumedRangeNoise;
+};
+
+/// For ransac(). Errors are in units of the squared noise.
+class SimilarityEstimator {
+ public:
+  /// With the inverse, which every error takes.
+  struct Model {
+    Sim3 b_from_a, a_from_b;
+  };
+  static constexpr std::size_t kSampleSize = 3;
+  static constexpr double kMaxSquaredError = 9.488;
+
+  SimilarityEstimator(const LandmarkMatches& matches, const SimilarityOptions& options)
+      : matches_(matches), options_(options) {}
+
+  std::size_t num_data() const { return matches_.size(); }
+
+  std::vector<Model> fit(std::span<const std::uint32_t, kSampleSize> sample) const {
+    std::array<Eigen::Vector3d, kSampleSize> points_a, points_b;
+    for (std::size_t i = 0; i < kSampleSize; ++i) {
+      points_a[i] = matches_.a.point_in_cam[sample[i]];
+      points_b[i] = matches_.b.point_in_cam[sample[i]];
+    }
+    if (options_.is_scale_free) {
+      const auto similarity = align_similarity(points_a, points_b);
+      if (similarity) return {model_of(*similarity)};
+    } else {
+      const auto rigid = align_rigid(points_a, points_b);
+      if (rigid) return {model_of(Sim3(*rigid))};
+    }
+    return {};
+  }
+
+  double squared_error(const Model& model, std::size_t index) const {
+    return squared_similarity_residual(model.b_from_a, model.a_from_b, matches_, index) /
+           (options_.noise_px * options_.noise_px);
+  }
+
+  std::optional<Model> refine(const Model& model, Indices nearby) const {
+    constexpr int kMaxIterations = 3;
+    if (nearby.size() <= kSampleSize) return std::nullopt;
+    Sim3 b_from_a = model.b_from_a;
+    const Loss loss = {geman_mcclure, kFinalScale * options_.noise_px};
+    SimilaritySolver(matches_, options_).minimize(b_from_a, nearby, loss, kMaxIterations);
+    return model_of(b_from_a);
+  }
+
+ private:
+  static Model model_of(const Sim3& b_from_a) { return {b_from_a, b_from_a.inverse()}; }
+
+  const LandmarkMatches& matches_;
+  const SimilarityOptions& options_;
+};
+
+Matrix7d covariance_from(Matrix7d information, bool is_scale_free) {
+  const double floor = 1e-12 * information.diagonal().maxCoeff();
+  information.diagonal().array() += std::max(kPriorInformation, floor);
+  Matrix7d inverse = information.ldlt().solve(Matrix7d::Identity());
+  if (!is_scale_free) inverse(6, 6) = 0.0;
+  return 0.5 * (inverse + inverse.transpose());
+}
+
+}  // namespace
+
+std::optional<SimilarityEstimate> find_similarity(const LandmarkMatches& matches,
+                                                  const SimilarityOptions& options,
+                                                  const RansacOptions& ransac_options) {
+  const auto consensus = ransac(SimilarityEstimator(matches, options), ransac_options);
+  if (!consensus) return std::nullopt;
+  return refine_similarity(matches, consensus->model.b_from_a, options);
+}
+
+SimilarityEstimate refine_similarity(const LandmarkMatches& matches,
+                                     const Sim3& initial_b_from_a,
+                                     const SimilarityOptions& options) {
+  SimilaritySolver solver(matches, options);
+  const Loss huber_loss = {huber, kHuberScale * options.noise_px};
+  SimilarityEstimate estimate;
+  estimate.b_from_a = initial_b_from_a;
+  std::vector<std::uint32_t> indices(matches.size());
+  std::iota(indices.begin(), indices.end(), 0u);
+  if (indices.size() >= kMinMatches) solver.anneal(estimate.b_from_a, indices);
+  indices = solver.inliers(estimate.b_from_a);
+  for (int round = 0; round < kNumRounds && indices.size() >= kMinMatches; ++round) {
+    if (options.is_scale_free) {
+      estimate.range_noise = solver.measure_range_noise(estimate.b_from_a, indices);
+    }
+    solver.minimize(estimate.b_from_a, indices, huber_loss, kIterationsPerRound);
+    auto next = solver.inliers(estimate.b_from_a);
+    const bool is_settled = next == indices;
+    indices = std::move(next);
+    if (is_settled) break;
+  }
+  estimate.is_inlier.assign(matches.size(), 0);
+  for (const std::uint32_t index : indices) {
+    estimate.is_inlier[index] = 1;
+    estimate.mean_squared_residual_px2 +=
+        squared_similarity_residual(estimate.b_from_a, estimate.b_from_a.inverse(), matches, index);
+  }
+  estimate.num_inliers = indices.size();
+  if (!indices.empty()) {
+    estimate.mean_squared_residual_px2 /= static_cast<double>(indices.size());
+  }
+  const NormalEquations last = solver.linearize(estimate.b_from_a, indices, huber_loss);
+  estimate.covariance =
+      covariance_from(last.hessian / (options.noise_px * options.noise_px), options.is_scale_free);
+  return estimate;
+}
+
+}  // namespace waymark
