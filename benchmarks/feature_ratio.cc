@@ -1,9 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// Time of our feature extractor relative to cv::ORB on the images of a folder:
-//   waymark_feature_ratio FOLDER [COUNT [MAX_IMAGES]]
-// Of more than MAX_IMAGES as many are used, evenly spread.
+// Time of our feature extractor relative to cv::ORB on the images of a folder or video:
+//   waymark_feature_ratio FOLDER|VIDEO [COUNT [MAX_IMAGES]]
+// Of more than MAX_IMAGES (200) as many are used, evenly spread.
 // Both work on each image in turn, on one thread. Times are those that the thread had the
 // processor, so that other load on the machine hits neither, or both alike.
 
@@ -16,6 +16,8 @@
 #include <opencv2/core.hpp>
 #include <opencv2/features2d.hpp>
 #include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
+#include <opencv2/videoio.hpp>
 #include <string>
 #include <vector>
 
@@ -51,15 +53,44 @@ std::vector<std::filesystem::path> list_images(const std::filesystem::path& fold
   return paths;
 }
 
-std::vector<std::filesystem::path> spread(const std::vector<std::filesystem::path>& all,
-                                          std::size_t max_count) {
-  if (all.size() <= max_count) return all;
-  std::vector<std::filesystem::path> chosen;
-  for (std::size_t i = 0; i < max_count; ++i) chosen.push_back(all[i * all.size() / max_count]);
+/// Of the indices below count at most max_count, evenly spread.
+std::vector<std::size_t> spread(std::size_t count, std::size_t max_count) {
+  std::vector<std::size_t> chosen;
+  const std::size_t num_chosen = std::min(count, max_count);
+  for (std::size_t i = 0; i < num_chosen; ++i) chosen.push_back(i * count / num_chosen);
   return chosen;
 }
 
-nlohmann::json measure(const std::vector<std::filesystem::path>& paths, int count) {
+std::vector<cv::Mat> read_folder(const std::filesystem::path& folder, std::size_t max_count) {
+  const std::vector<std::filesystem::path> paths = list_images(folder);
+  if (paths.empty()) throw std::runtime_error(folder.string() + ": no PNG images");
+  std::vector<cv::Mat> images;
+  for (const std::size_t i : spread(paths.size(), max_count)) {
+    images.push_back(cv::imread(paths[i].string(), cv::IMREAD_GRAYSCALE));
+    if (images.back().empty()) {
+      throw std::runtime_error(paths[i].string() + ": cannot be read as an image");
+    }
+  }
+  return images;
+}
+
+/// Grey frames of a video.
+std::vector<cv::Mat> read_video(const std::filesystem::path& path, std::size_t max_count) {
+  cv::VideoCapture capture(path.string());
+  const auto num_frames = static_cast<std::size_t>(capture.get(cv::CAP_PROP_FRAME_COUNT));
+  const std::vector<std::size_t> chosen = spread(num_frames, max_count);
+  std::vector<cv::Mat> images;
+  cv::Mat frame;
+  for (std::size_t i = 0; images.size() < chosen.size() && capture.grab(); ++i) {
+    if (i != chosen[images.size()] || !capture.retrieve(frame)) continue;
+    images.emplace_back();
+    cv::cvtColor(frame, images.back(), cv::COLOR_BGR2GRAY);
+  }
+  if (images.empty()) throw std::runtime_error(path.string() + ": no frames");
+  return images;
+}
+
+nlohmann::json measure(const std::vector<cv::Mat>& images, int count) {
   waymark::FeatureExtractor ours({.count = count});
   const cv::Ptr<cv::ORB> theirs = cv::ORB::create(count, 1.2f, 8);
   std::vector<waymark::Keypoint> keypoints;
@@ -69,9 +100,7 @@ nlohmann::json measure(const std::vector<std::filesystem::path>& paths, int coun
   std::vector<double> ours_ms;
   std::vector<double> theirs_ms;
   std::vector<double> returned;
-  for (const std::filesystem::path& path : paths) {
-    const cv::Mat image = cv::imread(path.string(), cv::IMREAD_GRAYSCALE);
-    if (image.empty()) throw std::runtime_error(path.string() + ": cannot be read as an image");
+  for (const cv::Mat& image : images) {
     const waymark::ImageView view{
         image.data, image.cols, image.rows, static_cast<std::ptrdiff_t>(image.step)};
     ours_ms.push_back(milliseconds([&] { ours.extract(view, {}, keypoints, descriptors); }));
@@ -79,7 +108,7 @@ nlohmann::json measure(const std::vector<std::filesystem::path>& paths, int coun
         [&] { theirs->detectAndCompute(image, cv::noArray(), cv_keypoints, cv_descriptors); }));
     returned.push_back(static_cast<double>(keypoints.size()) / count);
   }
-  return {{"images", paths.size()},
+  return {{"images", images.size()},
           {"count", count},
           {"ours_ms", median(ours_ms)},
           {"cv_orb_ms", median(theirs_ms)},
@@ -91,16 +120,17 @@ nlohmann::json measure(const std::vector<std::filesystem::path>& paths, int coun
 
 int main(int argc, char** argv) {
   if (argc < 2) {
-    std::cerr << "usage: waymark_feature_ratio FOLDER [COUNT [MAX_IMAGES]]\n";
+    std::cerr << "usage: waymark_feature_ratio FOLDER|VIDEO [COUNT [MAX_IMAGES]]\n";
     return 2;
   }
   try {
     cv::setNumThreads(1);
-    std::vector<std::filesystem::path> paths = list_images(argv[1]);
+    const std::filesystem::path path = argv[1];
     const int count = argc > 2 ? std::stoi(argv[2]) : 1000;
-    if (argc > 3) paths = spread(paths, std::stoul(argv[3]));
-    if (paths.empty()) throw std::runtime_error(std::string(argv[1]) + ": no PNG images");
-    std::cout << measure(paths, count).dump(2) << "\n";
+    const std::size_t max_count = argc > 3 ? std::stoul(argv[3]) : 200;
+    const bool is_folder = std::filesystem::is_directory(path);
+    const auto images = is_folder ? read_folder(path, max_count) : read_video(path, max_count);
+    std::cout << measure(images, count).dump(2) << "\n";
   } catch (const std::exception& error) {
     std::cerr << "waymark_feature_ratio: " << error.what() << "\n";
     return 1;
