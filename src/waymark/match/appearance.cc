@@ -17,6 +17,9 @@ namespace {
 constexpr int kNumBins = 36;
 /// Matches in the fullest bin and one on each side of it agree: 30 degrees in all.
 constexpr int kNumAgreeingBins = 1;
+/// Where less than this part agrees, the image did not turn as one: a camera that sees all round
+/// and tilts turns what is on either side against each other. Then the vote says nothing.
+constexpr double kMinAgreeing = 0.5;
 /// Features two levels apart are not the same corner unless the camera moved far.
 constexpr float kMaxSizeRatio = 1.8f;
 
@@ -89,10 +92,15 @@ std::span<const FeatureMatch> AppearanceMatcher::finish(const Features& a, const
     ++votes[static_cast<std::size_t>(rotation_bin(match, a, b))];
   }
   const auto fullest = std::max_element(votes.begin(), votes.end()) - votes.begin();
-  std::erase_if(matches_, [&](const FeatureMatch& match) {
+  const auto disagrees = [&](const FeatureMatch& match) {
     const int apart = std::abs(rotation_bin(match, a, b) - static_cast<int>(fullest));
     return std::min(apart, kNumBins - apart) > kNumAgreeingBins;
-  });
+  };
+  const auto num_disagreeing = std::count_if(matches_.begin(), matches_.end(), disagrees);
+  if (static_cast<double>(num_disagreeing) <=
+      (1.0 - kMinAgreeing) * static_cast<double>(matches_.size())) {
+    std::erase_if(matches_, disagrees);
+  }
   return matches_;
 }
 

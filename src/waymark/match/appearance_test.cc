@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <numeric>
 #include <set>
 
@@ -69,6 +70,17 @@ TEST_F(AppearanceTest, DropsMatchesThatTurnAgainstTheRest) {
   const auto matches = match_all(*a.features, turned);
   EXPECT_GT(matches.size(), turned.num_primary / 2);
   for (const FeatureMatch& match : matches) EXPECT_NE(match.b % 5, 0u);
+}
+
+TEST_F(AppearanceTest, KeepsAllWhereTheImageDoesNotTurnAsOne) {
+  const PointObservation a = see(Rigid3(), 0);
+  Features turned = *a.features;  // As a camera that sees all round sees it when it tilts.
+  for (std::size_t i = 0; i < turned.num_primary; ++i) {
+    const float turns =
+        turned.keypoints[i].x_px / static_cast<float>(rig_->cameras[0].camera->width_px());
+    turned.keypoints[i].angle_rad += 0.7f * std::sin(6.2831853f * turns);
+  }
+  EXPECT_EQ(match_all(*a.features, turned).size(), a.features->num_primary);
 }
 
 TEST_F(AppearanceTest, VotesAroundTheFullTurn) {
