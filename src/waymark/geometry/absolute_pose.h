@@ -18,7 +18,7 @@ namespace waymark {
 /// asked of z. None if the points lie on a line, two of them coincide or a value is not finite.
 ///
 /// Distances along the bearings by the pencil of the two homogeneous quadrics of Persson & Nordberg
-/// 2018 (Lambda Twist, eq. 6-12); its degenerate member is split into two planes by its adjugate
+/// 2018 (Lambda Twist); its degenerate member is split into two planes by its adjugate
 /// (Richter-Gebert 2011, 11.1) instead of eigenvectors, and the planes are met with the pencil
 /// without singling out one of the distances.
 std::vector<Rigid3> solve_absolute_three_point(std::span<const Eigen::Vector3d, 3> bearings,

@@ -138,5 +138,43 @@ TEST(Sim3, ComposesAndInverts) {
   EXPECT_TRUE((b_from_a.inverse() * (b_from_a * point_in_a)).isApprox(point_in_a));
 }
 
+Sim3 random_sim3(Rng& rng, double angle, double sigma) {
+  Vector7d xi;
+  xi << random_vector(rng), angle * random_vector(rng).normalized(), sigma;
+  return Sim3::exp(xi);
+}
+
+TEST(Sim3, AdjointMovesAPerturbationToTheOtherSide) {
+  Rng rng(10, 0);
+  for (int i = 0; i < 20; ++i) {
+    const Sim3 b_from_a = random_sim3(rng, 1.5, rng.normal());
+    Vector7d xi_a;
+    xi_a << random_vector(rng), random_vector(rng), 0.5 * rng.normal();
+    const Sim3 left = Sim3::exp(b_from_a.adjoint() * xi_a) * b_from_a;
+    const Sim3 right = b_from_a * Sim3::exp(xi_a);
+    EXPECT_LT((left * right.inverse()).log().norm(), 1e-12);
+  }
+}
+
+TEST(Sim3, LeftJacobianInverseMatchesNumericDerivative) {
+  Rng rng(11, 0);
+  for (const double angle : angles()) {
+    for (const double sigma : {-1.5, -1e-4, 0.0, 0.3, 2.0}) {
+      if (angle > 3.12) continue;  // The logarithm jumps within the step.
+      const Sim3 sim = random_sim3(rng, angle, sigma);
+      Matrix7d numeric;
+      const double step = 1e-5;
+      for (int i = 0; i < 7; ++i) {
+        const Vector7d delta = step * Vector7d::Unit(i);
+        numeric.col(i) =
+            ((Sim3::exp(delta) * sim).log() - (Sim3::exp(-delta) * sim).log()) / (2 * step);
+      }
+      EXPECT_LT((sim3_left_jacobian_inverse(sim.log()) - numeric).norm(),
+                1e-7 * (1.0 + numeric.norm()))
+          << angle << ' ' << sigma;
+    }
+  }
+}
+
 }  // namespace
 }  // namespace waymark

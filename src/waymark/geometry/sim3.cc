@@ -28,14 +28,18 @@ constexpr std::array<QuadratureNode, 5> kGaussLegendre = {
 // exp(u sigma) exp(u skew(phi)) (Strasdat 2012; Eade). Its closed form has removable singularities
 // at phi = 0 and sigma = 0, each with its own cancellation; the integrand is smooth, and the rule
 // above reaches 1e-15 for angles up to pi and scales from 1/20 to 20 without any case.
+template <class Add>
+void integrate(Add&& add) {
+  for (const QuadratureNode& node : kGaussLegendre) {
+    for (const double side : {-1.0, 1.0}) add(0.5 + 0.5 * side * node.position, 0.5 * node.weight);
+  }
+}
+
 Eigen::Matrix3d translation_jacobian(const Eigen::Vector3d& phi, double sigma) {
   Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
-  for (const QuadratureNode& node : kGaussLegendre) {
-    for (const double side : {-1.0, 1.0}) {
-      const double u = 0.5 + 0.5 * side * node.position;
-      sum += 0.5 * node.weight * std::exp(u * sigma) * so3_exp(u * phi).toRotationMatrix();
-    }
-  }
+  integrate([&](double u, double weight) {
+    sum += weight * std::exp(u * sigma) * so3_exp(u * phi).toRotationMatrix();
+  });
   return sum;
 }
 
@@ -54,6 +58,45 @@ Vector7d Sim3::log() const {
   Vector7d tangent;
   tangent << translation_jacobian(phi, sigma).inverse() * translation, phi, sigma;
   return tangent;
+}
+
+Matrix7d Sim3::adjoint() const {
+  const Eigen::Matrix3d matrix = rotation.toRotationMatrix();
+  Matrix7d result = Matrix7d::Zero();
+  result.topLeftCorner<3, 3>() = scale * matrix;
+  result.block<3, 3>(0, 3) = skew(translation) * matrix;
+  result.topRightCorner<3, 1>() = -translation;
+  result.block<3, 3>(3, 3) = matrix;
+  result(6, 6) = 1.0;
+  return result;
+}
+
+Matrix7d sim3_left_jacobian_inverse(const Vector7d& tangent) {
+  const Eigen::Vector3d rho = tangent.head<3>();
+  const Eigen::Vector3d phi = tangent.segment<3>(3);
+  // W, and the derivatives of W rho by phi and sigma under the integral.
+  Eigen::Matrix3d sum = Eigen::Matrix3d::Zero();
+  Eigen::Matrix3d by_phi = Eigen::Matrix3d::Zero();
+  Eigen::Vector3d by_sigma = Eigen::Vector3d::Zero();
+  integrate([&](double u, double weight) {
+    const Eigen::Matrix3d part =
+        weight * std::exp(u * tangent[6]) * so3_exp(u * phi).toRotationMatrix();
+    const Eigen::Vector3d moved = u * (part * rho);
+    sum += part;
+    by_phi -= skew(moved) * so3_left_jacobian(u * phi);
+    by_sigma += moved;
+  });
+  // From t = W(phi, sigma) rho, which exp(d) moves by d_rho + d_phi x t + d_sigma t.
+  const Eigen::Vector3d translation = sum * rho;
+  const Eigen::Matrix3d rho_from_translation = sum.inverse();
+  const Eigen::Matrix3d rotation_part = so3_left_jacobian_inverse(phi);
+  Matrix7d result = Matrix7d::Zero();
+  result.topLeftCorner<3, 3>() = rho_from_translation;
+  result.block<3, 3>(0, 3) = -rho_from_translation * (skew(translation) + by_phi * rotation_part);
+  result.topRightCorner<3, 1>() = rho_from_translation * (translation - by_sigma);
+  result.block<3, 3>(3, 3) = rotation_part;
+  result(6, 6) = 1.0;
+  return result;
 }
 
 }  // namespace waymark

@@ -7,6 +7,7 @@
 namespace waymark {
 
 using Vector7d = Eigen::Matrix<double, 7, 1>;
+using Matrix7d = Eigen::Matrix<double, 7, 7>;
 
 /// Similarity b_from_a: point_in_b = scale * (rotation * point_in_a) + translation. Tangent vectors
 /// are (rho, phi, sigma), sigma = log of the scale; perturbations on the left (Strasdat 2012;
@@ -38,6 +39,11 @@ struct Sim3 {
 
   static Sim3 exp(const Vector7d& tangent);
   Vector7d log() const;
+  /// xi_b = adjoint(b_from_a) * xi_a.
+  Matrix7d adjoint() const;
 };
+
+/// Inverse of the left Jacobian of Sim(3): log(exp(d) exp(a)) ~ a + J_l^-1(a) d.
+Matrix7d sim3_left_jacobian_inverse(const Vector7d& tangent);
 
 }  // namespace waymark

@@ -14,8 +14,6 @@
 
 namespace waymark {
 
-using Matrix7d = Eigen::Matrix<double, 7, 7>;
-
 struct SimilarityOptions {
   /// Otherwise the scale is 1: what both cameras know is metric.
   bool is_scale_free = true;
