@@ -1,0 +1,353 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// How well and how fast places are found again:
+//   waymark_place_benchmark DATA_DIR recall|growth [DESIGN...]
+// DATA_DIR holds the looped sequences below, each with camchain.yaml and groundtruth.txt; designs
+// are index (default), vocabulary, exhaustive.
+//
+// recall: part of the queries that have a keyframe within 1 m and 30 degrees, at least 30 keyframes
+// away in time, of which such a one is the first, among the first 5, among the first 10 candidates.
+// "alone": the index holds the sequence only; "all": it holds all sequences.
+//
+// growth: time of a query (median and 95 % quantile, thread time) and recall within 10 of the
+// bookstore's queries, also of poor ones (400 features, 1/16 of the bits flipped), while the map
+// grows by the same sequences again, each bit flipped with a chance of 1/16
+// ("revisited"), or with the bits of all descriptors in another order, which makes them other
+// places with like statistics ("elsewhere").
+
+#include <time.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <memory>
+#include <numbers>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "place_designs.h"
+#include "recorded_places.h"
+#include "waymark/base/rng.h"
+#include "waymark/place/place_index.h"
+
+namespace {
+
+using waymark::Descriptor;
+using waymark::PlaceDesign;
+using waymark::RecordedPlace;
+using Places = std::vector<RecordedPlace>;
+
+constexpr std::size_t kNumCandidates = 10;
+constexpr std::size_t kMinKeyframesAway = 30;
+
+struct Sequence {
+  std::string name;
+  std::size_t every = 5;
+};
+
+// The track is driven at 1 m per frame, so that there each frame is needed.
+const std::array<Sequence, 5> kLooped = {{{"sim_bookstore_mono"},
+                                          {"sim_house_rgbd"},
+                                          {"sim_track_stereo", 1},
+                                          {"sim_atrium_360"},
+                                          {"sim_warehouse_fisheye_stereo"}}};
+const char* const kQueries = "sim_bookstore_query_mono";
+
+double thread_time_ms() {
+  timespec time;
+  clock_gettime(CLOCK_THREAD_CPUTIME_ID, &time);
+  return static_cast<double>(time.tv_sec) * 1e3 + static_cast<double>(time.tv_nsec) * 1e-6;
+}
+
+double quantile(std::vector<double> values, double part) {
+  std::sort(values.begin(), values.end());
+  return values.at(static_cast<std::size_t>(part * static_cast<double>(values.size() - 1)));
+}
+
+bool is_same_place(const RecordedPlace& a, const RecordedPlace& b) {
+  const double angle = a.world_from_camera.rotation.angularDistance(b.world_from_camera.rotation);
+  const double distance =
+      (a.world_from_camera.translation - b.world_from_camera.translation).norm();
+  return distance <= 1.0 && angle <= 30.0 * std::numbers::pi / 180.0;
+}
+
+/// Where the candidates of queries first were right.
+struct Recall {
+  std::size_t num_queries = 0;
+  std::array<std::size_t, kNumCandidates> first_at = {};
+  std::vector<double> times_ms;
+
+  double within(std::size_t count) const {
+    std::size_t sum = 0;
+    for (std::size_t i = 0; i < count; ++i) sum += first_at[i];
+    return static_cast<double>(sum) / static_cast<double>(std::max<std::size_t>(num_queries, 1));
+  }
+};
+
+/// One sequence among all that a design holds.
+struct Held {
+  const Places* places = nullptr;
+  std::size_t begin = 0;  ///< Number of its first keyframe in the design.
+};
+
+void ask(const PlaceDesign& design,
+         const Held& held,
+         const RecordedPlace& query,
+         std::size_t hidden_begin,
+         std::size_t hidden_end,
+         Recall& recall) {
+  const Places& places = *held.places;
+  bool has_answer = false;
+  for (std::size_t i = 0; i < places.size() && !has_answer; ++i) {
+    const bool is_hidden = held.begin + i >= hidden_begin && held.begin + i < hidden_end;
+    has_answer = !is_hidden && is_same_place(query, places[i]);
+  }
+  if (!has_answer) return;
+  ++recall.num_queries;
+  const double start = thread_time_ms();
+  const std::vector<std::size_t> found =
+      design.find(query.descriptors, kNumCandidates, hidden_begin, hidden_end);
+  recall.times_ms.push_back(thread_time_ms() - start);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    const bool is_held = found[i] >= held.begin && found[i] < held.begin + places.size();
+    if (!is_held || !is_same_place(query, places[found[i] - held.begin])) continue;
+    ++recall.first_at[i];
+    return;
+  }
+}
+
+Recall ask_itself(const PlaceDesign& design, const Held& held) {
+  Recall recall;
+  for (std::size_t i = 0; i < held.places->size(); ++i) {
+    const std::size_t row = held.begin + i;
+    const std::size_t hidden_begin = row - std::min(row, kMinKeyframesAway - 1);
+    ask(design, held, (*held.places)[i], hidden_begin, row + kMinKeyframesAway, recall);
+  }
+  return recall;
+}
+
+Recall ask_all(const PlaceDesign& design, const Held& held, const Places& queries) {
+  Recall recall;
+  for (const RecordedPlace& query : queries) ask(design, held, query, 0, 0, recall);
+  return recall;
+}
+
+std::unique_ptr<PlaceDesign> make_design(const std::string& name) {
+  if (name == "index") return waymark::make_place_index();
+  if (name == "vocabulary") return waymark::make_vocabulary_tree(SIZE_MAX);
+  if (name == "early-vocabulary") return waymark::make_vocabulary_tree(50);
+  if (name == "exhaustive") return waymark::make_exhaustive_search();
+  throw std::runtime_error(
+      name + ": unknown design, expected index, vocabulary, early-vocabulary or exhaustive");
+}
+
+void print_recall(const std::string& name, const char* held, const Recall& recall) {
+  std::printf("  %-32s %-6s %4zu queries  first %.3f  5 %.3f  10 %.3f  %8.2f ms\n",
+              name.c_str(),
+              held,
+              recall.num_queries,
+              recall.within(1),
+              recall.within(5),
+              recall.within(10),
+              quantile(recall.times_ms, 0.5));
+  std::fflush(stdout);
+}
+
+void add_all(PlaceDesign& design, const Places& places) {
+  for (const RecordedPlace& place : places) design.add(place.descriptors);
+}
+
+void measure_recall(const std::vector<Places>& sequences,
+                    const Places& queries,
+                    const std::string& name) {
+  std::printf("%s\n", name.c_str());
+  const std::unique_ptr<PlaceDesign> all = make_design(name);
+  for (const Places& places : sequences) add_all(*all, places);
+  all->finish();
+  std::size_t begin = 0;
+  for (std::size_t i = 0; i < sequences.size(); ++i) {
+    const std::unique_ptr<PlaceDesign> alone = make_design(name);
+    add_all(*alone, sequences[i]);
+    alone->finish();
+    print_recall(kLooped[i].name, "alone", ask_itself(*alone, {&sequences[i], 0}));
+    print_recall(kLooped[i].name, "all", ask_itself(*all, {&sequences[i], begin}));
+    if (i == 0) {
+      print_recall(kQueries, "alone", ask_all(*alone, {&sequences[i], 0}, queries));
+      print_recall(kQueries, "all", ask_all(*all, {&sequences[i], 0}, queries));
+    }
+    begin += sequences[i].size();
+  }
+}
+
+void flip_bits(std::vector<Descriptor>& descriptors, waymark::Rng& rng) {
+  for (Descriptor& descriptor : descriptors) {
+    for (std::uint64_t& word : descriptor) {
+      word ^= rng.next() & rng.next() & rng.next() & rng.next();
+    }
+  }
+}
+
+void reorder_bits(std::vector<Descriptor>& descriptors, const std::array<std::size_t, 256>& order) {
+  for (Descriptor& descriptor : descriptors) {
+    Descriptor reordered = {};
+    for (std::size_t bit = 0; bit < order.size(); ++bit) {
+      const std::uint64_t value = descriptor[order[bit] / 64] >> (order[bit] % 64) & 1;
+      reordered[bit / 64] |= value << (bit % 64);
+    }
+    descriptor = reordered;
+  }
+}
+
+std::array<std::size_t, 256> random_order(waymark::Rng& rng) {
+  std::array<std::size_t, 256> order;
+  for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
+  for (std::uint32_t i = 255; i > 0; --i) std::swap(order[i], order[rng.below(i + 1)]);
+  return order;
+}
+
+/// What the library's index costs besides its answers.
+struct Upkeep {
+  double add_median_ms = 0.0;
+  double add_max_ms = 0.0;
+  double copy_us = 0.0;
+  double kilobytes_per_keyframe = 0.0;
+  std::size_t num_segments = 0;
+};
+
+Upkeep measure_upkeep(const std::vector<std::vector<Descriptor>>& keyframes) {
+  waymark::PlaceIndex index;
+  std::vector<double> times;
+  for (const std::vector<Descriptor>& descriptors : keyframes) {
+    const double start = thread_time_ms();
+    index.add({static_cast<std::uint32_t>(index.size())}, waymark::SubmapId{0}, descriptors);
+    times.push_back(thread_time_ms() - start);
+  }
+  const double start = thread_time_ms();
+  const waymark::PlaceIndex copy = index;
+  const double copy_us = (thread_time_ms() - start) * 1e3;
+  return {quantile(times, 0.5),
+          quantile(times, 1.0),
+          copy_us,
+          static_cast<double>(copy.num_bytes()) / 1e3 / static_cast<double>(copy.size()),
+          copy.num_segments()};
+}
+
+/// The sequences once, then again and again, changed each time.
+std::vector<std::vector<Descriptor>> grow(const std::vector<Places>& sequences,
+                                          std::size_t count,
+                                          bool is_elsewhere) {
+  std::vector<std::vector<Descriptor>> keyframes;
+  for (std::uint64_t round = 0; keyframes.size() < count; ++round) {
+    waymark::Rng rng(round, 0);
+    const std::array<std::size_t, 256> order = random_order(rng);
+    for (const Places& places : sequences) {
+      for (const RecordedPlace& place : places) {
+        keyframes.push_back(place.descriptors);
+        if (round > 0 && is_elsewhere) reorder_bits(keyframes.back(), order);
+        if (round > 0 && !is_elsewhere) flip_bits(keyframes.back(), rng);
+      }
+    }
+  }
+  keyframes.resize(count);
+  return keyframes;
+}
+
+/// Places as true as the first of them, for the keyframes that grow() made of them.
+Places repeat(const std::vector<Places>& sequences, std::size_t count) {
+  Places truth;
+  while (truth.size() < count) {
+    for (std::size_t i = 0; i < sequences.size(); ++i) {
+      for (RecordedPlace place : sequences[i]) {
+        place.descriptors.clear();
+        if (i > 0) place.world_from_camera.translation.setConstant(1e6);
+        truth.push_back(place);
+      }
+    }
+  }
+  truth.resize(count);
+  return truth;
+}
+
+/// What is left of queries in bad light: 400 features, of which 1/16 of the bits are wrong.
+Places impoverish(const Places& queries) {
+  Places poor = queries;
+  waymark::Rng rng(1, 1);
+  for (RecordedPlace& query : poor) {
+    for (std::uint32_t i = 0; i < 400 && i < query.descriptors.size(); ++i) {
+      const auto rest = static_cast<std::uint32_t>(query.descriptors.size()) - i;
+      std::swap(query.descriptors[i], query.descriptors[i + rng.below(rest)]);
+    }
+    query.descriptors.resize(std::min<std::size_t>(400, query.descriptors.size()));
+    flip_bits(query.descriptors, rng);
+  }
+  return poor;
+}
+
+void measure_growth(const std::vector<Places>& sequences,
+                    const Places& queries,
+                    const std::string& name) {
+  const Places poor = impoverish(queries);
+  for (const bool is_elsewhere : {false, true}) {
+    std::printf("%s, %s\n", name.c_str(), is_elsewhere ? "elsewhere" : "revisited");
+    for (const std::size_t count : {500, 1000, 2000, 3000, 4000, 5000, 8000}) {
+      const std::unique_ptr<PlaceDesign> design = make_design(name);
+      const auto keyframes = grow(sequences, count, is_elsewhere);
+      for (const auto& descriptors : keyframes) design->add(descriptors);
+      design->finish();
+      const Places truth =
+          is_elsewhere ? repeat({sequences[0]}, sequences[0].size()) : repeat(sequences, count);
+      const Recall recall = ask_all(*design, {&truth, 0}, queries);
+      std::printf("  %5zu keyframes  %7.2f ms, p95 %7.2f  recall %.3f, poor %.3f",
+                  count,
+                  quantile(recall.times_ms, 0.5),
+                  quantile(recall.times_ms, 0.95),
+                  recall.within(10),
+                  ask_all(*design, {&truth, 0}, poor).within(10));
+      if (name == "index") {
+        const Upkeep upkeep = measure_upkeep(keyframes);
+        std::printf("  %2zu segments, %.1f kB each, add %.2f ms, at most %.1f, copy %.1f us",
+                    upkeep.num_segments,
+                    upkeep.kilobytes_per_keyframe,
+                    upkeep.add_median_ms,
+                    upkeep.add_max_ms,
+                    upkeep.copy_us);
+      }
+      std::printf("\n");
+      std::fflush(stdout);
+    }
+  }
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  const std::string task = argc > 2 ? argv[2] : "";
+  if (task != "recall" && task != "growth") {
+    std::fprintf(stderr, "usage: waymark_place_benchmark DATA_DIR recall|growth [DESIGN...]\n");
+    return 2;
+  }
+  try {
+    std::vector<std::string> designs(argv + 3, argv + argc);
+    if (designs.empty()) designs = {"index"};
+    const std::filesystem::path data = argv[1];
+    std::vector<Places> sequences;
+    for (const Sequence& sequence : kLooped) {
+      sequences.push_back(waymark::read_places(data / sequence.name, sequence.every));
+    }
+    const Places queries = waymark::read_places(data / kQueries, 1);
+    for (const std::string& design : designs) {
+      (task == "recall" ? measure_recall : measure_growth)(sequences, queries, design);
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "waymark_place_benchmark: %s\n", error.what());
+    return 1;
+  }
+  return 0;
+}

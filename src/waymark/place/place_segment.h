@@ -1,0 +1,86 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <cstdint>
+#include <functional>
+#include <span>
+#include <vector>
+
+#include "waymark/base/id.h"
+#include "waymark/place/place_key.h"
+
+namespace waymark {
+
+/// A keyframe as the place index knows it.
+struct PlaceRow {
+  KeyframeId keyframe;
+  SubmapId submap;
+};
+
+/// An entry of a table against a key: the bits that differ in the upper kPlaceKeyBits, below them
+/// the row of the entry in its segment. The longer the common prefix, the less it is as a number.
+using PlaceDifference = std::uint64_t;
+inline constexpr int kPlaceRowBits = 64 - kPlaceKeyBits;
+inline constexpr PlaceDifference kPlaceRowMask = (PlaceDifference{1} << kPlaceRowBits) - 1;
+
+/// The descriptors of consecutive keyframes, sorted by their keys. Never changes once made: two
+/// segments are merged to a new one, in time linear in their size.
+///
+/// A table is an array of entries in ascending order, the key of a descriptor in the upper bits of
+/// each, the row of its keyframe in the lower. It is a prefix tree without nodes (Bawa, Condie and
+/// Ganesan 2005, LSH forest): what surrounds the place of a key is what shares the longest prefixes
+/// with it, however many descriptors there are.
+class PlaceSegment {
+ public:
+  /// Bounds the pause of a merge.
+  static constexpr std::size_t kMaxRows = 2048;
+  /// More descriptors of a keyframe are thinned evenly, which bounds memory and time.
+  static constexpr std::size_t kMaxDescriptors = 2048;
+  static constexpr std::size_t kMaxWindow = 32;
+
+  using Window = std::array<PlaceDifference, kMaxWindow>;
+
+  /// Of no keyframe.
+  PlaceSegment() = default;
+
+  PlaceSegment(const PlaceRow& row, std::span<const Descriptor> descriptors);
+
+  /// The rows of a, then those of b, which are younger, without those that are gone.
+  PlaceSegment(const PlaceSegment& a,
+               const PlaceSegment& b,
+               const std::function<bool(KeyframeId)>& is_gone);
+
+  /// Ascending by keyframe.
+  std::span<const PlaceRow> rows() const { return rows_; }
+
+  /// Writes the entries around the place of a key, in the order of the table, at most window of
+  /// them; gives their number.
+  std::size_t look_around(std::size_t table,
+                          PlaceKey key,
+                          std::size_t window,
+                          Window& differences) const;
+
+  std::size_t num_bytes() const;
+
+ private:
+  struct Table {
+    std::vector<std::uint64_t> entries;
+    /// Where the entries of each prefix of directory_bits begin, and where the last one's end.
+    std::vector<std::uint32_t> directory = {0, 0};
+    int directory_bits = 0;
+
+    void index();
+    std::size_t lower_bound(std::uint64_t entry) const;
+  };
+
+  std::vector<PlaceRow> rows_;
+  std::array<Table, kNumPlaceTables> tables_;
+};
+
+/// Every k-th descriptor where there are more than a segment takes.
+std::vector<Descriptor> thin_descriptors(std::span<const Descriptor> descriptors);
+
+}  // namespace waymark
