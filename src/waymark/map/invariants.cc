@@ -15,9 +15,13 @@ std::string name(LandmarkId id) { return "landmark " + std::to_string(id.value);
 
 std::string broken_keyframe(const Map& map, KeyframeId id, const Keyframe& keyframe) {
   if (keyframe.landmarks.size() != keyframe.features->size()) return "wrong number of landmarks";
-  const bool is_root = map.submaps().at(keyframe.submap.value).root == id;
+  if (map.submaps().at(keyframe.submap.value).joined_into.is_valid()) return "in a joined sub-map";
+  const bool is_root = map.submaps()[keyframe.submap.value].root == id;
   if (is_root == keyframe.parent.is_valid()) return "is a root with a parent or neither";
   if (!is_root && !map.keyframes().find(keyframe.parent)) return "its parent is gone";
+  if (!is_root && map.keyframes().at(keyframe.parent).submap != keyframe.submap) {
+    return "its parent is in another sub-map";
+  }
   KeyframeId ancestor = keyframe.parent;
   for (std::size_t steps = 0; ancestor.is_valid(); ++steps) {
     if (steps > map.keyframes().size()) return "the spanning tree has a cycle";
@@ -49,6 +53,7 @@ std::string broken_landmark(const Map& map, LandmarkId id, const Landmark& landm
     const Keyframe* keyframe = map.keyframes().find(observation.keyframe);
     if (!keyframe) return "seen by erased " + name(observation.keyframe);
     if (keyframe->landmarks.at(observation.feature) != id) return "one-sided observation";
+    if (keyframe->submap != landmark.submap) return "seen from another sub-map";
     has_reference |= observation.keyframe == landmark.reference;
   }
   return has_reference ? "" : "its reference does not see it";
@@ -82,6 +87,15 @@ std::string Map::broken_invariants() const {
   landmarks_.for_each([&](LandmarkId id, const Landmark& landmark) {
     report(name(id), broken_landmark(*this, id, landmark));
   });
+  for (const LoopEdge& edge : loop_edges_) {
+    const Keyframe* from = keyframes_.find(edge.from);
+    const Keyframe* to = keyframes_.find(edge.to);
+    if (!from || !to) {
+      report("loop edge", "one of its keyframes is gone");
+    } else if (from->submap != to->submap) {
+      report("loop edge", "its keyframes are in different sub-maps");
+    }
+  }
   SharedCounts stored;
   covisibility_.for_each([&](KeyframeId id, const Covisibility& covisibility) {
     for (const CovisibilityEdge& edge : covisibility.edges) {

@@ -9,6 +9,7 @@
 #include "waymark/base/id.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/sim3.h"
 #include "waymark/image/features.h"
 
 namespace waymark {
@@ -44,6 +45,13 @@ struct KeyframeForwarding {
   KeyframeId heir;          ///< Invalid while the keyframe lives.
   Rigid3 rig_from_heir;     ///< The erased keyframe's rig from the heir's.
   double heir_scale = 1.0;  ///< applied_scale of the heir at that time.
+};
+
+/// Two keyframes that were found to show the same place, and how they lie to each other.
+struct LoopEdge {
+  KeyframeId from;
+  KeyframeId to;
+  Sim3 to_from_from;  ///< Of the rigs; lengths in the units of the map around `to`.
 };
 
 }  // namespace waymark

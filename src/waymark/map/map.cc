@@ -3,6 +3,7 @@
 #include "waymark/map/map.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "waymark/base/check.h"
 
@@ -29,6 +30,7 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->keyframe_forwarding_ = keyframe_forwarding_.freeze();
   frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
   frozen->submaps_ = submaps_;
+  frozen->loop_edges_ = loop_edges_;
   last_frozen_ = frozen;
   return frozen;
 }
@@ -41,6 +43,28 @@ LandmarkId Map::resolve(LandmarkId id) const {
 KeyframeId Map::resolve(KeyframeId id) const {
   while (!keyframes_.find(id)) id = keyframe_forwarding_.at(id).heir;
   return id;
+}
+
+SubmapId Map::resolve(SubmapId id) const {
+  while (submaps_.at(id.value).joined_into.is_valid()) id = submaps_[id.value].joined_into;
+  return id;
+}
+
+std::vector<LoopEdge> Map::loop_edges() const {
+  std::vector<LoopEdge> edges = loop_edges_;
+  for (LoopEdge& edge : edges) {
+    const double from_scale = keyframes_.at(edge.from).applied_scale;
+    const double to_scale = keyframes_.at(edge.to).applied_scale;
+    edge.to_from_from.translation *= to_scale;
+    edge.to_from_from.scale *= to_scale / from_scale;
+  }
+  return edges;
+}
+
+bool Map::has_loop_edge(KeyframeId id) const {
+  return std::any_of(loop_edges_.begin(), loop_edges_.end(), [&](const LoopEdge& edge) {
+    return edge.from == id || edge.to == id;
+  });
 }
 
 Rigid3 Map::rig_from_world(KeyframeId reference,
@@ -60,7 +84,7 @@ Rigid3 Map::rig_from_world(KeyframeId reference,
 }
 
 SubmapId Map::add_submap(bool is_metric) {
-  submaps_.push_back({is_metric, {}});
+  submaps_.push_back({is_metric, {}, {}});
   return SubmapId{static_cast<std::uint32_t>(submaps_.size() - 1)};
 }
 
@@ -142,7 +166,7 @@ void Map::erase_landmark(LandmarkId id) {
 
 void Map::erase_keyframe(KeyframeId id) {
   const Keyframe old = keyframes_.at(id);
-  WAYMARK_CHECK(old.parent.is_valid());
+  WAYMARK_CHECK(old.parent.is_valid() && !has_loop_edge(id));
   for (std::uint32_t feature = 0; feature < old.landmarks.size(); ++feature) {
     const LandmarkId landmark = old.landmarks[feature];
     if (!landmark.is_valid() || !landmarks_.find(landmark)) continue;
@@ -163,6 +187,45 @@ void Map::erase_keyframe(KeyframeId id) {
 
 void Map::move_keyframe(KeyframeId id, const Rigid3& rig_from_world) {
   keyframes_.edit(id).rig_from_world = rig_from_world;
+}
+
+void Map::rescale_keyframe(KeyframeId id, double factor) {
+  WAYMARK_CHECK(factor > 0.0);
+  keyframes_.edit(id).applied_scale *= factor;
+}
+
+void Map::add_loop_edge(const LoopEdge& edge) {
+  WAYMARK_CHECK(edge.from != edge.to);
+  const double from_scale = keyframes_.at(edge.from).applied_scale;
+  const double to_scale = keyframes_.at(edge.to).applied_scale;
+  LoopEdge stored = edge;
+  stored.to_from_from.translation /= to_scale;
+  stored.to_from_from.scale *= from_scale / to_scale;
+  loop_edges_.push_back(stored);
+}
+
+void Map::join_submaps(KeyframeId child, KeyframeId parent) {
+  const SubmapId from = keyframes_.at(child).submap;
+  const SubmapId into = keyframes_.at(parent).submap;
+  WAYMARK_CHECK(from != into && submaps_[from.value].is_metric == submaps_[into.value].is_metric);
+  KeyframeId new_parent = parent;  // The way from the child up to the old root turns around.
+  for (KeyframeId id = child; id.is_valid();) {
+    const KeyframeId old_parent = std::exchange(keyframes_.edit(id).parent, new_parent);
+    new_parent = id;
+    id = old_parent;
+  }
+  std::vector<KeyframeId> keyframes;
+  keyframes_.for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.submap == from) keyframes.push_back(id);
+  });
+  std::vector<LandmarkId> landmarks;
+  landmarks_.for_each([&](LandmarkId id, const Landmark& landmark) {
+    if (landmark.submap == from) landmarks.push_back(id);
+  });
+  for (KeyframeId id : keyframes) keyframes_.edit(id).submap = into;
+  for (LandmarkId id : landmarks) landmarks_.edit(id).submap = into;
+  submaps_[from.value].root = KeyframeId{};
+  submaps_[from.value].joined_into = into;
 }
 
 void Map::move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world) {

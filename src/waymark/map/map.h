@@ -15,7 +15,8 @@ namespace waymark {
 /// A connected part of the session's map with its own frame.
 struct Submap {
   bool is_metric = false;  ///< False where the scale is free (mono).
-  KeyframeId root;
+  KeyframeId root;         ///< Invalid once joined.
+  SubmapId joined_into;    ///< Invalid while it is a part of its own.
 };
 
 /// The map of a session: a value with one owner, changed through its mutators only, which keep both
@@ -41,6 +42,11 @@ class Map {
   }
   /// The landmark that an id stands for now, through merges; invalid if erased.
   LandmarkId resolve(LandmarkId id) const;
+  /// The sub-map that an id stands for now, through joins.
+  SubmapId resolve(SubmapId id) const;
+  /// Places seen again, in the order they were found, as measured then and in the units of now.
+  std::vector<LoopEdge> loop_edges() const;
+  bool has_loop_edge(KeyframeId id) const;
   /// Pose of a rig that was stored relative to a keyframe: the rig from the world as of now.
   /// scale_then is the keyframe's applied_scale when rig_from_keyframe was stored.
   Rigid3 rig_from_world(KeyframeId reference,
@@ -63,9 +69,16 @@ class Map {
   /// sees the survivor, the absorbed one's feature is freed.
   void merge_landmarks(LandmarkId survivor, LandmarkId absorbed);
   void erase_landmark(LandmarkId id);
-  /// Erases a keyframe that is not a root, its observations and the landmarks only it saw.
+  /// Erases a keyframe that is neither a root nor in a loop edge, its observations and the
+  /// landmarks only it saw.
   void erase_keyframe(KeyframeId id);
   void move_keyframe(KeyframeId id, const Rigid3& rig_from_world);
+  /// Notes that lengths around a keyframe were multiplied by a factor.
+  void rescale_keyframe(KeyframeId id, double factor);
+  void add_loop_edge(const LoopEdge& edge);
+  /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
+  /// first becomes its root and hangs below `parent` of the second.
+  void join_submaps(KeyframeId child, KeyframeId parent);
   void move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world);
   void set_appearance(LandmarkId id, const Appearance& appearance);
   /// Adds to the counts of how often a landmark should have been and was seen.
@@ -83,6 +96,7 @@ class Map {
   CowTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
   CowTable<LandmarkId, LandmarkId> landmark_forwarding_;
   std::vector<Submap> submaps_;
+  std::vector<LoopEdge> loop_edges_;        ///< Lengths in the units before any correction.
   std::shared_ptr<const Map> last_frozen_;  ///< Keeps references alive until the next freeze().
 };
 

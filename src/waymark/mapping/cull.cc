@@ -72,7 +72,7 @@ void Probation::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dir
 void cull_redundant_keyframes(Map& map, KeyframeId centre, DirtyLandmarks& dirty) {
   for (KeyframeId id : strongest_neighbours(map, centre, 30)) {
     const Keyframe* keyframe = map.keyframes().find(id);
-    if (!keyframe || !keyframe->parent.is_valid()) continue;
+    if (!keyframe || !keyframe->parent.is_valid() || map.has_loop_edge(id)) continue;
     if (id.value + kNumNewest > centre.value || !is_redundant(map, id)) continue;
     for (LandmarkId landmark : keyframe->landmarks) {
       if (landmark.is_valid()) dirty.insert(landmark);

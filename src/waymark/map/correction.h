@@ -1,0 +1,34 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+/// Where elements of a map belong, found out on an earlier state of it (a pose graph, a global
+/// bundle adjustment).
+struct MapCorrection {
+  struct KeyframeMove {
+    KeyframeId keyframe;
+    Rigid3 rig_from_world;
+    double scale = 1.0;  ///< New lengths around the keyframe by old ones.
+  };
+  struct LandmarkMove {
+    LandmarkId landmark;
+    Eigen::Vector3d position_in_world;
+  };
+  std::vector<KeyframeMove> keyframes;  ///< Ascending.
+  std::vector<LandmarkMove> landmarks;  ///< Ascending.
+};
+
+/// Moves what the correction names to where it says; what it names but is erased is skipped. What
+/// it does not name, being younger, moves along: a keyframe by the similarity (rotation,
+/// translation, scale) of its nearest ancestor in the spanning tree that is named, and stays if
+/// there is none; a landmark, with its size, by that of its reference keyframe. Poses stored
+/// relative to a keyframe follow through its applied_scale.
+void apply_correction(Map& map, const MapCorrection& correction);
+
+}  // namespace waymark
