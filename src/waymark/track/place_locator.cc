@@ -1,0 +1,181 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/place_locator.h"
+
+#include <algorithm>
+
+#include "waymark/optimize/locate.h"
+
+namespace waymark {
+namespace {
+
+/// The candidate and those that share most landmarks with it.
+constexpr std::size_t kNumMatchedKeyframes = 4;
+constexpr AppearanceOptions kAppearance = {.max_distance = 60, .max_ratio = 0.85};
+/// Fewer matches, or fewer that agree on a pose, are chance more often than not.
+constexpr std::size_t kMinMatches = 15;
+constexpr std::size_t kMinConsensus = 12;
+constexpr double kMinInlierRatio = 0.15;
+/// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
+constexpr double kFirstRadiusPx = 12.0;
+constexpr double kSecondRadiusPx = 5.0;
+/// What a pose must rest on, and the part of what should be seen that must be.
+constexpr int kMinInliers = 30;
+constexpr double kMinFoundRatio = 0.2;
+
+std::vector<KeyframeId> with_strongest_neighbours(const Map& map, KeyframeId candidate) {
+  std::vector<CovisibilityEdge> edges = map.covisible(candidate);
+  std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
+    return a.num_shared > b.num_shared;
+  });
+  std::vector<KeyframeId> keyframes = {candidate};
+  for (const CovisibilityEdge& edge : edges) {
+    if (keyframes.size() == kNumMatchedKeyframes) break;
+    keyframes.push_back(edge.keyframe);
+  }
+  return keyframes;
+}
+
+/// The landmarks that primary features show, ascending.
+void collect_found(const Features& features,
+                   const std::vector<LandmarkId>& landmarks,
+                   std::vector<LandmarkId>& found) {
+  found.clear();
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    if (landmarks[i].is_valid()) found.push_back(landmarks[i]);
+  }
+  std::sort(found.begin(), found.end());
+}
+
+bool contains(const std::vector<LandmarkId>& ascending, LandmarkId id) {
+  return std::binary_search(ascending.begin(), ascending.end(), id);
+}
+
+}  // namespace
+
+PlaceLocator::PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed)
+    : rig_(rig), seed_(seed), matcher_(rig), locator_(rig) {}
+
+std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
+                                                 const Map& map,
+                                                 KeyframeId candidate,
+                                                 std::uint64_t stream,
+                                                 std::vector<LandmarkId>& landmarks) {
+  if (match_by_appearance(features, map, candidate, landmarks) < kMinMatches) return std::nullopt;
+  const std::optional<Rigid3> consensus = find_consensus(features, map, stream, landmarks);
+  if (!consensus) return std::nullopt;
+  collect_found(features, landmarks, found_);
+  gather_local_map(map, found_, candidate, local_);
+  LocatedPlace place;
+  place.frame = match_around(features, map, *consensus, kFirstRadiusPx, landmarks);
+  if (place.frame.num_inliers < kMinInliers / 2) return std::nullopt;
+  collect_found(features, landmarks, found_);
+  gather_local_map(map, found_, candidate, local_);
+  place.frame = match_around(features, map, place.frame.rig_from_world, kSecondRadiusPx, landmarks);
+  place.reference = local_.reference;
+  count_expected(features, landmarks, place);
+  if (place.frame.num_inliers < kMinInliers || place.found_ratio() < kMinFoundRatio) {
+    return std::nullopt;
+  }
+  return place;
+}
+
+std::size_t PlaceLocator::match_by_appearance(const Features& features,
+                                              const Map& map,
+                                              KeyframeId candidate,
+                                              std::vector<LandmarkId>& landmarks) {
+  matches_.clear();
+  for (KeyframeId keyframe : with_strongest_neighbours(map, candidate)) {
+    match_keyframe(features, map, keyframe);
+  }
+  std::sort(matches_.begin(), matches_.end(), [](const LandmarkMatch& a, const LandmarkMatch& b) {
+    if (a.distance != b.distance) return a.distance < b.distance;
+    return a.feature != b.feature ? a.feature < b.feature : a.landmark < b.landmark;
+  });
+  landmarks.assign(features.size(), LandmarkId{});
+  found_.clear();
+  for (const LandmarkMatch& match : matches_) {
+    const auto at = std::lower_bound(found_.begin(), found_.end(), match.landmark);
+    const bool is_found = at != found_.end() && *at == match.landmark;
+    if (is_found || landmarks[match.feature].is_valid()) continue;
+    landmarks[match.feature] = match.landmark;
+    found_.insert(at, match.landmark);
+  }
+  return found_.size();
+}
+
+void PlaceLocator::match_keyframe(const Features& features, const Map& map, KeyframeId id) {
+  const Keyframe& keyframe = map.keyframes().at(id);
+  with_landmark_.clear();
+  for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
+    if (keyframe.landmarks[i].is_valid()) with_landmark_.push_back(i);
+  }
+  for (const FeatureMatch& match :
+       appearance_.match_all(*keyframe.features, with_landmark_, features, kAppearance)) {
+    matches_.push_back({match.b, keyframe.landmarks[match.a], match.distance});
+  }
+}
+
+std::optional<Rigid3> PlaceLocator::find_consensus(const Features& features,
+                                                   const Map& map,
+                                                   std::uint64_t stream,
+                                                   std::vector<LandmarkId>& landmarks) {
+  observations_.clear();
+  feature_of_observation_.clear();
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    if (!landmarks[i].is_valid()) continue;
+    append_observation(
+        features, i, map.landmarks().at(landmarks[i]).position_in_world, observations_);
+    feature_of_observation_.push_back(i);
+  }
+  RansacOptions ransac_options;
+  ransac_options.seed = seed_;
+  ransac_options.stream = stream;
+  ransac_options.min_inlier_ratio = kMinInlierRatio;
+  const std::optional<PoseEstimate> estimate =
+      waymark::locate(*rig_, observations_, PoseOptions{}, ransac_options, workspace_);
+  if (!estimate || estimate->num_inliers < kMinConsensus) return std::nullopt;
+  for (std::size_t k = 0; k < feature_of_observation_.size(); ++k) {
+    if (!estimate->is_inlier[k]) landmarks[feature_of_observation_[k]] = LandmarkId{};
+  }
+  return estimate->rig_from_world;
+}
+
+LocatedFrame PlaceLocator::match_around(const Features& features,
+                                        const Map& map,
+                                        const Rigid3& rig_from_world,
+                                        double radius_px,
+                                        std::vector<LandmarkId>& landmarks) {
+  collect_found(features, landmarks, found_);
+  is_taken_.assign(features.num_primary, 0);
+  for (std::size_t i = 0; i < features.num_primary; ++i) is_taken_[i] = landmarks[i].is_valid();
+  const ProjectionMatches& matches = matcher_.match(
+      local_.landmarks, features, is_taken_, rig_from_world, {.radius_px = radius_px});
+  is_visible_ = matches.is_visible;
+  for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
+    const LandmarkId id = local_.landmarks.ids[i];
+    if (matches.features[i] == kNoFeature || contains(found_, id)) continue;
+    landmarks[matches.features[i]] = id;
+  }
+  return locator_.locate(features, map, rig_from_world, landmarks);
+}
+
+void PlaceLocator::count_expected(const Features& features,
+                                  const std::vector<LandmarkId>& landmarks,
+                                  LocatedPlace& place) const {
+  std::vector<LandmarkId> found;
+  collect_found(features, landmarks, found);
+  const Rigid3 cam_from_world = rig_->cameras[0].cam_from_rig * place.frame.rig_from_world;
+  const Eigen::Vector3d centre = cam_from_world.origin_in_source();
+  const auto primary_end = features.size_rad.begin() + std::ptrdiff_t(features.num_primary);
+  const auto [finest, coarsest] = std::minmax_element(features.size_rad.begin(), primary_end);
+  for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
+    const double range_m = (local_.landmarks.positions_in_world[i] - centre).norm();
+    const double size_rad = local_.landmarks.sizes_m[i] / range_m;
+    if (!is_visible_[i] || size_rad < *finest || size_rad > *coarsest) continue;
+    ++place.num_expected;
+    place.num_found += contains(found, local_.landmarks.ids[i]);
+  }
+}
+
+}  // namespace waymark
