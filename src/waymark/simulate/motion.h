@@ -60,7 +60,8 @@ class Motion {
 
 /// Names that make_motion() knows:
 ///   loop       once around the path of the world and a bit on, looking along it and around
-///   fast_turn  the same path, with quick turns of the head
+///   rounds     three times around and a bit on, over the same ground
+///   fast_turn  the path of one loop, with quick turns of the head
 ///   inspect    hand-held, around the starting place
 ///   slide      to the side and back
 ///   forward    ahead and back

@@ -57,12 +57,18 @@ Bounds measure(const Motion& motion) {
   return bounds;
 }
 
+/// Enough for a walk, or a drive in the street, at a usual speed.
+double usual_duration_s(const std::string& world, const std::string& motion) {
+  const double once_s = world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
+  return motion == "rounds" ? 3.0 * once_s : once_s;
+}
+
 TEST(Motion, IsSmooth) {
   for (const std::string& world : world_names()) {
     const bool is_street = world == "street";
     for (const std::string& name : motion_names()) {
       SCOPED_TRACE(world + " " + name);
-      const Bounds bounds = measure(make_motion(world, name, is_street ? 16.0 : 20.0));
+      const Bounds bounds = measure(make_motion(world, name, usual_duration_s(world, name)));
       EXPECT_LT(bounds.speed, is_street ? 12.0 : 3.0);
       EXPECT_LT(bounds.acceleration, is_street ? 16.0 : 5.0);
       EXPECT_LT(bounds.jump, 0.1);
@@ -93,7 +99,7 @@ TEST(Motion, KeepsClearOfThings) {
 }
 
 TEST(Motion, LoopsComeBack) {
-  for (const char* world : {"room", "apartment", "hall", "street"}) {
+  for (const std::string& world : world_names()) {
     const Motion motion = make_motion(world, "loop", 20.0);
     const Vector3d end = motion.world_from_rig(19.9).translation;
     double nearest = std::numeric_limits<double>::infinity();
@@ -101,6 +107,28 @@ TEST(Motion, LoopsComeBack) {
       nearest = std::min(nearest, (motion.world_from_rig(t).translation - end).norm());
     }
     EXPECT_LT(nearest, 0.5) << world;
+  }
+}
+
+TEST(Motion, RoundsPassThreeTimes) {
+  for (const std::string& world : world_names()) {
+    const Motion motion = make_motion(world, "rounds", 60.0);
+    // Three rounds and a bit on: a round takes a little less than a third of the time.
+    const Rigid3 first = motion.world_from_rig(10.0);
+    const double metres_per_s =
+        (motion.world_from_rig(10.1).translation - first.translation).norm() / 0.1;
+    std::vector<double> passes_s;
+    bool was_near = false;
+    for (double t = 0.0; t < 60.0; t += 0.02) {
+      const Rigid3 now = motion.world_from_rig(t);
+      const double ahead =
+          (now.rotation * Vector3d::UnitZ()).dot(first.rotation * Vector3d::UnitZ());
+      const bool is_near =
+          (now.translation - first.translation).norm() < 1.0 * metres_per_s && ahead > 0.3;
+      if (is_near && !was_near) passes_s.push_back(t);
+      was_near = is_near;
+    }
+    EXPECT_EQ(passes_s.size(), 3u) << world;
   }
 }
 

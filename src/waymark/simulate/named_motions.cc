@@ -17,18 +17,41 @@ using Eigen::Vector3d;
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
-/// Where one can go in a world. Paths run along the polygon; keys are spacing apart, and the spline
-/// rounds the corners by about as much.
+/// Where one can go in a world. Paths run along the closed polygon; keys are spacing apart, and the
+/// spline rounds the corners by about as much.
 struct Course {
   std::string_view world;
   std::vector<Vector2d> path;
-  bool is_closed;
   double spacing_m;
   double height_m;
   double look_around_deg;
   Sway sway;
   MotionKey start;  ///< With 1 m of free space around and 2 m ahead.
 };
+
+/// Around one of two rooms that look alike, along the corridor, around the other in the same way,
+/// and back. It begins in the middle of the first round, so that at the end there are places of the
+/// first room that were seen in the other one only.
+std::vector<Vector2d> rounds_of_both_rooms() {
+  constexpr double kDoor = 2.25;
+  constexpr double kApart = 5.2;
+  const auto at = [](double x, double y) { return Vector2d(x, y); };
+  std::vector<Vector2d> path = {
+      at(1.3, 2.8), at(3.2, 2.8), at(3.2, 1.3), at(kDoor, 0.8), at(kDoor, -1.3)};
+  for (const Vector2d& point : {at(kDoor, -1.3),
+                                at(kDoor, 0.8),
+                                at(1.3, 1.3),
+                                at(1.3, 2.8),
+                                at(3.2, 2.8),
+                                at(3.2, 1.3),
+                                at(kDoor, 0.8),
+                                at(kDoor, -1.3)}) {
+    path.emplace_back(point.x() + kApart, point.y());
+  }
+  for (const Vector2d& point : {at(kDoor, -1.3), at(kDoor, 0.8), at(1.3, 1.3)})
+    path.push_back(point);
+  return path;
+}
 
 std::vector<Course> courses() {
   const Sway hand{0.02, 1.2, 11};
@@ -37,45 +60,43 @@ std::vector<Course> courses() {
   const std::vector<Vector2d> ring = {{2.0, 1.75}, {6.2, 1.75}, {6.2, 5.45}, {2.0, 5.45}};
   const std::vector<Vector2d> aisle = {{4.0, 4.2}, {20.0, 4.2}, {20.0, 11.8}, {4.0, 11.8}};
   const std::vector<Vector2d> road = {{0.0, 0.0}, {40.0, 0.0}, {40.0, 28.0}, {0.0, 28.0}};
-  const std::vector<Vector2d> both_rooms = {{2.25, 3.0}, {2.25, -1.3}, {7.45, -1.3}, {7.45, 3.0}};
-  return {{"room", around_table, true, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
-          {"bare", around_table, true, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
-          {"apartment", ring, true, 0.75, 1.5, 18.0, hand, {{1.5, 1.75, 1.5}, 0.0, -4.0, 0.0}},
-          {"hall", aisle, true, 2.0, 1.6, 20.0, hand, {{4.5, 4.5, 1.6}, 20.0, 2.0, 0.0}},
-          {"street", road, true, 8.0, 1.6, 0.0, wheels, {{10.0, 0.0, 1.6}, 0.0, 0.0, 0.0}},
-          {"twins", both_rooms, false, 0.7, 1.5, 15.0, hand, {{2.25, 1.5, 1.5}, 90.0, -4.0, 0.0}}};
+  const std::vector<Vector2d> both_rooms = rounds_of_both_rooms();
+  return {{"room", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
+          {"bare", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
+          {"apartment", ring, 0.75, 1.5, 18.0, hand, {{1.5, 1.75, 1.5}, 0.0, -4.0, 0.0}},
+          {"hall", aisle, 2.0, 1.6, 20.0, hand, {{4.5, 4.5, 1.6}, 20.0, 2.0, 0.0}},
+          {"street", road, 8.0, 1.6, 0.0, wheels, {{10.0, 0.0, 1.6}, 0.0, 0.0, 0.0}},
+          {"twins", both_rooms, 0.7, 1.5, 15.0, hand, {{2.25, 1.5, 1.5}, 90.0, -4.0, 0.0}}};
 }
 
 double path_length(const Course& course) {
   double length = 0.0;
   const std::size_t count = course.path.size();
-  for (std::size_t i = 0; i + (course.is_closed ? 0 : 1) < count; ++i) {
+  for (std::size_t i = 0; i < count; ++i) {
     length += (course.path[(i + 1) % count] - course.path[i]).norm();
   }
   return length;
 }
 
-/// The point at arc length s; a closed path repeats, an open one goes on straight.
+/// The point at arc length s.
 Vector2d path_point(const Course& course, double s) {
   const std::size_t count = course.path.size();
   const double length = path_length(course);
-  if (course.is_closed) s -= length * std::floor(s / length);
-  const std::size_t last = course.is_closed ? count - 1 : count - 2;
+  s -= length * std::floor(s / length);
   for (std::size_t i = 0;; ++i) {
     const Vector2d& from = course.path[i];
     const Vector2d side = course.path[(i + 1) % count] - from;
-    if (s <= side.norm() || i == last) return from + s / side.norm() * side;
+    if (s <= side.norm() || i == count - 1) return from + s / side.norm() * side;
     s -= side.norm();
   }
 }
 
-/// Keys along the path. head_deg(i) turns the head at key i.
+/// Keys so many times around the path and a bit on. head_deg(i) turns the head at key i.
 template <class HeadTurn>
-std::vector<MotionKey> along_path(const Course& course, HeadTurn head_deg) {
+std::vector<MotionKey> along_path(const Course& course, int num_rounds, HeadTurn head_deg) {
   const double length = path_length(course);
-  const double start = course.is_closed ? 0.4 * (course.path[1] - course.path[0]).norm() : 0.0;
-  // On closed paths the way ends beyond where it began.
-  const double end = course.is_closed ? start + 1.06 * length + 2.0 * course.spacing_m : length;
+  const double start = 0.4 * (course.path[1] - course.path[0]).norm();
+  const double end = start + (num_rounds + 0.06) * length + 2.0 * course.spacing_m;
   const int count = std::max(4, static_cast<int>(std::ceil((end - start) / course.spacing_m)) + 1);
   std::vector<MotionKey> keys;
   double heading = 0.0;
@@ -132,9 +153,15 @@ MotionKey inspect_offset(double phase) {
           5.0 * std::sin(4.0 * a)};
 }
 
-Motion loop(const Course& course, double duration_s) {
+Motion walk_around(const Course& course, int num_rounds, double duration_s) {
   const auto look_around = [&](int i) { return course.look_around_deg * std::sin(0.55 * i); };
-  return Motion(along_path(course, look_around), duration_s, course.sway);
+  return Motion(along_path(course, num_rounds, look_around), duration_s, course.sway);
+}
+
+Motion loop(const Course& course, double duration_s) { return walk_around(course, 1, duration_s); }
+
+Motion rounds(const Course& course, double duration_s) {
+  return walk_around(course, 3, duration_s);
 }
 
 Motion fast_turn(const Course& course, double duration_s) {
@@ -142,7 +169,7 @@ Motion fast_turn(const Course& course, double duration_s) {
     constexpr std::array<double, 8> kTurnDeg = {0.0, 0.0, 0.0, 75.0, 75.0, 0.0, 0.0, -75.0};
     return kTurnDeg[static_cast<std::size_t>(i) % kTurnDeg.size()];
   };
-  return Motion(along_path(course, turn_head), duration_s, course.sway);
+  return Motion(along_path(course, 1, turn_head), duration_s, course.sway);
 }
 
 Motion inspect(const Course& course, double duration_s) {
@@ -170,7 +197,8 @@ struct NamedMotion {
   Motion (*make)(const Course& course, double duration_s);
 };
 
-constexpr std::array<NamedMotion, 7> kMotions = {{{"loop", loop},
+constexpr std::array<NamedMotion, 8> kMotions = {{{"loop", loop},
+                                                  {"rounds", rounds},
                                                   {"fast_turn", fast_turn},
                                                   {"inspect", inspect},
                                                   {"slide", slide},
