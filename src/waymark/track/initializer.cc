@@ -215,7 +215,9 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
     references_.push_back({frame, pixels_of(*frame.features), {}});
     if (references_.size() > kMaxReferences) references_.erase(references_.begin() + 1);
   }
-  while (passed_.front().id < references_.front().frame.id) passed_.pop_front();
+  while (passed_.front().id < references_.front().frame.id || passed_.size() > kMaxPassed) {
+    passed_.pop_front();
+  }
   return std::nullopt;
 }
 
@@ -269,9 +271,15 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
   const LandmarkSet landmarks = landmark_set(start.submap);
   start.filled.push_back(
       {reference.frame.id, {KeyframeId{0}, Rigid3{}, 1.0}, reference.frame.features});
-  const auto middle = std::find_if(passed_.begin(), passed_.end(), [&](const Frame& passed) {
-    return passed.id >= reference.frame.id;
-  });
+  // Each pose is the guess for the next one, from the reference outwards. Where the frames next to
+  // the reference were dropped, the way goes back from the end of the pair.
+  const bool reaches_reference = passed_.front().id <= reference.frame.id;
+  auto middle = passed_.end();
+  if (reaches_reference) {
+    middle = std::find_if(passed_.begin(), passed_.end(), [&](const Frame& passed) {
+      return passed.id >= reference.frame.id;
+    });
+  }
   const auto try_fill = [&](const Frame& passed, Rigid3& guess) {
     const std::optional<Rigid3> rig_from_world = locate(passed, guess, landmarks);
     if (!rig_from_world) return;
@@ -282,7 +290,7 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
   for (auto it = middle; it != passed_.end(); ++it) {
     if (it->id != reference.frame.id) try_fill(*it, guess);
   }
-  guess = Rigid3{};
+  guess = reaches_reference ? Rigid3{} : start.rig_from_world;
   for (auto it = middle; it != passed_.begin(); --it) try_fill(*std::prev(it), guess);
 }
 

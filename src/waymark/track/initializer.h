@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -34,9 +35,12 @@ struct Initialization {
 /// Starts a map: from the first frame with enough depth, or in mono from two views. In mono several
 /// earlier frames are kept as references; each new frame is matched to all of them, and the first
 /// pair with a well conditioned geometry makes the map. The frames in between are then located in
-/// it.
+/// it, the newest kMaxPassed of them at most: a camera may stand still for any time before it
+/// moves.
 class Initializer {
  public:
+  static constexpr std::size_t kMaxPassed = 300;
+
   Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed);
 
   std::optional<Initialization> add(const Frame& frame);
@@ -68,7 +72,7 @@ class Initializer {
   ProjectionMatcher projection_;
   PoseWorkspace pose_workspace_;
   std::deque<Reference> references_;
-  std::deque<Frame> passed_;  ///< Frames since the oldest reference.
+  std::deque<Frame> passed_;  ///< The newest frames since the oldest reference.
 };
 
 }  // namespace waymark

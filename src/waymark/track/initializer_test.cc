@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <functional>
+#include <set>
 
 #include "waymark/image/range_precision.h"
 #include "waymark/track/test_map.h"
@@ -133,6 +134,38 @@ TEST(Initializer, MonoStartsOnceTurningBecomesMoving) {
   const Started started = run(scene, false, 50);
   ASSERT_TRUE(started.start);
   EXPECT_GE(started.at, 15u);
+}
+
+TEST(Initializer, MonoKeepsOnlySoManyFramesWhileTheCameraStandsStill) {
+  const auto num_still = static_cast<std::uint32_t>(Initializer::kMaxPassed + 20);
+  const Path path = sideways();
+  Scene scene =
+      mono_scene([&](std::uint32_t i) { return path(i < num_still ? 0 : i - num_still); });
+  scene.noise.max_features = 130;
+  Initializer initializer(scene.rig, false, 7);
+  std::optional<Initialization> start;
+  const auto still = scene.look(0).features;
+  for (std::uint32_t i = 0; i < num_still; ++i) {
+    ASSERT_FALSE(initializer.add({FrameId{i}, 50'000'000 * std::int64_t{i}, still}));
+  }
+  std::uint32_t at = num_still;
+  for (; at < num_still + 40 && !start; ++at) start = initializer.add(scene.frame(at));
+  ASSERT_TRUE(start);
+  // The reference, and the newest of the others without a gap.
+  const FrameId reference = start->submap.keyframes[0].frame;
+  std::set<std::uint32_t> filled;
+  for (const FilledPose& pose : start->filled) {
+    if (pose.frame != reference) filled.insert(pose.frame.value);
+  }
+  EXPECT_EQ(start->filled.size(), filled.size() + 1);
+  ASSERT_EQ(filled.size(), Initializer::kMaxPassed);
+  EXPECT_EQ(*filled.begin(), at - 1 - Initializer::kMaxPassed);
+  EXPECT_EQ(*filled.rbegin(), at - 2);
+  // The camera stood still from the reference on.
+  for (const FilledPose& pose : start->filled) {
+    if (pose.frame.value >= num_still) continue;
+    EXPECT_LT(pose.pose.rig_from_reference.log().norm(), 0.02) << pose.frame.value;
+  }
 }
 
 TEST(Initializer, MonoRefusesViewsThatHaveNothingInCommon) {
