@@ -67,8 +67,7 @@ BundleOptions narrowed(const BundleOptions& options,
   BundleOptions result = options;
   if (!options.follows_noise) return result;
   if (const auto noise_px = measured_noise_px(problem, is_used)) {
-    result.huber_px =
-        std::clamp(kHuberSigmas * *noise_px, kHuberSigmas * kMinNoisePx, options.huber_px);
+    result.huber_px = std::min(kHuberSigmas * std::max(*noise_px, kMinNoisePx), options.huber_px);
   }
   return result;
 }

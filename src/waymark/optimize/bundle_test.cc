@@ -113,6 +113,15 @@ TEST_P(Bundle, TheLossNarrowsWithTheNoise) {
   EXPECT_LT(drift, 0.002);  // 0.0012; with a loss of 2 px 0.0032.
 }
 
+TEST_P(Bundle, TheLossIsNeverWiderThanStated) {
+  const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.2}, 7);
+  BundleProblem following = problem_of(scene);
+  adjust_bundle(following, {.solver = GetParam(), .huber_px = 0.1});
+  BundleProblem stated = problem_of(scene);
+  adjust_bundle(stated, {.solver = GetParam(), .huber_px = 0.1, .follows_noise = false});
+  EXPECT_EQ(following.points, stated.points);
+}
+
 TEST_P(Bundle, FixedPosesStay) {
   const BundleScene scene = make_bundle_scene({.num_fixed = 3}, 2);
   BundleProblem problem = problem_of(scene);
