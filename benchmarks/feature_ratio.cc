@@ -21,6 +21,7 @@
 #include <string>
 #include <vector>
 
+#include "waymark/base/median.h"
 #include "waymark/image/extractor.h"
 
 namespace {
@@ -36,12 +37,6 @@ double milliseconds(Work work) {
   const double start = thread_time_ms();
   work();
   return thread_time_ms() - start;
-}
-
-double median(std::vector<double> values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
 }
 
 std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder) {
@@ -110,9 +105,9 @@ nlohmann::json measure(const std::vector<cv::Mat>& images, int count) {
   }
   return {{"images", images.size()},
           {"count", count},
-          {"ours_ms", median(ours_ms)},
-          {"cv_orb_ms", median(theirs_ms)},
-          {"ratio", median(ours_ms) / median(theirs_ms)},
+          {"ours_ms", waymark::median(ours_ms)},
+          {"cv_orb_ms", waymark::median(theirs_ms)},
+          {"ratio", waymark::median(ours_ms) / waymark::median(theirs_ms)},
           {"returned_fraction", *std::min_element(returned.begin(), returned.end())}};
 }
 

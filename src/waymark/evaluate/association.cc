@@ -4,6 +4,8 @@
 
 #include <algorithm>
 
+#include "waymark/base/median.h"
+
 namespace waymark {
 namespace {
 
@@ -51,9 +53,7 @@ std::int64_t median_interval_ns(std::span<const StampedPose> poses) {
   for (std::size_t i = 1; i < poses.size(); ++i) {
     intervals_ns.push_back(distance_ns(poses[i - 1].timestamp_ns, poses[i].timestamp_ns));
   }
-  const auto middle = intervals_ns.begin() + static_cast<std::ptrdiff_t>(intervals_ns.size() / 2);
-  std::nth_element(intervals_ns.begin(), middle, intervals_ns.end());
-  return static_cast<std::int64_t>(std::min<std::uint64_t>(*middle, INT64_MAX));
+  return static_cast<std::int64_t>(std::min<std::uint64_t>(median(intervals_ns), INT64_MAX));
 }
 
 double covered_part(std::span<const StampedPose> estimate,

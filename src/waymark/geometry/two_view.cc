@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/homography.h"
 #include "waymark/geometry/relative_pose.h"
@@ -194,11 +195,7 @@ TwoViewGeometry make_geometry(const Candidate& candidate,
     geometry.has_point[i] = 1;
     geometry.points_in_a[i] = *point;
   }
-  if (!inlier_parallaxes.empty()) {
-    const auto middle = inlier_parallaxes.begin() + inlier_parallaxes.size() / 2;
-    std::nth_element(inlier_parallaxes.begin(), middle, inlier_parallaxes.end());
-    geometry.median_parallax_rad = *middle;
-  }
+  if (!inlier_parallaxes.empty()) geometry.median_parallax_rad = median(inlier_parallaxes);
   return geometry;
 }
 

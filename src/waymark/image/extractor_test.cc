@@ -4,10 +4,10 @@
 
 #include <gmock/gmock.h>
 
-#include <algorithm>
 #include <cmath>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/image/allocation_count.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/mask.h"
@@ -117,8 +117,7 @@ TEST(FeatureExtractor, LocatesToFractionsOfAPixel) {
       }
     }
     ASSERT_GT(errors.size(), 1000u);
-    std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
-    EXPECT_LT(errors[errors.size() / 2], 0.1) << "at a shift of " << shift << " / 4 pixels";
+    EXPECT_LT(median(errors), 0.1) << "at a shift of " << shift << " / 4 pixels";
   }
 }
 

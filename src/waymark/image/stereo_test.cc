@@ -4,11 +4,11 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/geometry/so3.h"
@@ -93,13 +93,6 @@ struct Statistics {
   double median_bias_px = 0.0;      ///< Of the error along the curve, towards near.
   double median_range_error = 0.0;  ///< Relative.
 };
-
-double median(std::vector<double> values) {
-  std::nth_element(values.begin(),
-                   values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2),
-                   values.end());
-  return values[values.size() / 2];
-}
 
 struct Truth {
   bool is_visible;

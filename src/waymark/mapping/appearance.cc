@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/appearance.h"
 
-#include <algorithm>
 #include <array>
+#include <span>
 
+#include "waymark/base/median.h"
 #include "waymark/image/hamming.h"
 
 namespace waymark {
@@ -21,12 +22,9 @@ Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) 
     for (std::size_t k = 0; k < descriptors.size(); ++k) {
       distances[k] = hamming_distance(*descriptors[i], *descriptors[k]);
     }
-    const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(descriptors.size() / 2);
-    std::nth_element(distances.begin(),
-                     middle,
-                     distances.begin() + static_cast<std::ptrdiff_t>(descriptors.size()));
-    if (*middle < best_median) {
-      best_median = *middle;
+    const int middle = median(std::span(distances).first(descriptors.size()));
+    if (middle < best_median) {
+      best_median = middle;
       best = i;
     }
   }

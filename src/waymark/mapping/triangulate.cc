@@ -2,8 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/triangulate.h"
 
-#include <algorithm>
-
+#include "waymark/base/median.h"
 #include "waymark/geometry/triangulation.h"
 
 namespace waymark {
@@ -30,10 +29,7 @@ double median_distance(const Map& map, const Keyframe& keyframe) {
     const Landmark* landmark = map.landmarks().find(keyframe.landmarks[i]);
     if (landmark) distances.push_back((landmark->position_in_world - centre).norm());
   }
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return distances.empty() ? 0.0 : median(distances);
 }
 
 std::optional<Eigen::Vector3d> triangulate_match(const Keyframe& a,

@@ -7,6 +7,7 @@
 #include <optional>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/optimize/ceres_solver.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/schur_solver.h"
@@ -55,9 +56,7 @@ std::optional<double> measured_noise_px(const BundleProblem& problem,
     if (is_used[i]) squared.push_back(squared_residual(problem, problem.observations[i]));
   }
   if (squared.empty()) return std::nullopt;
-  const auto middle = squared.begin() + static_cast<std::ptrdiff_t>(squared.size() / 2);
-  std::nth_element(squared.begin(), middle, squared.end());
-  return std::sqrt(*middle) / 1.177;
+  return std::sqrt(median(squared)) / 1.177;
 }
 
 /// Options of a round: the loss as narrow as the noise allows.

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {
@@ -36,8 +37,7 @@ double median_point_error(const BundleProblem& problem, const BundleScene& scene
   for (std::size_t i = 0; i < scene.points.size(); ++i) {
     errors.push_back((problem.points[i] - scene.points[i]).norm());
   }
-  std::nth_element(errors.begin(), errors.begin() + errors.size() / 2, errors.end());
-  return errors[errors.size() / 2];
+  return median(errors);
 }
 
 void expect_finite(const BundleProblem& problem, const BundleResult& result) {

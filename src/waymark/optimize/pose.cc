@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/base/median.h"
 #include "waymark/optimize/pose_arrays.h"
 #include "waymark/optimize/pose_kernel.h"
 
@@ -147,9 +148,7 @@ class PoseSolver {
     for (std::size_t i = 0; i < arrays_.observation.size(); ++i) {
       if (arrays_.observation[i] != UINT32_MAX) values.push_back(arrays_.squared_residual[i]);
     }
-    const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-    std::nth_element(values.begin(), middle, values.end());
-    return std::sqrt(*middle);
+    return std::sqrt(median(values));
   }
 
   const Rig& rig_;

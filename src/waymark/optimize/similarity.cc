@@ -9,6 +9,7 @@
 #include <numeric>
 #include <span>
 
+#include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
@@ -55,13 +56,6 @@ struct NormalEquations {
   Vector7d gradient = Vector7d::Zero();
   double cost = 0.0;
 };
-
-/// Reorders the values; there must be some.
-double median(std::vector<double>& values) {
-  const auto middle = values.begin() + static_cast<std::ptrdiff_t>(values.size() / 2);
-  std::nth_element(values.begin(), middle, values.end());
-  return *middle;
-}
 
 /// The similarity of one set of matches.
 class SimilaritySolver {

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/base/median.h"
 #include "waymark/geometry/two_view.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
@@ -72,9 +73,7 @@ BundleObservation observation_of(const Features& features,
 double median_distance(const std::vector<Eigen::Vector3d>& points) {
   std::vector<double> distances;
   for (const Eigen::Vector3d& point : points) distances.push_back(point.norm());
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return median(distances);
 }
 
 /// Bearings of matched features and their noise, as arrays of their own.

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
 #include "waymark/image/range_precision.h"
 
 namespace waymark {
@@ -252,12 +253,7 @@ KeyframeSituation Tracker::assess(const Frame& frame, const LocatedFrame& locate
     const Eigen::Vector3d b = (point - reference_centre).normalized();
     parallaxes_px.push_back((a - b).norm() / pixel_rad_);
   }
-  if (!parallaxes_px.empty()) {
-    const auto middle =
-        parallaxes_px.begin() + static_cast<std::ptrdiff_t>(parallaxes_px.size() / 2);
-    std::nth_element(parallaxes_px.begin(), middle, parallaxes_px.end());
-    situation.median_parallax_px = *middle;
-  }
+  if (!parallaxes_px.empty()) situation.median_parallax_px = median(parallaxes_px);
   return situation;
 }
 
