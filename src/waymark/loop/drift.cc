@@ -1,0 +1,127 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/drift.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <queue>
+#include <tuple>
+#include <vector>
+
+namespace waymark {
+namespace {
+
+/// Keyframes that share fewer landmarks are not linked.
+constexpr std::uint32_t kMinShared = 15;
+/// Drift that is possible: in parts of the way, with a free scale more, and in parts of the
+/// distance of what is seen even where the camera only turned.
+constexpr double kMaxMetricDrift = 0.05;
+constexpr double kMaxFreeDrift = 0.10;
+constexpr double kMaxDriftOfDepth = 0.15;
+constexpr double kMaxAngleRad = 0.05;
+constexpr double kMaxAnglePerStepRad = 0.01;
+constexpr double kMaxAngleAtAllRad = 0.5;
+constexpr double kMaxLogScale = 0.1;
+constexpr double kMaxLogScalePerStep = 0.03;
+constexpr double kMaxLogScaleAtAll = 0.7;
+
+struct Arrival {
+  double length;
+  int num_steps;
+  KeyframeId keyframe;
+};
+
+struct IsLater {
+  bool operator()(const Arrival& a, const Arrival& b) const {
+    return std::tie(a.length, a.num_steps, a.keyframe) >
+           std::tie(b.length, b.num_steps, b.keyframe);
+  }
+};
+
+/// Children in the spanning tree per keyframe, by value of the id.
+std::vector<std::vector<KeyframeId>> list_children(const Map& map) {
+  std::vector<std::vector<KeyframeId>> children(map.keyframes().end_id().value);
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.parent.is_valid()) children[keyframe.parent.value].push_back(id);
+  });
+  return children;
+}
+
+/// Median distance of what a keyframe sees.
+double median_depth(const Map& map, KeyframeId id) {
+  const Keyframe& keyframe = map.keyframes().at(id);
+  std::vector<double> distances;
+  for (LandmarkId landmark : keyframe.landmarks) {
+    if (!landmark.is_valid()) continue;
+    distances.push_back(
+        (keyframe.rig_from_world * map.landmarks().at(landmark).position_in_world).norm());
+  }
+  if (distances.empty()) return 0.0;
+  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
+  std::nth_element(distances.begin(), middle, distances.end());
+  return *middle;
+}
+
+}  // namespace
+
+std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to) {
+  const auto children = list_children(map);
+  std::vector<double> lengths(children.size(), std::numeric_limits<double>::infinity());
+  std::priority_queue<Arrival, std::vector<Arrival>, IsLater> queue;
+  const auto arrive = [&](KeyframeId id, double length, int num_steps) {
+    if (!(length < lengths[id.value])) return;
+    lengths[id.value] = length;
+    queue.push({length, num_steps, id});
+  };
+  arrive(from, 0.0, 0);
+  while (!queue.empty()) {
+    const Arrival here = queue.top();
+    queue.pop();
+    if (here.keyframe == to) return GraphWay{here.length, here.num_steps};
+    if (here.length > lengths[here.keyframe.value]) continue;
+    const Keyframe& keyframe = map.keyframes().at(here.keyframe);
+    const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
+    const auto go = [&](KeyframeId next) {
+      const Rigid3& next_from_world = map.keyframes().at(next).rig_from_world;
+      const double step = (next_from_world.origin_in_source() - centre).norm();
+      arrive(next, here.length + step, here.num_steps + 1);
+    };
+    if (keyframe.parent.is_valid()) go(keyframe.parent);
+    for (KeyframeId child : children[here.keyframe.value]) go(child);
+    for (const CovisibilityEdge& edge : map.covisible(here.keyframe)) {
+      if (edge.num_shared >= kMinShared) go(edge.keyframe);
+    }
+  }
+  return std::nullopt;
+}
+
+ImpliedDrift implied_drift(const Map& map, const Revisit& revisit) {
+  const Rigid3& query_from_world = map.keyframes().at(revisit.query).rig_from_world;
+  const Rigid3& match_from_world = map.keyframes().at(revisit.match).rig_from_world;
+  const Sim3 mapped(query_from_world * match_from_world.inverse());
+  const Sim3 drift = mapped * revisit.query_from_match.inverse();
+  return {drift.inverse().translation.norm(),
+          Eigen::AngleAxisd(drift.rotation).angle(),
+          std::log(drift.scale)};
+}
+
+bool is_plausible_loop(const Map& map, const Revisit& revisit) {
+  const std::optional<GraphWay> way = shortest_way(map, revisit.query, revisit.match);
+  if (!way) return false;
+  const bool is_metric = map.submaps()[map.keyframes().at(revisit.query).submap.value].is_metric;
+  const ImpliedDrift drift = implied_drift(map, revisit);
+  const double log_scale = std::abs(drift.log_scale);
+  // A scale that changed on the way made lengths wrong by half of that, on average.
+  const double per_length = is_metric ? kMaxMetricDrift : kMaxFreeDrift + 0.5 * log_scale;
+  const double max_distance =
+      per_length * way->length + kMaxDriftOfDepth * median_depth(map, revisit.match);
+  const double max_angle =
+      std::min(kMaxAngleRad + kMaxAnglePerStepRad * way->num_steps, kMaxAngleAtAllRad);
+  const double max_log_scale =
+      std::min(kMaxLogScale + kMaxLogScalePerStep * way->num_steps, kMaxLogScaleAtAll);
+  return drift.distance <= max_distance && drift.angle_rad <= max_angle &&
+         log_scale <= max_log_scale;
+}
+
+}  // namespace waymark

@@ -1,0 +1,35 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <optional>
+
+#include "waymark/loop/revisit.h"
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+/// The way between two keyframes along the covisibility graph and the spanning tree.
+struct GraphWay {
+  double length = 0.0;  ///< In map units.
+  int num_steps = 0;
+};
+
+/// The shortest way; nothing between sub-maps. Keyframes that share but a few landmarks are not
+/// linked: what was seen again by chance would be a shortcut.
+std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to);
+
+/// What a loop says the map is off by: the query where the map has it against where the loop puts
+/// it.
+struct ImpliedDrift {
+  double distance = 0.0;  ///< In map units.
+  double angle_rad = 0.0;
+  double log_scale = 0.0;
+};
+ImpliedDrift implied_drift(const Map& map, const Revisit& revisit);
+
+/// Whether a map can have drifted so far on the way that lies between query and match. Two rooms
+/// that are alike are told apart by this.
+bool is_plausible_loop(const Map& map, const Revisit& revisit);
+
+}  // namespace waymark

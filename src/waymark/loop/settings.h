@@ -1,0 +1,20 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "waymark/base/settings.h"
+
+namespace waymark {
+
+struct LoopSettings {
+  bool enabled = true;
+
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field("enabled",
+          self.enabled,
+          SettingInfo{.help = "Recognise places seen before: close loops and join sub-maps."});
+  }
+};
+
+}  // namespace waymark

@@ -1,0 +1,136 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cmath>
+#include <map>
+#include <numbers>
+#include <vector>
+
+#include "waymark/mapping/appearance.h"
+#include "waymark/mapping/associate.h"
+#include "waymark/match/test_scene.h"
+#include "waymark/place/place_index.h"
+#include "waymark/simulate/points.h"
+
+namespace waymark {
+
+/// Points all round a circle on which a camera walks and looks outward.
+inline PointCloud cloud_all_round(int count) {
+  PointCloud box = scatter_in({-11.0, -2.5, -11.0}, {11.0, 2.5, 11.0}, 2 * count, 4.5, 5);
+  std::erase_if(box.landmarks, [](const PointLandmark& point) {
+    const double radius = std::hypot(point.position.x(), point.position.z());
+    return radius < 7.0 || radius > 11.0;
+  });
+  return box;
+}
+
+/// The half round z > 0 again, turned by 180 degrees, in place of the other half.
+inline PointCloud cloud_with_twins(int count) {
+  PointCloud cloud = cloud_all_round(count);
+  std::erase_if(cloud.landmarks,
+                [](const PointLandmark& point) { return point.position.z() < 0.0; });
+  const std::size_t num_originals = cloud.landmarks.size();
+  const Eigen::Vector3d half_turn(-1.0, 1.0, -1.0);
+  for (std::size_t i = 0; i < num_originals; ++i) {
+    PointLandmark twin = cloud.landmarks[i];
+    twin.position = half_turn.cwiseProduct(twin.position);
+    twin.tangent = half_turn.cwiseProduct(twin.tangent);
+    cloud.landmarks.push_back(twin);
+  }
+  return cloud;
+}
+
+/// A map as it is before loops are closed: the camera walks on a circle and keyframes associate
+/// what they see with landmarks of the last few keyframes only, so that a place seen again gets
+/// landmarks anew. The map drifts steadily from the truth.
+class LoopScene {
+ public:
+  static constexpr int kStepsPerRound = 40;
+  static constexpr double kRadius = 4.0;
+
+  /// drift: tangent of map_from_world after one round, zero at the start.
+  LoopScene(PointCloud cloud_in, bool is_metric_in, const Vector7d& drift_in)
+      : rig(make_test_rig(1)),
+        cloud(std::move(cloud_in)),
+        is_metric(is_metric_in),
+        drift(drift_in) {
+    start_submap(Sim3());
+  }
+
+  /// Further keyframes belong to another sub-map, whose frame and units are others.
+  void start_submap(const Sim3& submap_from_world) {
+    submap = map.add_submap(is_metric);
+    frame = submap_from_world;
+    parent = {};
+    landmark_of_point.clear();
+  }
+
+  static Rigid3 true_pose(int step) {
+    const double angle = 2.0 * std::numbers::pi * step / kStepsPerRound;
+    return make_test_pose({kRadius * std::sin(angle), 0.0, kRadius * std::cos(angle)},
+                          {0.0, angle, 0.0});
+  }
+
+  Sim3 map_from_world(int step) const {
+    return frame * Sim3::exp(static_cast<double>(step) / kStepsPerRound * drift);
+  }
+
+  KeyframeId add_keyframe(int step) {
+    const Rigid3 world_from_rig = true_pose(step);
+    const PointObservation view =
+        observe(cloud, *rig, world_from_rig, {.seed = 4}, static_cast<std::uint64_t>(step));
+    const Sim3 rig_from_map = Sim3(world_from_rig.inverse()) * map_from_world(step).inverse();
+    Keyframe keyframe;
+    keyframe.frame = FrameId{static_cast<std::uint32_t>(step)};
+    keyframe.submap = submap;
+    keyframe.parent = parent;
+    keyframe.rig = rig;
+    keyframe.features = view.features;
+    keyframe.rig_from_world = {rig_from_map.rotation,
+                               rig_from_map.translation / rig_from_map.scale};
+    const KeyframeId id = map.add_keyframe(std::move(keyframe));
+    associate_features(id, step, view);
+    places.add(id, submap, view.features->descriptors);
+    steps.push_back(step);
+    parent = id;
+    return id;
+  }
+
+  std::shared_ptr<const Rig> rig;
+  PointCloud cloud;
+  bool is_metric;
+  Vector7d drift;
+  Map map;
+  PlaceIndex places;
+  SubmapId submap;
+  std::vector<int> steps;  ///< Per keyframe.
+
+ private:
+  struct KnownPoint {
+    LandmarkId landmark;
+    int last_step;
+  };
+  static constexpr int kMemory = 3;
+
+  void associate_features(KeyframeId id, int step, const PointObservation& view) {
+    for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
+      const std::uint32_t index = view.landmark_of_feature[i];
+      if (index == kNoLandmark) continue;
+      const auto [at, is_new] = landmark_of_point.try_emplace(index);
+      if (is_new || step - at->second.last_step > kMemory) {
+        const Eigen::Vector3d& point = cloud.landmarks[index].position;
+        at->second.landmark = map.add_landmark(submap, map_from_world(step + 2) * point, id);
+      }
+      at->second.last_step = step;
+      map.observe(id, i, at->second.landmark);
+      map.set_appearance(at->second.landmark, describe_landmark(map, at->second.landmark));
+    }
+  }
+
+  Sim3 frame;
+  KeyframeId parent;
+  std::map<std::uint32_t, KnownPoint> landmark_of_point;
+};
+
+}  // namespace waymark
