@@ -36,7 +36,7 @@ class TestMap {
     keyframe.timestamp_ns = 100'000'000 * std::int64_t{number};
     keyframe.submap = submap;
     keyframe.rig_from_world = world_from_rig.inverse();
-    if (number > 0) keyframe.parent = KeyframeId{number - 1};
+    if (map.submaps()[submap.value].root.is_valid()) keyframe.parent = KeyframeId{number - 1};
     keyframe.rig = rig;
     keyframe.features = seen.back().features;
     return map.add_keyframe(std::move(keyframe));

@@ -1,0 +1,43 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/base/frame_state.h"
+#include "waymark/map/map.h"
+#include "waymark/place/place_index.h"
+#include "waymark/track/frame.h"
+#include "waymark/track/place_locator.h"
+#include "waymark/track/settings.h"
+
+namespace waymark {
+
+/// Finds frames of which nothing is known in the map: similar places from the index, the first of
+/// which that shows what the frame shows is the answer. The cost is bounded whatever the size of
+/// the map, and misses are preferred to wrong places. Keeps its buffers.
+class Relocalizer {
+ public:
+  /// rig: the one that sees the frames; the map may be of other cameras.
+  Relocalizer(std::shared_ptr<const Rig> rig, const TrackingSettings& settings, std::uint64_t seed);
+
+  /// Pose of a frame in whichever sub-map shows the place. landmarks: per feature, on success those
+  /// that the frame sees. The index may know more or fewer keyframes than the map.
+  std::optional<LocatedFrame> locate(const Frame& frame,
+                                     const Map& map,
+                                     const PlaceIndex& places,
+                                     std::vector<LandmarkId>& landmarks);
+
+  /// Why the last locate() found nothing: kNoCandidate, kNotVerified, else kNone.
+  FrameReason reason() const { return reason_; }
+
+ private:
+  PlaceLocator locator_;
+  const int min_inliers_;
+  FrameReason reason_ = FrameReason::kNone;
+};
+
+}  // namespace waymark

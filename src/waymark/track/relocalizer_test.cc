@@ -1,0 +1,93 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/relocalizer.h"
+
+#include <gtest/gtest.h>
+
+#include <utility>
+
+#include "waymark/track/test_map.h"
+
+namespace waymark {
+namespace {
+
+PointCloud another_cloud(std::uint64_t seed) {
+  return scatter_in({-5.0, -3.0, 4.0}, {5.0, 3.0, 9.0}, 1500, 6.0, seed);
+}
+
+/// Two places in a sub-map each, of four keyframes each.
+class RelocalizerTest : public ::testing::Test {
+ protected:
+  RelocalizerTest()
+      : scene_(1, cloud_ahead(), {.seed = 5}, false), relocalizer_(scene_.rig, {}, 1) {
+    add_keyframes();
+    first_ = std::exchange(scene_.cloud, another_cloud(11));
+    scene_.submap = scene_.map.add_submap(false);
+    scene_.landmark_of_point.clear();
+    add_keyframes();
+  }
+
+  void add_keyframes() {
+    for (const double x : {0.0, 0.4, 0.8, 1.2}) {
+      const KeyframeId id = scene_.add_keyframe(pose_at(x));
+      places_.add(id, scene_.submap, scene_.seen[id.value].features->descriptors);
+    }
+  }
+
+  std::optional<LocatedFrame> locate(const PointCloud& cloud, const Rigid3& world_from_rig) {
+    const auto view = observe(cloud, *scene_.rig, world_from_rig, scene_.noise, 100);
+    const Frame frame = {FrameId{100}, 0, view.features};
+    return relocalizer_.locate(frame, scene_.map, places_, landmarks_);
+  }
+
+  SubmapId found_submap() const {
+    for (const LandmarkId id : landmarks_) {
+      if (id.is_valid()) return scene_.map.landmarks().at(id).submap;
+    }
+    return {};
+  }
+
+  TestMap scene_;
+  PointCloud first_;
+  PlaceIndex places_;
+  Relocalizer relocalizer_;
+  std::vector<LandmarkId> landmarks_;
+};
+
+TEST_F(RelocalizerTest, FindsFramesInTheSubmapThatShowsTheirPlace) {
+  const Rigid3 truth = pose_at(0.5, 0.2, 0.6, 0.1);
+  for (const std::uint32_t submap : {0u, 1u}) {
+    const auto located = locate(submap == 0 ? first_ : scene_.cloud, truth);
+    ASSERT_TRUE(located);
+    EXPECT_EQ(relocalizer_.reason(), FrameReason::kNone);
+    EXPECT_LT((located->rig_from_world.origin_in_source() - truth.translation).norm(), 0.02);
+    EXPECT_EQ(found_submap(), SubmapId{submap});
+  }
+}
+
+TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {
+  EXPECT_FALSE(locate(another_cloud(77), pose_at(0.5)));
+  EXPECT_NE(relocalizer_.reason(), FrameReason::kNone);
+  // The looks of the place, but not its shape.
+  for (PointLandmark& point : first_.landmarks) point.position.x() *= -1.0;
+  EXPECT_FALSE(locate(first_, pose_at(0.5)));
+  EXPECT_EQ(relocalizer_.reason(), FrameReason::kNotVerified);
+}
+
+TEST_F(RelocalizerTest, SaysThatThereIsNoCandidate) {
+  places_ = PlaceIndex();
+  EXPECT_FALSE(locate(first_, pose_at(0.5)));
+  EXPECT_EQ(relocalizer_.reason(), FrameReason::kNoCandidate);
+}
+
+TEST_F(RelocalizerTest, LeavesOutKeyframesThatTheMapDoesNotHave) {
+  scene_.map.erase_keyframe(KeyframeId{6});
+  const auto view = observe(scene_.cloud, *scene_.rig, pose_at(0.6), scene_.noise, 101);
+  for (std::uint32_t id = 8; id < 30; ++id) {
+    places_.add(KeyframeId{id}, SubmapId{1}, view.features->descriptors);
+  }
+  EXPECT_TRUE(locate(scene_.cloud, pose_at(0.6)));
+}
+
+}  // namespace
+}  // namespace waymark
