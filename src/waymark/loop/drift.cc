@@ -9,6 +9,8 @@
 #include <tuple>
 #include <vector>
 
+#include "waymark/base/median.h"
+
 namespace waymark {
 namespace {
 
@@ -48,7 +50,8 @@ std::vector<std::vector<KeyframeId>> list_children(const Map& map) {
   return children;
 }
 
-/// Median distance of what a keyframe sees.
+}  // namespace
+
 double median_depth(const Map& map, KeyframeId id) {
   const Keyframe& keyframe = map.keyframes().at(id);
   std::vector<double> distances;
@@ -57,13 +60,8 @@ double median_depth(const Map& map, KeyframeId id) {
     distances.push_back(
         (keyframe.rig_from_world * map.landmarks().at(landmark).position_in_world).norm());
   }
-  if (distances.empty()) return 0.0;
-  const auto middle = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 2);
-  std::nth_element(distances.begin(), middle, distances.end());
-  return *middle;
+  return distances.empty() ? 0.0 : median(distances);
 }
-
-}  // namespace
 
 std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to) {
   const auto children = list_children(map);

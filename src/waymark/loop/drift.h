@@ -19,6 +19,9 @@ struct GraphWay {
 /// linked: what was seen again by chance would be a shortcut.
 std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to);
 
+/// Median distance of what a keyframe sees, in map units; 0 if that is nothing.
+double median_depth(const Map& map, KeyframeId id);
+
 /// What a loop says the map is off by: the query where the map has it against where the loop puts
 /// it.
 struct ImpliedDrift {

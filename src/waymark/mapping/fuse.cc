@@ -44,11 +44,23 @@ LandmarkSet seen_only_by(const Map& map, std::span<const KeyframeId> sources, Ke
   return set;
 }
 
+}  // namespace
+
+void merge(Map& map, LandmarkId a, LandmarkId b, DirtyLandmarks& dirty) {
+  const bool keeps_a = num_observers(map.landmarks().at(a)) >= num_observers(map.landmarks().at(b));
+  const LandmarkId survivor = keeps_a ? a : b;
+  const LandmarkId absorbed = keeps_a ? b : a;
+  map.merge_landmarks(survivor, absorbed);
+  dirty.erase(absorbed);
+  dirty.insert(survivor);
+}
+
 void fuse_into(Map& map,
-               const LandmarkSet& landmarks,
+               std::span<const KeyframeId> sources,
                KeyframeId target,
                ProjectionMatcher& matcher,
                DirtyLandmarks& dirty) {
+  const LandmarkSet landmarks = seen_only_by(map, sources, target);
   const std::shared_ptr<const Features> features = map.keyframes().at(target).features;
   const ProjectionMatches& matches = matcher.match(landmarks,
                                                    *features,
@@ -68,17 +80,9 @@ void fuse_into(Map& map,
       dirty.insert(id);
       continue;
     }
-    const bool keeps_present =
-        num_observers(map.landmarks().at(present)) >= num_observers(landmark);
-    const LandmarkId survivor = keeps_present ? present : id;
-    const LandmarkId absorbed = keeps_present ? id : present;
-    map.merge_landmarks(survivor, absorbed);
-    dirty.erase(absorbed);
-    dirty.insert(survivor);
+    merge(map, present, id, dirty);
   }
 }
-
-}  // namespace
 
 void fuse_with_neighbours(Map& map,
                           KeyframeId keyframe,
@@ -86,9 +90,9 @@ void fuse_with_neighbours(Map& map,
                           DirtyLandmarks& dirty) {
   const std::vector<KeyframeId> targets = surroundings(map, keyframe);
   for (KeyframeId target : targets) {
-    fuse_into(map, seen_only_by(map, std::span(&keyframe, 1), target), target, matcher, dirty);
+    fuse_into(map, std::span(&keyframe, 1), target, matcher, dirty);
   }
-  fuse_into(map, seen_only_by(map, targets, keyframe), keyframe, matcher, dirty);
+  fuse_into(map, targets, keyframe, matcher, dirty);
 }
 
 }  // namespace waymark
