@@ -147,6 +147,11 @@ class Verdict:
                  for begin, end in zip(begins, [*begins[1:], len(self.frames)])
                  if not self.frames[begin].part.is_black]
         max_error_m = self._judge_submaps()
+        unexplained = [row["index"] for row in self.run.frames
+                       if row["state"] not in ("tracked", "filled") and row["reason"] == "none"]
+        if unexplained:
+            self.fail(f"{len(unexplained)} frames have neither a pose nor a reason, from frame "
+                      f"{unexplained[0]} on")
         return Report(parts, len(self.run.trajectories), max_error_m, self.failures)
 
     def _judge_part(self, begin, end):
