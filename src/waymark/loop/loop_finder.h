@@ -30,14 +30,11 @@ class LoopFinder {
 };
 
 /// Keyframes of other places that look like the query, best first: none that the map links to it by
-/// a few steps of covisibility, and none that look less like it than the query's own surroundings
-/// do by far.
+/// a few steps of covisibility, few of one place, and none that look less like it than the query's
+/// own surroundings do by far.
 std::vector<KeyframeId> find_candidates(const Map& map,
                                         const PlaceIndex& places,
                                         KeyframeId query,
                                         std::size_t max_count);
-
-/// Whether the evidence is enough.
-bool is_convincing(const Map& map, const RevisitEvidence& evidence);
 
 }  // namespace waymark

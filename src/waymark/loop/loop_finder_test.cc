@@ -138,6 +138,14 @@ TEST(LoopFinderTest, WantsWitnessesForAnotherSubmap) {
   EXPECT_EQ(walk(scene, finder, 7, 8).num_found, 0);
 }
 
+TEST(LoopFinderTest, JoinsNothingAtAPlaceThatIsThereTwice) {
+  LoopScene scene(cloud_with_twins(kNumPoints), false, Vector7d::Zero());
+  LoopFinder finder(scene.rig, 1);
+  walk(scene, finder, 0, 30);  // The second ten are like the first, in another place.
+  scene.start_submap(Sim3());
+  EXPECT_EQ(walk(scene, finder, 2, 8).num_found, 0);
+}
+
 TEST(LoopFinderTest, SeesNothingWhereNothingIsSeenAgain) {
   LoopScene scene(cloud_all_round(kNumPoints), false, drift_of(0.5, 0.1, 0.1));
   LoopFinder finder(scene.rig, 1);
