@@ -16,11 +16,11 @@ namespace {
 
 /// Keyframes that share fewer landmarks are not linked.
 constexpr std::uint32_t kMinShared = 15;
-/// Drift that is possible: in parts of the way, with a free scale more, and in parts of the
-/// distance of what is seen even where the camera only turned.
-constexpr double kMaxMetricDrift = 0.05;
-constexpr double kMaxFreeDrift = 0.10;
-constexpr double kMaxDriftOfDepth = 0.15;
+/// Drift that is possible, in parts of the way and, even where the camera only turned, of the
+/// distance of what is seen. True loops of hand-held and driven sequences had at most 0.002 of the
+/// way beyond what drift of direction and scale explain, rooms that are alike 0.05 and more.
+constexpr double kMaxDriftOfWay = 0.025;
+constexpr double kMaxDriftOfDepth = 0.1;
 constexpr double kMaxAngleRad = 0.05;
 constexpr double kMaxAnglePerStepRad = 0.01;
 constexpr double kMaxAngleAtAllRad = 0.5;
@@ -107,11 +107,10 @@ ImpliedDrift implied_drift(const Map& map, const Revisit& revisit) {
 bool is_plausible_loop(const Map& map, const Revisit& revisit) {
   const std::optional<GraphWay> way = shortest_way(map, revisit.query, revisit.match);
   if (!way) return false;
-  const bool is_metric = map.submaps()[map.keyframes().at(revisit.query).submap.value].is_metric;
   const ImpliedDrift drift = implied_drift(map, revisit);
   const double log_scale = std::abs(drift.log_scale);
-  // A scale that changed on the way made lengths wrong by half of that, on average.
-  const double per_length = is_metric ? kMaxMetricDrift : kMaxFreeDrift + 0.5 * log_scale;
+  // What turned or grew by so much at the end did by half of that on average.
+  const double per_length = kMaxDriftOfWay + 0.5 * (drift.angle_rad + log_scale);
   const double max_distance =
       per_length * way->length + kMaxDriftOfDepth * median_depth(map, revisit.match);
   const double max_angle =

@@ -179,5 +179,24 @@ TEST(DriftTest, ImpliedDriftIsTheDrift) {
   EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
 }
 
+TEST(DriftTest, IsPlausibleForItsWayOnly) {
+  LoopScene scene(cloud_all_round(kNumPoints), true, Vector7d::Zero());
+  for (int step = 0; step <= kRound; ++step) scene.add_keyframe(step);
+  Revisit revisit;
+  revisit.query = KeyframeId{kRound};
+  revisit.match = KeyframeId{0};
+  const double way = shortest_way(scene.map, revisit.query, revisit.match)->length;
+  revisit.query_from_match.translation = {0.03 * way, 0.0, 0.0};
+  EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
+  revisit.query_from_match.translation = {0.08 * way, 0.0, 0.0};
+  EXPECT_FALSE(is_plausible_loop(scene.map, revisit));
+  revisit.match = KeyframeId{kRound - 1};  // A step of 0.6 does not allow what the round does.
+  revisit.query_from_match =
+      Sim3(LoopScene::true_pose(kRound).inverse() * LoopScene::true_pose(kRound - 1));
+  EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
+  revisit.query_from_match.translation.x() += 0.03 * way;
+  EXPECT_FALSE(is_plausible_loop(scene.map, revisit));
+}
+
 }  // namespace
 }  // namespace waymark
