@@ -81,9 +81,14 @@ TEST_F(CorrectionTest, StoredRelativePosesAreRescaledAlsoThroughErasedReferences
   MapCorrection correction;
   correction.keyframes.push_back({KeyframeId{2}, target_, 1.5});
   map_.observe(KeyframeId{4}, 1, LandmarkId{3});  // Outlives its keyframe.
-  map_.erase_keyframe(KeyframeId{3});
   apply_correction(map_, correction);
   EXPECT_TRUE(seen_from(KeyframeId{3}).isApprox(Eigen::Vector3d(0.0, 0.0, 2.25), 1e-12));
+  map_.erase_keyframe(KeyframeId{3});
+  EXPECT_TRUE(seen_from(KeyframeId{3}).isApprox(Eigen::Vector3d(0.0, 0.0, 2.25), 1e-12));
+  correction.keyframes.front().scale = 2.0;
+  apply_correction(map_, correction);
+  EXPECT_TRUE(seen_from(KeyframeId{3}).isApprox(Eigen::Vector3d(0.0, 0.0, 4.5), 1e-12));
+  EXPECT_DOUBLE_EQ(map_.scale_since(KeyframeId{3}, 1.0), 3.0);
 }
 
 TEST_F(CorrectionTest, ErasedElementsAreSkipped) {

@@ -45,6 +45,7 @@ struct KeyframeForwarding {
   KeyframeId heir;          ///< Invalid while the keyframe lives.
   Rigid3 rig_from_heir;     ///< The erased keyframe's rig from the heir's.
   double heir_scale = 1.0;  ///< applied_scale of the heir at that time.
+  double scale = 1.0;       ///< That of the erased keyframe.
 };
 
 /// Two keyframes that were found to show the same place, and how they lie to each other.

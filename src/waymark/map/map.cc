@@ -67,6 +67,15 @@ bool Map::has_loop_edge(KeyframeId id) const {
   });
 }
 
+double Map::scale_since(KeyframeId reference, double scale_then) const {
+  while (!keyframes_.find(reference)) {
+    const KeyframeForwarding& forwarding = keyframe_forwarding_.at(reference);
+    scale_then *= forwarding.heir_scale / forwarding.scale;
+    reference = forwarding.heir;
+  }
+  return keyframes_.at(reference).applied_scale / scale_then;
+}
+
 Rigid3 Map::rig_from_world(KeyframeId reference,
                            const Rigid3& rig_from_keyframe,
                            double scale_then) const {
@@ -74,6 +83,7 @@ Rigid3 Map::rig_from_world(KeyframeId reference,
   Rigid3 rig_from_reference = rig_from_keyframe;
   while (!keyframe) {
     const KeyframeForwarding& forwarding = keyframe_forwarding_.at(reference);
+    rig_from_reference.translation *= forwarding.scale / scale_then;
     rig_from_reference = rig_from_reference * forwarding.rig_from_heir;
     scale_then = forwarding.heir_scale;
     reference = forwarding.heir;
@@ -179,8 +189,10 @@ void Map::erase_keyframe(KeyframeId id) {
   });
   for (KeyframeId child : children) keyframes_.edit(child).parent = old.parent;
   const Keyframe& heir = keyframes_.at(old.parent);
-  keyframe_forwarding_.edit(id) = {
-      old.parent, old.rig_from_world * heir.rig_from_world.inverse(), heir.applied_scale};
+  keyframe_forwarding_.edit(id) = {old.parent,
+                                   old.rig_from_world * heir.rig_from_world.inverse(),
+                                   heir.applied_scale,
+                                   old.applied_scale};
   keyframes_.erase(id);
   covisibility_.erase(id);
 }

@@ -52,6 +52,8 @@ class Map {
   Rigid3 rig_from_world(KeyframeId reference,
                         const Rigid3& rig_from_keyframe,
                         double scale_then) const;
+  /// New by old lengths around a keyframe since its applied_scale was scale_then.
+  double scale_since(KeyframeId reference, double scale_then) const;
   /// The living keyframe that stands for a possibly erased one.
   KeyframeId resolve(KeyframeId id) const;
 
