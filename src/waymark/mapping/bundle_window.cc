@@ -119,18 +119,19 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
   return result;
 }
 
-void write_back(Map& map, const BundleWindow& window, const BundleProblem& problem) {
-  std::size_t pose = 0;
+MapCorrection moves_of(const BundleWindow& window, const BundleProblem& problem) {
+  MapCorrection correction;
   std::vector<KeyframeId> keyframes = window.moving;
   keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
   std::sort(keyframes.begin(), keyframes.end());
-  for (KeyframeId id : keyframes) {
-    if (!problem.is_pose_fixed[pose]) map.move_keyframe(id, problem.rig_from_world[pose]);
-    ++pose;
+  for (std::size_t i = 0; i < keyframes.size(); ++i) {
+    if (problem.is_pose_fixed[i]) continue;
+    correction.keyframes.push_back({keyframes[i], problem.rig_from_world[i]});
   }
   for (std::size_t i = 0; i < window.landmarks.size(); ++i) {
-    map.move_landmark(window.landmarks[i], problem.points[i]);
+    correction.landmarks.push_back({window.landmarks[i], problem.points[i]});
   }
+  return correction;
 }
 
 }  // namespace
@@ -173,30 +174,54 @@ bool is_supported(const Map& map, const Landmark& landmark) {
   return false;
 }
 
-std::vector<LandmarkId> adjust_window(Map& map,
-                                      const BundleWindow& window,
-                                      const BundleOptions& options,
-                                      DirtyLandmarks& dirty) {
-  std::vector<LandmarkId> erased;
-  if (window.moving.empty() || window.landmarks.empty()) return erased;
+WindowAdjustment compute_adjustment(const Map& map,
+                                    const BundleWindow& window,
+                                    const BundleOptions& options) {
   WindowProblem window_problem = make_problem(map, window);
   const BundleResult result = adjust_bundle(window_problem.problem, options);
-  write_back(map, window, window_problem.problem);
-  dirty.insert(window.landmarks.begin(), window.landmarks.end());
+  WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}};
   for (std::size_t i = 0; i < window_problem.observations.size(); ++i) {
-    if (!result.is_outlier[i]) continue;
-    const auto& [keyframe, feature] = window_problem.observations[i];
+    if (result.is_outlier[i]) adjustment.outliers.push_back(window_problem.observations[i]);
+  }
+  return adjustment;
+}
+
+std::vector<LandmarkId> drop_outliers(Map& map,
+                                      std::span<const Observation> outliers,
+                                      std::span<const LandmarkId> landmarks,
+                                      DirtyLandmarks& dirty) {
+  for (const auto& [keyframe, feature] : outliers) {
     // A partner may have gone with its primary feature already.
-    if (!map.keyframes().at(keyframe).landmarks[feature].is_valid()) continue;
+    const Keyframe* observer = map.keyframes().find(keyframe);
+    if (!observer || !observer->landmarks[feature].is_valid()) continue;
+    dirty.insert(observer->landmarks[feature]);
     forget_with_partner(map, keyframe, feature);
   }
-  for (LandmarkId id : window.landmarks) {
-    if (is_supported(map, map.landmarks().at(id))) continue;
+  std::vector<LandmarkId> erased;
+  for (LandmarkId id : landmarks) {
+    const Landmark* landmark = map.landmarks().find(id);
+    if (!landmark || is_supported(map, *landmark)) continue;
     map.erase_landmark(id);
     dirty.erase(id);
     erased.push_back(id);
   }
   return erased;
+}
+
+std::vector<LandmarkId> adjust_window(Map& map,
+                                      const BundleWindow& window,
+                                      const BundleOptions& options,
+                                      DirtyLandmarks& dirty) {
+  if (window.moving.empty() || window.landmarks.empty()) return {};
+  const WindowAdjustment adjustment = compute_adjustment(map, window, options);
+  for (const auto& move : adjustment.correction.keyframes) {
+    map.move_keyframe(move.keyframe, move.rig_from_world);
+  }
+  for (const auto& move : adjustment.correction.landmarks) {
+    map.move_landmark(move.landmark, move.position_in_world);
+  }
+  dirty.insert(window.landmarks.begin(), window.landmarks.end());
+  return drop_outliers(map, adjustment.outliers, window.landmarks, dirty);
 }
 
 }  // namespace waymark

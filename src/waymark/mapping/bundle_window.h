@@ -5,6 +5,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/map/correction.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/optimize/bundle.h"
@@ -24,6 +25,24 @@ BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_ke
 
 /// A whole sub-map; its root is fixed.
 BundleWindow whole_submap(const Map& map, SubmapId submap);
+
+/// What adjusting a window finds.
+struct WindowAdjustment {
+  MapCorrection correction;           ///< Of all that moves, without scales.
+  std::vector<Observation> outliers;  ///< Ascending by landmark.
+};
+
+/// Adjusts a window and leaves the map as it is.
+WindowAdjustment compute_adjustment(const Map& map,
+                                    const BundleWindow& window,
+                                    const BundleOptions& options);
+
+/// Removes observations, where they still exist, and of the landmarks those without support.
+/// Returns the erased landmarks.
+std::vector<LandmarkId> drop_outliers(Map& map,
+                                      std::span<const Observation> outliers,
+                                      std::span<const LandmarkId> landmarks,
+                                      DirtyLandmarks& dirty);
 
 /// Adjusts a window, writes it back and drops the observations that turned out wrong, with the
 /// landmarks that lose their support. Returns the erased landmarks.

@@ -69,7 +69,10 @@ void Probation::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dir
   });
 }
 
-void cull_redundant_keyframes(Map& map, KeyframeId centre, DirtyLandmarks& dirty) {
+std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
+                                                 KeyframeId centre,
+                                                 DirtyLandmarks& dirty) {
+  std::vector<KeyframeId> erased;
   for (KeyframeId id : strongest_neighbours(map, centre, 30)) {
     const Keyframe* keyframe = map.keyframes().find(id);
     if (!keyframe || !keyframe->parent.is_valid() || map.has_loop_edge(id)) continue;
@@ -78,8 +81,10 @@ void cull_redundant_keyframes(Map& map, KeyframeId centre, DirtyLandmarks& dirty
       if (landmark.is_valid()) dirty.insert(landmark);
     }
     map.erase_keyframe(id);
+    erased.push_back(id);
   }
   std::erase_if(dirty, [&](LandmarkId id) { return !map.landmarks().contains(id); });
+  return erased;
 }
 
 }  // namespace waymark

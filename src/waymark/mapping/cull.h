@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <deque>
+#include <vector>
 
 #include "waymark/mapping/associate.h"
 
@@ -29,7 +30,9 @@ class Probation {
   std::deque<Entry> entries_;
 };
 
-/// Erases keyframes around one whose landmarks others see just as well.
-void cull_redundant_keyframes(Map& map, KeyframeId centre, DirtyLandmarks& dirty);
+/// Erases keyframes around one whose landmarks others see just as well. Returns them.
+std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
+                                                 KeyframeId centre,
+                                                 DirtyLandmarks& dirty);
 
 }  // namespace waymark

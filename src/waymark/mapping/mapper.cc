@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/mapper.h"
 
+#include <utility>
+
 #include "waymark/base/check.h"
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"
+#include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/triangulate.h"
 
 namespace waymark {
@@ -13,7 +16,7 @@ namespace waymark {
 Mapper::Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings)
     : rig_(rig), settings_(settings), projection_(rig) {}
 
-void Mapper::add(const NewSubmap& message) {
+Mapper::Changes Mapper::add(const NewSubmap& message) {
   const SubmapId submap = map_.add_submap(message.is_metric);
   std::vector<KeyframeId> ids;
   for (const InitialKeyframe& initial : message.keyframes) {
@@ -37,9 +40,10 @@ void Mapper::add(const NewSubmap& message) {
     dirty_.insert(id);
   }
   refresh_appearances();
+  return {std::move(ids), {}};
 }
 
-void Mapper::add(const NewKeyframe& message) {
+Mapper::Changes Mapper::add(const NewKeyframe& message) {
   const KeyframeId id = insert(message);
   probation_.review(map_, id.value, dirty_);
   const LandmarkId first_new = map_.landmarks().end_id();
@@ -53,8 +57,9 @@ void Mapper::add(const NewKeyframe& message) {
   const BundleWindow window =
       choose_window(map_, id, static_cast<std::size_t>(settings_.window_keyframes));
   adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 8}, dirty_);
-  cull_redundant_keyframes(map_, id, dirty_);
+  std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_);
   refresh_appearances();
+  return {{id}, std::move(erased)};
 }
 
 KeyframeId Mapper::insert(const NewKeyframe& message) {
@@ -96,8 +101,8 @@ void Mapper::refresh_appearances() {
 
 void Mapper::refine_globally() {
   for (std::uint32_t value = 0; value < map_.submaps().size(); ++value) {
-    const BundleWindow window = whole_submap(map_, SubmapId{value});
-    adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 20}, dirty_);
+    if (map_.submaps()[value].joined_into.is_valid()) continue;
+    apply_adjustment(map_, adjust_globally(map_, SubmapId{value}), dirty_);
   }
   refresh_appearances();
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <vector>
 
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
@@ -20,10 +21,23 @@ class Mapper {
  public:
   Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings);
 
-  void add(const NewSubmap& message);
-  void add(const NewKeyframe& message);
+  /// What a message did to the keyframes.
+  struct Changes {
+    std::vector<KeyframeId> added;
+    std::vector<KeyframeId> erased;
+  };
+  Changes add(const NewSubmap& message);
+  Changes add(const NewKeyframe& message);
   /// Adjusts every sub-map as a whole.
   void refine_globally();
+
+  /// For what reaches beyond the surroundings of the newest keyframe: change(map, dirty), which
+  /// says what landmarks look different after it.
+  template <class Change>
+  void change(Change&& change) {
+    change(map_, dirty_);
+    refresh_appearances();
+  }
 
   std::shared_ptr<const Map> freeze() { return map_.freeze(); }
   const Map& map() const { return map_; }

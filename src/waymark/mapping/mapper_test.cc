@@ -75,7 +75,8 @@ Session run(const Setup& setup) {
     const PointObservation seen = observe(cloud, *rig, truth(static_cast<int>(i)), noise, i);
     StageTimes times;
     const Frame frame{FrameId{i}, 50'000'000 * std::int64_t{i}, seen.features};
-    TrackOutcome outcome = tracker.track(frame, visible, times);
+    TrackOutcome outcome =
+        tracker.track(frame, {visible, std::make_shared<const PlaceIndex>()}, times);
     memory.add(frame, outcome, *visible);
     if (outcome.num_inliers > 0 && !outcome.covariance.isZero()) {
       session.position_variances.push_back(outcome.covariance.topLeftCorner<3, 3>().trace());

@@ -1,0 +1,26 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <vector>
+
+#include "waymark/mapping/bundle_window.h"
+
+namespace waymark {
+
+/// What adjusting a whole sub-map finds, on a frozen map, for a map that has gone on since.
+struct GlobalAdjustment {
+  MapCorrection correction;
+  std::vector<Observation> outliers;
+  std::vector<LandmarkId> landmarks;  ///< That were adjusted, ascending.
+};
+
+/// Bundle adjustment over all of a sub-map; its root stays. In mono the scale around each keyframe
+/// is how much further away the landmarks that it sees are than before, in the median. Any thread;
+/// nothing is shared.
+GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
+
+/// Takes in what was found: moves what was known, lets what is younger follow, drops outliers.
+void apply_adjustment(Map& map, const GlobalAdjustment& adjustment, DirtyLandmarks& dirty);
+
+}  // namespace waymark
