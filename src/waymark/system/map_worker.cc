@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/system/map_worker.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace waymark {
@@ -18,9 +19,10 @@ MapWorker::MapWorker(Timing timing, Work work)
 
 MapWorker::~MapWorker() { stop(); }
 
-void MapWorker::send(FrameId visible_from, MapperMessage message) {
-  feed_.expect(visible_from);
-  Delivery delivery{visible_from, std::move(message)};
+void MapWorker::send(FrameId visible_from, MapTask task) {
+  last_visible_from_ = std::max(last_visible_from_, visible_from);
+  feed_.expect(last_visible_from_);
+  Delivery delivery{last_visible_from_, std::move(task)};
   if (timing_ == Timing::kInline) {
     process(delivery);
   } else {
@@ -28,7 +30,9 @@ void MapWorker::send(FrameId visible_from, MapperMessage message) {
   }
 }
 
-std::shared_ptr<const Map> MapWorker::for_frame(FrameId frame) { return feed_.for_frame(frame); }
+std::shared_ptr<const PublishedMap> MapWorker::for_frame(FrameId frame) {
+  return feed_.for_frame(frame);
+}
 
 void MapWorker::finish() {
   stop();
@@ -36,7 +40,7 @@ void MapWorker::finish() {
 }
 
 void MapWorker::process(const Delivery& delivery) {
-  feed_.publish(delivery.visible_from, work_(delivery.message));
+  feed_.publish(delivery.visible_from, work_(delivery.task));
 }
 
 void MapWorker::run() {

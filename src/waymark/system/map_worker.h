@@ -4,41 +4,55 @@
 
 #include <functional>
 #include <memory>
+#include <optional>
 #include <thread>
 
 #include "waymark/base/feed.h"
 #include "waymark/base/mailbox.h"
 #include "waymark/base/timing.h"
-#include "waymark/map/map.h"
+#include "waymark/track/map_snapshot.h"
 #include "waymark/track/messages.h"
 
 namespace waymark {
 
-/// Takes the tracker's messages to the mapper, in a thread of its own unless the timing is kInline,
+/// What the mapper is to do at a frame: take in a message or, without one, the global adjustment
+/// that is due.
+struct MapTask {
+  FrameId frame;
+  std::optional<MapperMessage> message;
+};
+
+/// What the mapper shows after a task.
+struct PublishedMap {
+  MapSnapshot snapshot;
+  FrameId adjustment_due;  ///< When a global adjustment is to be taken in; invalid if none runs.
+};
+
+/// Takes tasks to the mapper, in a thread of its own unless the timing is kInline,
 /// and shows the maps that come of them at fixed frames. What the work throws reaches the caller:
 /// at once from send() in kInline, else from the next for_frame() that has to wait or from
 /// finish().
 class MapWorker {
  public:
-  /// The map after a message; called for one message after the other, in order.
-  using Work = std::function<std::shared_ptr<const Map>(const MapperMessage&)>;
+  /// The map after a task; called for one task after the other, in order.
+  using Work = std::function<std::shared_ptr<const PublishedMap>(const MapTask&)>;
 
   MapWorker(Timing timing, Work work);
   ~MapWorker();
   MapWorker(const MapWorker&) = delete;
   MapWorker& operator=(const MapWorker&) = delete;
 
-  /// The effect of the message shows from this frame on; frames ascend.
-  void send(FrameId visible_from, MapperMessage message);
+  /// The effect of the task shows from this frame on, but not before that of an earlier task.
+  void send(FrameId visible_from, MapTask task);
   /// The newest map that a frame may see, null before the first; frames ascend.
-  std::shared_ptr<const Map> for_frame(FrameId frame);
-  /// Waits until all messages are done and ends the thread. No send() afterwards.
+  std::shared_ptr<const PublishedMap> for_frame(FrameId frame);
+  /// Waits until all tasks are done and ends the thread. No send() afterwards.
   void finish();
 
  private:
   struct Delivery {
     FrameId visible_from;
-    MapperMessage message;
+    MapTask task;
   };
 
   void process(const Delivery& delivery);
@@ -47,7 +61,8 @@ class MapWorker {
 
   const Timing timing_;
   const Work work_;
-  Feed<Map> feed_;
+  FrameId last_visible_from_{0};
+  Feed<PublishedMap> feed_;
   Mailbox<Delivery> inbox_;
   std::jthread thread_;
 };

@@ -5,6 +5,7 @@
 #include <cstdint>
 
 #include "waymark/image/frame_builder.h"
+#include "waymark/loop/settings.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/track/settings.h"
 
@@ -14,12 +15,14 @@ namespace waymark {
 struct Settings {
   int seed = 0;
   int map_latency = 2;
+  int global_latency = 60;
   FeatureSettings features;
   StereoSettings stereo;
   DepthSettings depth;
   ViewSettings view;
   TrackingSettings tracking;
   MappingSettings mapping;
+  LoopSettings loop;
 
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
@@ -33,12 +36,20 @@ struct Settings {
                       .unit = "frames",
                       .help = "From sending a keyframe to seeing the map with it, except in real "
                               "time. More gives the mapper more time beside the tracker."});
+    field("global_latency",
+          self.global_latency,
+          SettingInfo{.low = 1,
+                      .high = 10000,
+                      .unit = "frames",
+                      .help = "From closing a loop to taking in the adjustment of all that it "
+                              "ties together, except in real time."});
     field("features", self.features, SettingInfo{.help = "Corners and descriptors."});
     field("stereo", self.stereo, SettingInfo{.help = "Search in the second camera's image."});
     field("depth", self.depth, SettingInfo{.help = "Depth images."});
     field("view", self.view, SettingInfo{.help = "Which directions are used."});
     field("tracking", self.tracking, SettingInfo{.help = "Pose of each frame."});
     field("mapping", self.mapping, SettingInfo{.help = "Landmarks and keyframes."});
+    field("loop", self.loop, SettingInfo{.help = "Places seen before."});
   }
 };
 

@@ -7,7 +7,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/image/frame_builder.h"
-#include "waymark/mapping/mapper.h"
+#include "waymark/loop/global_mapper.h"
+#include "waymark/system/adjustment_worker.h"
 #include "waymark/system/map_worker.h"
 #include "waymark/track/tracker.h"
 #include "waymark/track/trajectory_memory.h"
@@ -44,20 +45,24 @@ class System::Impl {
         timing_(checked(timing)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         memory_(rig_),
-        mapper_(rig_, settings.mapping),
-        worker_(timing, [this](const MapperMessage& message) { return process(message); }) {}
+        mapper_(rig_, settings.mapping, settings.loop, static_cast<std::uint64_t>(settings.seed)),
+        adjuster_(timing),
+        worker_(timing, [this](const MapTask& task) { return process(task); }) {}
 
   TrackingResult feed(const FrameInput& input);
   void finish();
   std::vector<TrajectoryFrame> trajectory() const;
   std::vector<FrameState> frame_states() const;
-  std::shared_ptr<const Map> map() const { return visible_map_; }
+  std::shared_ptr<const Map> map() const { return visible_.snapshot.map; }
   SystemStatistics statistics() const;
   const FocalCheck* focal_check() const;
 
  private:
+  void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
-  std::shared_ptr<const Map> process(const MapperMessage& message);
+  std::shared_ptr<const PublishedMap> process(const MapTask& task);
+  void add(const MapperMessage& message);
+  void finish_adjustment();
 
   // Fixed after construction.
   const std::shared_ptr<const Rig> rig_;
@@ -68,11 +73,15 @@ class System::Impl {
   FrameBuilder builder_;
   std::optional<Tracker> tracker_;
   TrajectoryMemory memory_;
-  std::shared_ptr<const Map> visible_map_ = std::make_shared<const Map>();
+  PublishedMap visible_;
+  FrameId last_due_;  ///< The global adjustment that was asked for last.
+  int num_relocalizations_ = 0;
   bool is_finished_ = false;
 
   // The mapper's thread, and the caller's once that has ended.
-  Mapper mapper_;
+  GlobalMapper mapper_;
+  AdjustmentWorker adjuster_;
+  FrameId adjustment_due_;
   std::vector<double> mapping_ms_;
 
   // Written once by the mapper's thread, before the first map that has_focal_check() is published.
@@ -104,10 +113,11 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   }
   {
     StageTimer timer(result.stages, Stage::kWait);
-    if (auto map = worker_.for_frame(id)) visible_map_ = std::move(map);
+    look_at_map(id);
   }
-  TrackOutcome outcome = tracker_->track(frame, visible_map_, result.stages);
-  memory_.add(frame, outcome, *visible_map_);
+  TrackOutcome outcome = tracker_->track(frame, visible_.snapshot, result.stages);
+  memory_.add(frame, outcome, *map());
+  num_relocalizations_ += outcome.is_relocalized;
   result.frame = id;
   result.state = outcome.state;
   result.reason = outcome.reason;
@@ -116,7 +126,7 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   result.num_matches = outcome.num_matches;
   result.num_inliers = outcome.num_inliers;
   result.is_keyframe = outcome.message.has_value();
-  result.submap = SubmapId{0};
+  result.submap = outcome.submap;
   if (outcome.message) {
     StageTimer timer(result.stages, timing_ == Timing::kInline ? Stage::kWait : Stage::kKeyframe);
     send(id, std::move(*outcome.message));
@@ -124,29 +134,56 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   return result;
 }
 
+void System::Impl::look_at_map(FrameId frame) {
+  if (const auto published = worker_.for_frame(frame)) visible_ = *published;
+  const FrameId due = visible_.adjustment_due;
+  if (!due.is_valid() || due > frame || due == last_due_) return;
+  last_due_ = due;
+  worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt});
+}
+
 void System::Impl::send(FrameId frame, MapperMessage message) {
   // A new sub-map is what the next frame is tracked in; a keyframe shows its effect later.
   const bool is_submap = std::holds_alternative<NewSubmap>(message);
   const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
-  worker_.send(FrameId{frame.value + latency}, std::move(message));
+  worker_.send(FrameId{frame.value + latency}, {frame, std::move(message)});
 }
 
-std::shared_ptr<const Map> System::Impl::process(const MapperMessage& message) {
+std::shared_ptr<const PublishedMap> System::Impl::process(const MapTask& task) {
+  if (task.message) {
+    add(*task.message);
+  } else {
+    finish_adjustment();
+  }
+  if (!adjuster_.is_busy()) {
+    if (auto adjustment = mapper_.take_task()) {
+      adjuster_.start(*std::move(adjustment));
+      adjustment_due_ =
+          FrameId{task.frame.value + static_cast<std::uint32_t>(settings_.global_latency)};
+    }
+  }
+  return std::make_shared<const PublishedMap>(PublishedMap{mapper_.snapshot(), adjustment_due_});
+}
+
+void System::Impl::finish_adjustment() {
+  const AdjustmentWorker::Result result = adjuster_.finish();
+  mapper_.apply(result.task, result.adjustment);
+  adjustment_due_ = FrameId{};
+}
+
+void System::Impl::add(const MapperMessage& message) {
   const auto start = std::chrono::steady_clock::now();
   std::visit([&](const auto& content) { mapper_.add(content); }, message);
   mapping_ms_.push_back(
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  auto map = mapper_.freeze();
-  if (!is_focal_checked_ && has_focal_check(*map)) {
-    is_focal_checked_ = true;
-    focal_check_ = check_focal_length(*map);
-  }
-  return map;
+  if (is_focal_checked_ || !has_focal_check(mapper_.map())) return;
+  is_focal_checked_ = true;
+  focal_check_ = check_focal_length(mapper_.map());
 }
 
 const FocalCheck* System::Impl::focal_check() const {
   // The map first: seeing it is what makes the result readable here.
-  if (!has_focal_check(*visible_map_) || !focal_check_) return nullptr;
+  if (!has_focal_check(*map()) || !focal_check_) return nullptr;
   return &*focal_check_;
 }
 
@@ -154,9 +191,10 @@ void System::Impl::finish() {
   if (is_finished_) return;
   is_finished_ = true;
   worker_.finish();
-  mapper_.refine_globally();
-  visible_map_ = mapper_.freeze();
-  memory_.settle(*visible_map_);
+  if (adjuster_.is_busy()) finish_adjustment();
+  mapper_.finish();
+  visible_.snapshot = mapper_.snapshot();
+  memory_.settle(*map());
 }
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {
@@ -165,14 +203,14 @@ std::vector<TrajectoryFrame> System::Impl::trajectory() const {
     const TrajectoryMemory::Entry& memory = memory_.entries()[i];
     const KeyframeId reference = memory.pose.reference;
     // The newest frames may refer to a keyframe that the visible map does not contain yet.
-    if (!has_pose(memory.state) || reference >= visible_map_->keyframes().end_id()) continue;
-    const Rigid3 rig_from_world = visible_map_->rig_from_world(
+    if (!has_pose(memory.state) || reference >= map()->keyframes().end_id()) continue;
+    const Rigid3 rig_from_world = map()->rig_from_world(
         reference, memory.pose.rig_from_reference, memory.pose.reference_scale);
-    const KeyframeId living = visible_map_->resolve(reference);
+    const KeyframeId living = map()->resolve(reference);
     frames.push_back({FrameId{i},
                       memory.timestamp_ns,
                       memory.state,
-                      visible_map_->keyframes().at(living).submap,
+                      map()->keyframes().at(living).submap,
                       rig_from_world.inverse()});
   }
   return frames;
@@ -187,9 +225,13 @@ std::vector<FrameState> System::Impl::frame_states() const {
 SystemStatistics System::Impl::statistics() const {
   WAYMARK_CHECK(is_finished_);
   SystemStatistics statistics;
-  statistics.num_keyframes = static_cast<int>(visible_map_->keyframes().size());
-  statistics.num_landmarks = static_cast<int>(visible_map_->landmarks().size());
-  statistics.num_submaps = static_cast<int>(visible_map_->submaps().size());
+  statistics.num_keyframes = static_cast<int>(map()->keyframes().size());
+  statistics.num_landmarks = static_cast<int>(map()->landmarks().size());
+  for (const Submap& submap : map()->submaps()) {
+    statistics.num_submaps += !submap.joined_into.is_valid();
+  }
+  statistics.num_loops = mapper_.num_loops();
+  statistics.num_relocalizations = num_relocalizations_;
   statistics.mapping_ms = mapping_ms_;
   return statistics;
 }

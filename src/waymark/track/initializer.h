@@ -44,6 +44,8 @@ class Initializer {
   Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed);
 
   std::optional<Initialization> add(const Frame& frame);
+  /// Forgets the frames added so far.
+  void reset() { references_.clear(), passed_.clear(); }
   /// Why the last add() gave nothing.
   FrameReason reason() const { return reason_; }
 

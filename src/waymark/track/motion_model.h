@@ -25,8 +25,11 @@ class MotionModel {
     has_pose_ = true;
   }
 
-  /// The same pose in a map that was corrected since.
-  void move_last(const Rigid3& rig_from_world) { rig_from_world_ = rig_from_world; }
+  /// The same pose in a map that was corrected since, whose lengths were multiplied by scale.
+  void move_last(const Rigid3& rig_from_world, double scale) {
+    rig_from_world_ = rig_from_world;
+    motion_.head<3>() *= scale;
+  }
 
   Rigid3 predict(std::int64_t timestamp_ns) const {
     if (!has_velocity_) return rig_from_world_;

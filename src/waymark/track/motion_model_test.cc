@@ -29,8 +29,12 @@ TEST(MotionModel, KeepsTheVelocityWhenTheMapMoves) {
   model.update(0, Rigid3());
   model.update(100, Rigid3::exp(kMotion));
   const Rigid3 moved(Eigen::Quaterniond::Identity(), {1.0, 2.0, 3.0});
-  model.move_last(moved);
+  model.move_last(moved, 1.0);
   EXPECT_TRUE(model.predict(200).matrix().isApprox((Rigid3::exp(kMotion) * moved).matrix(), 1e-12));
+  model.move_last(moved, 2.0);
+  Vector6d larger = kMotion;
+  larger.head<3>() *= 2.0;
+  EXPECT_TRUE(model.predict(200).matrix().isApprox((Rigid3::exp(larger) * moved).matrix(), 1e-12));
 }
 
 TEST(MotionModel, ForgetsOnReset) {

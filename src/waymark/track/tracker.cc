@@ -19,6 +19,10 @@ constexpr int kMaxLocalMapAge = 5;
 /// Landmarks that so many keyframes see, or all in a young map, count as established.
 constexpr std::size_t kEstablishedObservers = 3;
 constexpr std::uint32_t kRecoveryKeyframes = 12;
+/// Frames after a loss in which the camera is looked for near where it was.
+constexpr int kRecoveryFrames = 30;
+/// Frames after a loss until a single one with range may start a new sub-map.
+constexpr int kPatience = 5;
 
 }  // namespace
 
@@ -32,10 +36,12 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
       initializer_(rig, has_range, seed),
       matcher_(rig),
-      locator_(rig) {}
+      locator_(rig),
+      relocalizer_(rig, settings, seed) {}
 
-TrackOutcome Tracker::track(const Frame& frame, std::shared_ptr<const Map> map, StageTimes& times) {
-  map_ = std::move(map);
+TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, StageTimes& times) {
+  map_ = visible.map;
+  places_ = visible.places;
   TrackOutcome outcome =
       mode_ == Mode::kInitializing ? initialize(frame, times) : follow(frame, times);
   if (!outcome.pose) return outcome;
@@ -48,22 +54,30 @@ TrackOutcome Tracker::track(const Frame& frame, std::shared_ptr<const Map> map, 
 
 TrackOutcome Tracker::initialize(const Frame& frame, StageTimes& times) {
   StageTimer timer(times, Stage::kInitialize);
+  if (auto started = start_submap(frame)) return *std::move(started);
   TrackOutcome outcome;
   outcome.state = FrameState::kInitializing;
-  std::optional<Initialization> start = initializer_.add(frame);
   outcome.reason = initializer_.reason();
-  if (!start) return outcome;
-  const std::uint32_t first_id = num_sent_;
+  return outcome;
+}
+
+std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame) {
+  std::optional<Initialization> start = initializer_.add(frame);
+  if (!start) return std::nullopt;
+  initializer_.reset();
+  submap_start_ = num_sent_;
   num_sent_ += static_cast<std::uint32_t>(start->submap.keyframes.size());
+  TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
   outcome.pose = RelativePose{KeyframeId{num_sent_ - 1}, Rigid3{}, 1.0};
   outcome.rig_from_world = start->rig_from_world;
   outcome.num_matches = outcome.num_inliers = static_cast<int>(start->submap.landmarks.size());
   outcome.filled = std::move(start->filled);
   for (FilledPose& filled : outcome.filled) {
-    filled.pose.reference = KeyframeId{first_id + filled.pose.reference.value};
+    filled.pose.reference = KeyframeId{submap_start_ + filled.pose.reference.value};
   }
   outcome.message = std::move(start->submap);
+  outcome.submap = SubmapId{num_submaps_++};
   landmarks_.clear();  // They have no ids yet; carry_over() takes them from the keyframe.
   last_keyframe_frame_ = frame.id;
   mode_ = Mode::kTracking;
@@ -71,34 +85,50 @@ TrackOutcome Tracker::initialize(const Frame& frame, StageTimes& times) {
 }
 
 TrackOutcome Tracker::follow(const Frame& frame, StageTimes& times) {
-  WAYMARK_CHECK(map_ != nullptr);
-  if (frame.features->num_primary == 0) return lose(frame, FrameReason::kNoFeatures);
+  if (frame.features->num_primary == 0) return lose(frame, FrameReason::kNoFeatures, times);
+  std::optional<LocatedFrame> located = locate_near_last(frame, times);
+  if (!located) located = relocalize(frame, times);
+  if (!located) return lose(frame, relocalizer_.reason(), times);
+  StageTimer timer(times, Stage::kKeyframe);
+  return accept(frame, *located);
+}
+
+std::optional<LocatedFrame> Tracker::locate_near_last(const Frame& frame, StageTimes& times) {
   std::optional<LocatedFrame> located;
   if (mode_ == Mode::kTracking) {
     StageTimer timer(times, Stage::kPredict);
     carry_over();
     located = locate_from_last(frame);
   }
-  if (!located) {
+  if (!located && num_lost_ < kRecoveryFrames) {
     StageTimer timer(times, Stage::kRecover);
     located = recover(frame);
   }
-  if (!located) return lose(frame, FrameReason::kTooFewMatches);
-  {
-    StageTimer timer(times, Stage::kLocalMap);
-    located = locate_in_local_map(frame, *located);
-  }
-  if (located->num_inliers < settings_.min_inliers) return lose(frame, FrameReason::kTooFewInliers);
-  StageTimer timer(times, Stage::kKeyframe);
-  return accept(frame, *located);
+  if (!located) return std::nullopt;
+  StageTimer timer(times, Stage::kLocalMap);
+  located = locate_in_local_map(frame, *located);
+  if (located->num_inliers < settings_.min_inliers) return std::nullopt;
+  return located;
+}
+
+std::optional<LocatedFrame> Tracker::relocalize(const Frame& frame, StageTimes& times) {
+  StageTimer timer(times, Stage::kRecover);
+  const auto located = relocalizer_.locate(frame, *map_, *places_, landmarks_);
+  if (!located) return std::nullopt;
+  local_map_source_.reset();
+  const LocatedFrame refined = locate_in_local_map(frame, *located);
+  if (refined.num_inliers < settings_.min_inliers) return std::nullopt;
+  return refined;
 }
 
 void Tracker::carry_over() {
   if (last_landmarks_.empty())
     last_landmarks_ = map_->keyframes().at(last_pose_.reference).landmarks;
   for (LandmarkId& id : last_landmarks_) id = map_->resolve(id);
-  motion_.move_last(map_->rig_from_world(
-      last_pose_.reference, last_pose_.rig_from_reference, last_pose_.reference_scale));
+  motion_.move_last(
+      map_->rig_from_world(
+          last_pose_.reference, last_pose_.rig_from_reference, last_pose_.reference_scale),
+      map_->scale_since(last_pose_.reference, last_pose_.reference_scale));
 }
 
 std::optional<LocatedFrame> Tracker::locate_from_last(const Frame& frame) {
@@ -141,10 +171,15 @@ std::optional<LocatedFrame> Tracker::locate_near_keyframe(const Frame& frame, Ke
 }
 
 std::optional<LocatedFrame> Tracker::recover(const Frame& frame) {
+  const SubmapId submap = map_->keyframes().at(map_->resolve(last_pose_.reference)).submap;
   std::uint32_t tried = 0;
   for (std::uint32_t value = map_->keyframes().end_id().value; value-- > 0;) {
-    if (!map_->keyframes().find(KeyframeId{value})) continue;
-    if (auto located = locate_near_keyframe(frame, KeyframeId{value})) return located;
+    const Keyframe* keyframe = map_->keyframes().find(KeyframeId{value});
+    if (!keyframe || keyframe->submap != submap) continue;
+    if (auto located = locate_near_keyframe(frame, KeyframeId{value})) {
+      local_map_source_.reset();
+      return located;
+    }
     if (++tried == kRecoveryKeyframes) break;
   }
   return std::nullopt;
@@ -198,9 +233,12 @@ void Tracker::count_sightings(const ProjectionMatches& matches) {
 }
 
 TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
-  mode_ = Mode::kTracking;
   TrackOutcome outcome;
+  outcome.is_relocalized = mode_ == Mode::kLost;
+  mode_ = Mode::kTracking;
+  num_lost_ = 0;
   outcome.state = FrameState::kTracked;
+  outcome.submap = map_->keyframes().at(local_.reference).submap;
   outcome.rig_from_world = located.rig_from_world;
   outcome.covariance = located.covariance;
   outcome.num_matches = located.num_matches;
@@ -217,9 +255,20 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
   return outcome;
 }
 
-TrackOutcome Tracker::lose(const Frame&, FrameReason reason) {
-  mode_ = Mode::kLost;
-  motion_.reset();
+TrackOutcome Tracker::lose(const Frame& frame, FrameReason reason, StageTimes& times) {
+  if (mode_ != Mode::kLost) {
+    mode_ = Mode::kLost;
+    num_lost_ = 0;
+    motion_.reset();
+    initializer_.reset();
+  }
+  ++num_lost_;
+  // With keyframes outstanding a new sub-map could not show in the next frame.
+  const bool is_up_to_date = num_sent_ == map_->keyframes().end_id().value;
+  if (is_up_to_date && (!has_range_ || num_lost_ > kPatience)) {
+    StageTimer timer(times, Stage::kInitialize);
+    if (auto started = start_submap(frame)) return *std::move(started);
+  }
   TrackOutcome outcome;
   outcome.state = FrameState::kLost;
   outcome.reason = reason;
@@ -228,7 +277,8 @@ TrackOutcome Tracker::lose(const Frame&, FrameReason reason) {
 
 KeyframeSituation Tracker::assess(const Frame& frame, const LocatedFrame& located) const {
   const Keyframe& reference = map_->keyframes().at(local_.reference);
-  const std::size_t established = std::min(kEstablishedObservers, map_->keyframes().size());
+  const std::size_t age = map_->keyframes().end_id().value - submap_start_;
+  const std::size_t established = std::min(kEstablishedObservers, age);
   KeyframeSituation situation;
   situation.has_range = has_range_;
   situation.num_pending = num_sent_ - map_->keyframes().end_id().value;

@@ -15,9 +15,11 @@
 #include "waymark/track/initializer.h"
 #include "waymark/track/keyframe_decision.h"
 #include "waymark/track/local_map.h"
+#include "waymark/track/map_snapshot.h"
 #include "waymark/track/messages.h"
 #include "waymark/track/motion_model.h"
 #include "waymark/track/pose_refiner.h"
+#include "waymark/track/relocalizer.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
@@ -35,12 +37,15 @@ struct TrackOutcome {
   std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
   std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
   std::vector<SeenLandmark> seen;        ///< What the pose rests on.
+  SubmapId submap;                       ///< Where there is a pose.
+  bool is_relocalized = false;           ///< Found again after a loss.
 };
 
 /// Follows the camera through the map, frame by frame (Klein and Murray 2007; Mur-Artal et al.
-/// 2015): predict, match to the last frame, match to the local map, decide on a keyframe. Reads
-/// frozen maps, writes messages. The mapper must take the messages in order and give keyframes
-/// consecutive ids from 0.
+/// 2015): predict, match to the last frame, match to the local map, decide on a keyframe. A lost
+/// frame is looked for in every sub-map; if no place looks like it, it helps to start a new one.
+/// Reads frozen maps, writes messages. The mapper must take the messages in order and give
+/// keyframes and sub-maps consecutive ids from 0; a new sub-map must show in the next frame.
 class Tracker {
  public:
   Tracker(std::shared_ptr<const Rig> rig,
@@ -48,24 +53,30 @@ class Tracker {
           const TrackingSettings& settings,
           std::uint64_t seed);
 
-  /// map: the newest one that this frame may see; null before the first sub-map.
-  TrackOutcome track(const Frame& frame, std::shared_ptr<const Map> map, StageTimes& times);
+  /// visible: the newest map that this frame may see; empty before the first sub-map.
+  TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
 
  private:
   enum class Mode { kInitializing, kTracking, kLost };
 
   TrackOutcome initialize(const Frame& frame, StageTimes& times);
+  /// The first pose of a new sub-map, if this frame completes one.
+  std::optional<TrackOutcome> start_submap(const Frame& frame);
   TrackOutcome follow(const Frame& frame, StageTimes& times);
+  std::optional<LocatedFrame> locate_near_last(const Frame& frame, StageTimes& times);
   /// Reads the last frame's pose and landmarks in the map of this frame.
   void carry_over();
   std::optional<LocatedFrame> locate_from_last(const Frame& frame);
   std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
+  /// Among the newest keyframes of the sub-map it was in.
   std::optional<LocatedFrame> recover(const Frame& frame);
+  /// Anywhere in the map.
+  std::optional<LocatedFrame> relocalize(const Frame& frame, StageTimes& times);
   LocatedFrame locate_in_local_map(const Frame& frame, const LocatedFrame& first);
   void refresh_local_map(const Frame& frame);
   void count_sightings(const ProjectionMatches& matches);
   TrackOutcome accept(const Frame& frame, const LocatedFrame& located);
-  TrackOutcome lose(const Frame& frame, FrameReason reason);
+  TrackOutcome lose(const Frame& frame, FrameReason reason, StageTimes& times);
   KeyframeSituation assess(const Frame& frame, const LocatedFrame& located) const;
   NewKeyframe make_keyframe(const Frame& frame, const RelativePose& pose);
   std::vector<Sighting> take_sightings();
@@ -78,9 +89,12 @@ class Tracker {
   ProjectionMatcher matcher_;
   AppearanceMatcher appearance_;
   FrameLocator locator_;
+  Relocalizer relocalizer_;
 
   Mode mode_ = Mode::kInitializing;
+  int num_lost_ = 0;  ///< Frames since the loss.
   std::shared_ptr<const Map> map_;
+  std::shared_ptr<const PlaceIndex> places_;
   LocalMap local_;
   std::shared_ptr<const Map> local_map_source_;
   int local_map_age_ = 0;
@@ -91,7 +105,9 @@ class Tracker {
   std::vector<LandmarkId> landmarks_;       ///< Per feature of this frame.
   std::vector<Sighting> sightings_;
   FrameId last_keyframe_frame_;
-  std::uint32_t num_sent_ = 0;  ///< Keyframes sent to the mapper.
+  std::uint32_t num_sent_ = 0;      ///< Keyframes sent to the mapper.
+  std::uint32_t num_submaps_ = 0;   ///< Sub-maps sent to the mapper.
+  std::uint32_t submap_start_ = 0;  ///< First keyframe of the sub-map, if that is a new one.
   LandmarkSet last_set_;
   std::vector<std::uint8_t> is_taken_;
 };

@@ -31,7 +31,7 @@ class TrackerTest : public ::testing::Test {
     const Frame frame{FrameId{number},
                       50'000'000 * std::int64_t{number},
                       std::make_shared<const Features>(features)};
-    return tracker_.track(frame, map_, times);
+    return tracker_.track(frame, {map_, std::make_shared<const PlaceIndex>()}, times);
   }
 
   /// Tracks a view and lets the mapper answer.

@@ -1,0 +1,76 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/global_mapper.h"
+
+#include <utility>
+
+#include "waymark/loop/loop_closing.h"
+
+namespace waymark {
+
+GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
+                           const MappingSettings& mapping,
+                           const LoopSettings& loop,
+                           std::uint64_t seed)
+    : settings_(loop), mapper_(rig, mapping), finder_(rig, seed), projection_(rig) {}
+
+void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(message)); }
+
+void GlobalMapper::add(const NewKeyframe& message) {
+  const Mapper::Changes changes = mapper_.add(message);
+  update_places(changes);
+  if (settings_.enabled) close_loop_at(changes.added.back());
+}
+
+void GlobalMapper::update_places(const Mapper::Changes& changes) {
+  for (const KeyframeId id : changes.added) {
+    const Keyframe& keyframe = mapper_.map().keyframes().at(id);
+    places_.add(id, keyframe.submap, keyframe.features->descriptors);
+  }
+  for (const KeyframeId id : changes.erased) places_.erase(id);
+}
+
+bool GlobalMapper::close_loop_at(KeyframeId query) {
+  const std::optional<Revisit> revisit = finder_.find(mapper_.map(), places_, query);
+  if (!revisit) return false;
+  const auto& keyframes = mapper_.map().keyframes();
+  const bool is_join = keyframes.at(revisit->query).submap != keyframes.at(revisit->match).submap;
+  mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+    if (is_join) {
+      join_submaps(map, places_, *revisit, projection_, dirty);
+    } else {
+      close_loop(map, *revisit, projection_, dirty);
+    }
+  });
+  num_loops_ += !is_join;
+  ++num_closures_;
+  unadjusted_ = mapper_.map().keyframes().at(query).submap;
+  return true;
+}
+
+std::optional<AdjustmentTask> GlobalMapper::take_task() {
+  if (!unadjusted_.is_valid()) return std::nullopt;
+  const SubmapId submap = mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
+  return AdjustmentTask{mapper_.freeze(), submap, num_closures_};
+}
+
+void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment) {
+  if (task.num_closures != num_closures_) return;
+  mapper_.change(
+      [&](Map& map, DirtyLandmarks& dirty) { apply_adjustment(map, adjustment, dirty); });
+}
+
+void GlobalMapper::finish() {
+  const std::uint32_t end = mapper_.map().keyframes().end_id().value;
+  if (settings_.enabled && end > 0) {
+    const KeyframeId newest{end - 1};
+    if (mapper_.map().keyframes().contains(newest)) close_loop_at(newest);
+  }
+  mapper_.refine_globally();
+}
+
+MapSnapshot GlobalMapper::snapshot() {
+  return {mapper_.freeze(), std::make_shared<const PlaceIndex>(places_)};
+}
+
+}  // namespace waymark

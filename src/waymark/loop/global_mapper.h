@@ -1,0 +1,61 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+
+#include "waymark/loop/loop_finder.h"
+#include "waymark/loop/settings.h"
+#include "waymark/mapping/global_adjustment.h"
+#include "waymark/mapping/mapper.h"
+#include "waymark/track/map_snapshot.h"
+
+namespace waymark {
+
+/// The sub-map that is to be adjusted as a whole, as it was when that was decided. Immutable.
+struct AdjustmentTask {
+  std::shared_ptr<const Map> map;
+  SubmapId submap;
+  std::uint32_t num_closures = 0;  ///< Loops closed and sub-maps joined before.
+};
+
+/// The mapper with all that reaches beyond the surroundings of the newest keyframe: finds places
+/// seen before, closes loops and joins sub-maps at once by a pose graph, and has the rest adjusted
+/// later by whoever runs the tasks it hands out.
+class GlobalMapper {
+ public:
+  GlobalMapper(std::shared_ptr<const Rig> rig,
+               const MappingSettings& mapping,
+               const LoopSettings& loop,
+               std::uint64_t seed);
+
+  void add(const NewSubmap& message);
+  void add(const NewKeyframe& message);
+  /// The adjustment that a loop made necessary, once for each; nothing where there is none.
+  std::optional<AdjustmentTask> take_task();
+  /// Takes in what a task gave, unless a loop was closed meanwhile: then a new task follows.
+  void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
+  /// The end: looks for loops a last time and adjusts every sub-map.
+  void finish();
+
+  const Map& map() const { return mapper_.map(); }
+  MapSnapshot snapshot();
+  int num_loops() const { return num_loops_; }
+
+ private:
+  void update_places(const Mapper::Changes& changes);
+  bool close_loop_at(KeyframeId query);
+
+  const LoopSettings settings_;
+  Mapper mapper_;
+  PlaceIndex places_;
+  LoopFinder finder_;
+  ProjectionMatcher projection_;
+  SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
+  std::uint32_t num_closures_ = 0;
+  int num_loops_ = 0;
+};
+
+}  // namespace waymark
