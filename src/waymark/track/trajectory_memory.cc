@@ -5,6 +5,13 @@
 #include <utility>
 
 namespace waymark {
+namespace {
+
+bool has_pose(const TrajectoryMemory::Entry& entry) {
+  return entry.state == FrameState::kTracked || entry.state == FrameState::kFilled;
+}
+
+}  // namespace
 
 void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, const Map& map) {
   RelativePose pose = outcome.pose.value_or(RelativePose{});
@@ -12,6 +19,8 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
   if (outcome.keyframe) pose = {*outcome.keyframe, Rigid3{}, pose.reference_scale};
   entries_.push_back({frame.timestamp_ns, outcome.state, pose});
   if (!outcome.seen.empty()) unsettled_.push_back({frame.id, outcome.seen, nullptr});
+  if (!outcome.pose) unposed_.push_back({frame.id, frame.features});
+  if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
   for (const FilledPose& filled : outcome.filled) {
     Entry& entry = entries_.at(filled.frame.value);
     entry.state = FrameState::kFilled;
@@ -27,6 +36,8 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
 void TrajectoryMemory::settle(const Map& map) {
   for (const Unsettled& unsettled : unsettled_) settle(unsettled, map);
   unsettled_.clear();
+  fill_gaps(map);
+  unposed_.clear();
 }
 
 void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
@@ -42,6 +53,41 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
           : refiner_.refine(map, unsettled.seen, guess);
   if (!refined) return;
   pose = {living, *refined * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
+}
+
+void TrajectoryMemory::fill_gaps(const Map& map) {
+  for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, map);
+  for (const Unposed& unposed : unposed_) fill(unposed, -1, map);
+}
+
+void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
+  Entry& entry = entries_.at(unposed.frame.value);
+  const std::int64_t neighbour = std::int64_t{unposed.frame.value} + step;
+  if (has_pose(entry) || neighbour < 0 || neighbour >= std::ssize(entries_)) return;
+  const Entry& known = entries_[static_cast<std::size_t>(neighbour)];
+  if (!has_pose(known)) return;
+  const KeyframeId living = map.resolve(known.pose.reference);
+  const Keyframe& keyframe = map.keyframes().at(living);
+  const Rigid3 near = *rig_from_world(neighbour, keyframe.submap, map);
+  // The motion between the two frames beyond goes on.
+  const auto beyond = rig_from_world(neighbour + step, keyframe.submap, map);
+  const Rigid3 guess = beyond ? near * beyond->inverse() * near : near;
+  const auto seen = refiner_.find(map, living, *unposed.features, guess);
+  const auto found = refiner_.refine(map, seen, guess);
+  if (!found) return;
+  entry.state = FrameState::kFilled;
+  entry.pose = {living, *found * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
+}
+
+std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t frame,
+                                                       SubmapId submap,
+                                                       const Map& map) const {
+  if (frame < 0 || frame >= std::ssize(entries_)) return std::nullopt;
+  const Entry& entry = entries_[static_cast<std::size_t>(frame)];
+  if (!has_pose(entry)) return std::nullopt;
+  const RelativePose& pose = entry.pose;
+  if (map.keyframes().at(map.resolve(pose.reference)).submap != submap) return std::nullopt;
+  return map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
 }
 
 }  // namespace waymark

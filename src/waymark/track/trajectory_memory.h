@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <deque>
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "waymark/track/pose_refiner.h"
@@ -13,11 +14,13 @@
 namespace waymark {
 
 /// What is remembered of every frame: its state, its pose relative to a keyframe, and, until the
-/// map around it has settled, what it saw. Of that the newest kMaxUnsettled frames at most, so that
-/// memory per frame stays small in sessions of any length.
+/// map around it has settled, what it saw. Of that the newest kMaxUnsettled frames at most, and of
+/// frames without a pose the newest kMaxUnposed, so that memory per frame stays small in sessions
+/// of any length.
 class TrajectoryMemory {
  public:
   static constexpr std::size_t kMaxUnsettled = 2000;
+  static constexpr std::size_t kMaxUnposed = 300;
 
   struct Entry {
     std::int64_t timestamp_ns = 0;
@@ -29,7 +32,8 @@ class TrajectoryMemory {
 
   /// Adds the next frame; map is the one it was tracked in.
   void add(const Frame& frame, const TrackOutcome& outcome, const Map& map);
-  /// Finds the poses of all unsettled frames again in the final map.
+  /// Finds the poses of all unsettled frames again in the final map, and from there those of the
+  /// frames before and after them that had none.
   void settle(const Map& map);
 
   const std::vector<Entry>& entries() const { return entries_; }
@@ -42,10 +46,21 @@ class TrajectoryMemory {
     std::shared_ptr<const Features> features;  ///< Of a frame filled in later.
   };
 
+  /// A frame that had no pose when it was tracked.
+  struct Unposed {
+    FrameId frame;
+    std::shared_ptr<const Features> features;
+  };
+
   void settle(const Unsettled& unsettled, const Map& map);
+  void fill_gaps(const Map& map);
+  /// Looks for a frame near its neighbour, one step (1 or -1 frames) away.
+  void fill(const Unposed& unposed, int step, const Map& map);
+  std::optional<Rigid3> rig_from_world(std::int64_t frame, SubmapId submap, const Map& map) const;
 
   std::vector<Entry> entries_;
   std::deque<Unsettled> unsettled_;
+  std::deque<Unposed> unposed_;
   PoseRefiner refiner_;
 };
 

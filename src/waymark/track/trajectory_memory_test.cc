@@ -71,6 +71,24 @@ TEST_F(TrajectoryMemoryTest, SettlesFilledFramesByWhatTheirFeaturesShow) {
   EXPECT_LT(error_m(2), 0.01);
 }
 
+TEST_F(TrajectoryMemoryTest, FillsGapsFromBothSides) {
+  memory_.add(frame(1), TrackOutcome{}, scene_.map);
+  memory_.add(frame(2), TrackOutcome{}, scene_.map);
+  add_stale(3);
+  memory_.add(frame(4), TrackOutcome{}, scene_.map);
+  Frame blind = frame(5);
+  blind.features = std::make_shared<const Features>();
+  memory_.add(blind, TrackOutcome{}, scene_.map);
+  memory_.add(frame(6), TrackOutcome{}, scene_.map);
+  memory_.settle(scene_.map);
+  for (const std::uint32_t number : {1u, 2u, 4u}) {
+    EXPECT_EQ(memory_.entries()[number].state, FrameState::kFilled) << number;
+    EXPECT_LT(error_m(number), 0.01) << number;
+  }
+  EXPECT_EQ(memory_.entries()[5].state, FrameState::kLost);
+  EXPECT_EQ(memory_.entries()[6].state, FrameState::kLost) << "nothing known beside it";
+}
+
 TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
