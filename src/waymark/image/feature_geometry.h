@@ -1,0 +1,21 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "waymark/camera/rig.h"
+#include "waymark/image/features.h"
+
+namespace waymark {
+
+/// Fills in what follows from the keypoints and the cameras: bearings, level_pixel_from_bearing,
+/// size_rad and the grid of the primary features. For features that do not come from images: those
+/// of FrameBuilder are the same bits for camera 0, and for camera 1, whose pixels it knows to more
+/// digits than keypoints have, the same but for rounding. num_primary and the keypoints must be
+/// there, and the cameras of the keypoints in the rig. Gives per keypoint whether its pixel has a
+/// bearing; where it has none, what was filled in is unspecified.
+std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features);
+
+}  // namespace waymark
