@@ -5,35 +5,37 @@
 #include <algorithm>
 
 #include "waymark/optimize/locate.h"
+#include "waymark/track/place_confidence.h"
 
 namespace waymark {
 namespace {
 
 /// The candidate and those that share most landmarks with it.
-constexpr std::size_t kNumMatchedKeyframes = 4;
+constexpr std::size_t kNumMatchedKeyframes = 3;
 constexpr AppearanceOptions kAppearance = {.max_distance = 60, .max_ratio = 0.85};
 /// Fewer matches, or fewer that agree on a pose, are chance more often than not.
-constexpr std::size_t kMinMatches = 15;
-constexpr std::size_t kMinConsensus = 12;
-constexpr double kMinInlierRatio = 0.15;
+constexpr std::size_t kMinMatches = 20;
+constexpr std::size_t kMinConsensus = 15;
+constexpr double kMinInlierRatio = 0.2;
 /// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
 constexpr double kFirstRadiusPx = 12.0;
 constexpr double kSecondRadiusPx = 5.0;
-/// What a pose must rest on, and the part of what should be seen that must be.
+/// Laxer than in tracking: light and cameras may have changed, and a few wrong ones do no harm.
+constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio = 0.9};
 constexpr int kMinInliers = 30;
-constexpr double kMinFoundRatio = 0.2;
 
-std::vector<KeyframeId> with_strongest_neighbours(const Map& map, KeyframeId candidate) {
+void collect_strongest_neighbours(const Map& map,
+                                  KeyframeId candidate,
+                                  std::vector<KeyframeId>& keyframes) {
   std::vector<CovisibilityEdge> edges = map.covisible(candidate);
   std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
     return a.num_shared > b.num_shared;
   });
-  std::vector<KeyframeId> keyframes = {candidate};
+  keyframes = {candidate};
   for (const CovisibilityEdge& edge : edges) {
     if (keyframes.size() == kNumMatchedKeyframes) break;
     keyframes.push_back(edge.keyframe);
   }
-  return keyframes;
 }
 
 /// The landmarks that primary features show, ascending.
@@ -61,7 +63,8 @@ std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  KeyframeId candidate,
                                                  std::uint64_t stream,
                                                  std::vector<LandmarkId>& landmarks) {
-  if (match_by_appearance(features, map, candidate, landmarks) < kMinMatches) return std::nullopt;
+  collect_strongest_neighbours(map, candidate, matched_keyframes_);
+  if (match_by_appearance(features, map, landmarks) < kMinMatches) return std::nullopt;
   const std::optional<Rigid3> consensus = find_consensus(features, map, stream, landmarks);
   if (!consensus) return std::nullopt;
   collect_found(features, landmarks, found_);
@@ -72,22 +75,19 @@ std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
   collect_found(features, landmarks, found_);
   gather_local_map(map, found_, candidate, local_);
   place.frame = match_around(features, map, place.frame.rig_from_world, kSecondRadiusPx, landmarks);
+  if (place.frame.num_inliers < kMinInliers) return std::nullopt;
   place.reference = local_.reference;
-  count_expected(features, landmarks, place);
-  if (place.frame.num_inliers < kMinInliers || place.found_ratio() < kMinFoundRatio) {
-    return std::nullopt;
-  }
+  place.confidence = place_confidence(
+      *rig_, features, landmarks, map, place.reference, place.frame.rig_from_world);
+  if (place.confidence < kMinConfidence) return std::nullopt;
   return place;
 }
 
 std::size_t PlaceLocator::match_by_appearance(const Features& features,
                                               const Map& map,
-                                              KeyframeId candidate,
                                               std::vector<LandmarkId>& landmarks) {
   matches_.clear();
-  for (KeyframeId keyframe : with_strongest_neighbours(map, candidate)) {
-    match_keyframe(features, map, keyframe);
-  }
+  for (KeyframeId keyframe : matched_keyframes_) match_keyframe(features, map, keyframe);
   std::sort(matches_.begin(), matches_.end(), [](const LandmarkMatch& a, const LandmarkMatch& b) {
     if (a.distance != b.distance) return a.distance < b.distance;
     return a.feature != b.feature ? a.feature < b.feature : a.landmark < b.landmark;
@@ -131,7 +131,10 @@ std::optional<Rigid3> PlaceLocator::find_consensus(const Features& features,
   RansacOptions ransac_options;
   ransac_options.seed = seed_;
   ransac_options.stream = stream;
-  ransac_options.min_inlier_ratio = kMinInlierRatio;
+  // A sparser consensus would be refused, so that it need not be found.
+  ransac_options.min_inlier_ratio =
+      std::max(kMinInlierRatio,
+               static_cast<double>(kMinConsensus) / static_cast<double>(observations_.size()));
   const std::optional<PoseEstimate> estimate =
       waymark::locate(*rig_, observations_, PoseOptions{}, ransac_options, workspace_);
   if (!estimate || estimate->num_inliers < kMinConsensus) return std::nullopt;
@@ -149,33 +152,15 @@ LocatedFrame PlaceLocator::match_around(const Features& features,
   collect_found(features, landmarks, found_);
   is_taken_.assign(features.num_primary, 0);
   for (std::size_t i = 0; i < features.num_primary; ++i) is_taken_[i] = landmarks[i].is_valid();
-  const ProjectionMatches& matches = matcher_.match(
-      local_.landmarks, features, is_taken_, rig_from_world, {.radius_px = radius_px});
-  is_visible_ = matches.is_visible;
+  const ProjectionOptions options = {.radius_px = radius_px, .appearance = kGuidedAppearance};
+  const ProjectionMatches& matches =
+      matcher_.match(local_.landmarks, features, is_taken_, rig_from_world, options);
   for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
     const LandmarkId id = local_.landmarks.ids[i];
     if (matches.features[i] == kNoFeature || contains(found_, id)) continue;
     landmarks[matches.features[i]] = id;
   }
   return locator_.locate(features, map, rig_from_world, landmarks);
-}
-
-void PlaceLocator::count_expected(const Features& features,
-                                  const std::vector<LandmarkId>& landmarks,
-                                  LocatedPlace& place) const {
-  std::vector<LandmarkId> found;
-  collect_found(features, landmarks, found);
-  const Rigid3 cam_from_world = rig_->cameras[0].cam_from_rig * place.frame.rig_from_world;
-  const Eigen::Vector3d centre = cam_from_world.origin_in_source();
-  const auto primary_end = features.size_rad.begin() + std::ptrdiff_t(features.num_primary);
-  const auto [finest, coarsest] = std::minmax_element(features.size_rad.begin(), primary_end);
-  for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
-    const double range_m = (local_.landmarks.positions_in_world[i] - centre).norm();
-    const double size_rad = local_.landmarks.sizes_m[i] / range_m;
-    if (!is_visible_[i] || size_rad < *finest || size_rad > *coarsest) continue;
-    ++place.num_expected;
-    place.num_found += contains(found, local_.landmarks.ids[i]);
-  }
 }
 
 }  // namespace waymark

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "waymark/map/map.h"
@@ -19,12 +20,8 @@ namespace waymark {
 /// A pose found near a keyframe, and what speaks for it.
 struct LocatedPlace {
   LocatedFrame frame;
-  KeyframeId reference;  ///< Shares most landmarks with the features.
-  /// Landmarks around that the features should show at this pose, and those that they do show.
-  int num_expected = 0;
-  int num_found = 0;
-
-  double found_ratio() const { return num_expected > 0 ? double(num_found) / num_expected : 0.0; }
+  KeyframeId reference;     ///< Shares most landmarks with the features.
+  double confidence = 0.0;  ///< See place_confidence(), of the reference.
 };
 
 /// Finds out whether features show the surroundings of a keyframe, and from where, without a
@@ -33,17 +30,24 @@ struct LocatedPlace {
 /// keyframe's. Keeps its buffers.
 class PlaceLocator {
  public:
+  /// Below this a pose may be that of a place that merely looks alike.
+  static constexpr double kMinConfidence = 0.3;
+
   /// rig: the one that sees the features.
   PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
-  /// Nothing unless the pose is beyond doubt. landmarks: on success per feature the landmark that
-  /// it shows, all of the candidate's sub-map. Same seed and stream (the frame, for example), same
-  /// result.
+  /// Nothing unless the pose rests on 30 landmarks with kMinConfidence. landmarks: on success per
+  /// feature the landmark that it shows, all of the candidate's sub-map. Same seed and stream (the
+  /// frame, for example), same result.
   std::optional<LocatedPlace> locate(const Features& features,
                                      const Map& map,
                                      KeyframeId candidate,
                                      std::uint64_t stream,
                                      std::vector<LandmarkId>& landmarks);
+
+  /// The keyframes whose landmarks the last locate() began with: the candidate and its strongest
+  /// neighbours. Another try from one of them would hardly end otherwise.
+  std::span<const KeyframeId> matched_keyframes() const { return matched_keyframes_; }
 
  private:
   struct LandmarkMatch {
@@ -54,7 +58,6 @@ class PlaceLocator {
 
   std::size_t match_by_appearance(const Features& features,
                                   const Map& map,
-                                  KeyframeId candidate,
                                   std::vector<LandmarkId>& landmarks);
   void match_keyframe(const Features& features, const Map& map, KeyframeId keyframe);
   std::optional<Rigid3> find_consensus(const Features& features,
@@ -66,9 +69,6 @@ class PlaceLocator {
                             const Rigid3& rig_from_world,
                             double radius_px,
                             std::vector<LandmarkId>& landmarks);
-  void count_expected(const Features& features,
-                      const std::vector<LandmarkId>& landmarks,
-                      LocatedPlace& place) const;
 
   const std::shared_ptr<const Rig> rig_;
   const std::uint64_t seed_;
@@ -78,12 +78,12 @@ class PlaceLocator {
   PoseObservations observations_;
   PoseWorkspace workspace_;
   LocalMap local_;
+  std::vector<KeyframeId> matched_keyframes_;
   std::vector<LandmarkMatch> matches_;
   std::vector<std::uint32_t> with_landmark_;
   std::vector<std::uint32_t> feature_of_observation_;
   std::vector<std::uint8_t> is_taken_;
   std::vector<LandmarkId> found_;  ///< Ascending.
-  std::vector<std::uint8_t> is_visible_;
 };
 
 }  // namespace waymark

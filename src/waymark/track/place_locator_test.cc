@@ -52,7 +52,7 @@ TEST_P(PlaceLocatorTest, FindsThePoseOfAFarView) {
   ASSERT_TRUE(place);
   EXPECT_LT(error_m(place->frame.rig_from_world, truth), 0.02);
   EXPECT_GT(place->frame.num_inliers, 200);
-  EXPECT_GT(place->found_ratio(), 0.5);
+  EXPECT_GT(place->confidence, 0.5);
   EXPECT_GT(share_of_true(view), 0.98);
   EXPECT_TRUE(place->reference.is_valid());
 }

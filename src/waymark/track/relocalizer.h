@@ -38,6 +38,8 @@ class Relocalizer {
   PlaceLocator locator_;
   const int min_inliers_;
   FrameReason reason_ = FrameReason::kNone;
+  std::vector<KeyframeId> matched_;  ///< Those already tried for this frame.
+  std::vector<LandmarkId> seen_;
 };
 
 }  // namespace waymark
