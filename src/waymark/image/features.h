@@ -28,6 +28,12 @@ using Descriptor = std::array<std::uint64_t, 4>;
 
 inline constexpr std::uint32_t kNoFeature = UINT32_MAX;
 
+/// Inverse of a measured range and its standard deviation in 1/m; both 0 where none was measured.
+struct MeasuredRange {
+  float inverse = 0.0f;
+  float inverse_sigma = 0.0f;
+};
+
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
 /// none and belong to a primary feature.
@@ -50,6 +56,12 @@ struct Features {
   FeatureGrid grid;  ///< Of the primary features, by level-0 pixel.
 
   std::size_t size() const { return keypoints.size(); }
+
+  /// What the depth image says of a feature; nothing of those of camera 1.
+  MeasuredRange measured_range(std::uint32_t feature) const {
+    if (feature >= num_primary || !(inverse_range_sigma[feature] > 0.0f)) return {};
+    return {1.0f / range_m[feature], inverse_range_sigma[feature]};
+  }
 };
 
 }  // namespace waymark

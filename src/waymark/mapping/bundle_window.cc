@@ -83,10 +83,9 @@ BundleObservation measure(const Keyframe& keyframe, std::uint32_t feature) {
   measured.camera = features.keypoints[feature].camera;
   measured.bearing = features.bearings[feature];
   measured.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  if (feature < features.num_primary && features.inverse_range_sigma[feature] > 0.0f) {
-    measured.inverse_range = 1.0f / features.range_m[feature];
-    measured.inverse_range_sigma = features.inverse_range_sigma[feature];
-  }
+  const MeasuredRange range = features.measured_range(feature);
+  measured.inverse_range = range.inverse;
+  measured.inverse_range_sigma = range.inverse_sigma;
   return measured;
 }
 

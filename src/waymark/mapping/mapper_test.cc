@@ -158,10 +158,9 @@ BundleObservation observation_of(const Features& features, std::uint32_t feature
   observation.camera = features.keypoints[feature].camera;
   observation.bearing = features.bearings[feature];
   observation.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  if (feature < features.num_primary && features.inverse_range_sigma[feature] > 0.0f) {
-    observation.inverse_range = 1.0f / features.range_m[feature];
-    observation.inverse_range_sigma = features.inverse_range_sigma[feature];
-  }
+  const MeasuredRange measured = features.measured_range(feature);
+  observation.inverse_range = measured.inverse;
+  observation.inverse_range_sigma = measured.inverse_sigma;
   return observation;
 }
 

@@ -12,11 +12,9 @@ void append_observation(const Features& features,
   observations.bearing.push_back(features.bearings[feature]);
   observations.level_pixel_from_bearing.push_back(features.level_pixel_from_bearing[feature]);
   observations.camera.push_back(features.keypoints[feature].camera);
-  const bool has_range =
-      feature < features.num_primary && features.inverse_range_sigma[feature] > 0.0f;
-  observations.inverse_range.push_back(has_range ? 1.0f / features.range_m[feature] : 0.0f);
-  observations.inverse_range_sigma.push_back(has_range ? features.inverse_range_sigma[feature]
-                                                       : 0.0f);
+  const MeasuredRange measured = features.measured_range(feature);
+  observations.inverse_range.push_back(measured.inverse);
+  observations.inverse_range_sigma.push_back(measured.inverse_sigma);
 }
 
 LocatedFrame FrameLocator::locate(const Features& features,

@@ -17,10 +17,9 @@ SeenLandmark seen_by(const Features& features, std::uint32_t feature, LandmarkId
   seen.bearing = features.bearings[feature];
   seen.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
   seen.camera = features.keypoints[feature].camera;
-  if (feature < features.num_primary && features.inverse_range_sigma[feature] > 0.0f) {
-    seen.inverse_range = 1.0f / features.range_m[feature];
-    seen.inverse_range_sigma = features.inverse_range_sigma[feature];
-  }
+  const MeasuredRange measured = features.measured_range(feature);
+  seen.inverse_range = measured.inverse;
+  seen.inverse_range_sigma = measured.inverse_sigma;
   return seen;
 }
 
