@@ -10,7 +10,7 @@ from .program import map_sequence
 from .tables import list_of, table
 from .trajectories import nanoseconds
 
-WIDTH, HEIGHT, FOCAL = 544, 240, 458.0
+WIDTH, HEIGHT, FOCAL = 544, 232, 458.0
 CAMCHAIN = f"""cam0:
   camera_model: pinhole
   intrinsics: [{FOCAL}, {FOCAL}, {WIDTH / 2 - 0.5}, {HEIGHT / 2 - 0.5}]
