@@ -15,17 +15,18 @@ from evaluation.kidnapped import CASES, Judge  # noqa: E402
 
 
 class Kidnapped(unittest.TestCase):
-    def setUp(self):
-        self._folder = tempfile.TemporaryDirectory(prefix="waymark_kidnapped_")
-        self.addCleanup(self._folder.cleanup)
+    @classmethod
+    def setUpClass(cls):
+        if "WAYMARK_DATA" not in os.environ:
+            raise unittest.SkipTest("needs WAYMARK_DATA, the folder of the recorded sequences")
+        cls._folder = tempfile.TemporaryDirectory(prefix="waymark_kidnapped_")
+        cls.addClassCleanup(cls._folder.cleanup)
+        cls._judge = Judge(pathlib.Path(os.environ["WAYMARK_DATA"]), pathlib.Path(cls._folder.name))
 
     def judge(self, case):
-        if "WAYMARK_DATA" not in os.environ:
-            self.skipTest("needs WAYMARK_DATA, the folder of the recorded sequences")
-        judge = Judge(pathlib.Path(os.environ["WAYMARK_DATA"]), pathlib.Path(self._folder.name))
-        if not judge.has(case):
+        if not self._judge.has(case):
             self.skipTest(f"WAYMARK_DATA lacks a sequence of {case.title}")
-        report = judge.judge(case)
+        report = self._judge.judge(case)
         self.assertFalse(report.failures, "\n" + "\n".join(report.failures))
 
 
