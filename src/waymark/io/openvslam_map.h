@@ -1,0 +1,26 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+struct ImportedMap {
+  Map map;
+  std::vector<std::string> notes;  ///< What was left out.
+};
+
+/// A map of OpenVSLAM or stella_vslam from the bytes of its MessagePack file (.msg), as if it had
+/// been made here: keyframes with features, descriptors and poses, landmarks with observations,
+/// the spanning tree and loop edges; what they do not store is computed. Each root of a spanning
+/// tree gives a sub-map. Bearings follow from the cameras of the file. Throws InputError for what
+/// is malformed; name is what errors call the file. References to landmarks that are gone, which
+/// real files have, are left out.
+ImportedMap import_openvslam_map(std::string_view bytes, const std::string& name);
+
+}  // namespace waymark
