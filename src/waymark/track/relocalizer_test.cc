@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "waymark/track/test_map.h"
 
@@ -63,6 +65,27 @@ TEST_F(RelocalizerTest, FindsFramesInTheSubmapThatShowsTheirPlace) {
     EXPECT_LT((located->rig_from_world.origin_in_source() - truth.translation).norm(), 0.02);
     EXPECT_EQ(found_submap(), SubmapId{submap});
   }
+}
+
+TEST_F(RelocalizerTest, PrefersThePlaceThatExplainsMore) {
+  // Half of a third place is as in the first, and the index thinks it the likelier one.
+  PointCloud half_alike = another_cloud(13);
+  for (std::size_t i = 0; i < half_alike.landmarks.size(); i += 2) {
+    half_alike.landmarks[i] = first_.landmarks[i];
+  }
+  scene_.cloud = half_alike;
+  scene_.submap = scene_.map.add_submap(false);
+  scene_.landmark_of_point.clear();
+  places_ = PlaceIndex();
+  for (const std::uint32_t id : {0u, 1u, 2u, 3u}) {
+    const std::vector<Descriptor>& all = scene_.seen[id].features->descriptors;
+    places_.add(KeyframeId{id}, SubmapId{0}, std::span(all).first(all.size() / 4));
+  }
+  add_keyframes();
+  ASSERT_TRUE(locate(half_alike, pose_at(0.5)));
+  EXPECT_EQ(found_submap(), SubmapId{2});
+  ASSERT_TRUE(locate(first_, pose_at(0.5)));
+  EXPECT_EQ(found_submap(), SubmapId{0});
 }
 
 TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {
