@@ -18,8 +18,12 @@ struct FeatureSettings {
 
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
-    field(
-        "count", self.count, SettingInfo{.low = 50, .high = 20000, .help = "Features per image."});
+    field("count",
+          self.count,
+          SettingInfo{
+              .low = 50,
+              .high = 20000,
+              .help = "Features per image; half as many again where it shows all directions."});
     field("min_contrast",
           self.min_contrast,
           SettingInfo{.low = 1,

@@ -44,11 +44,18 @@ class Stopwatch {
   Clock::time_point start_ = Clock::now();
 };
 
+/// An image of all directions is given half as many features again: as many that tell of the
+/// motion as other cameras see, and those ahead and behind, which tell little.
+FeatureSettings settings_for(const Rig& rig, FeatureSettings settings) {
+  WAYMARK_CHECK(!rig.cameras.empty());
+  if (rig.cameras[0].camera->wrap_width_px() > 0.0) settings.count += settings.count / 2;
+  return settings;
+}
+
 }  // namespace
 
 FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
-    : rig_(std::move(rig)), settings_(settings), extractor_(settings.features) {
-  WAYMARK_CHECK(!rig_.cameras.empty());
+    : rig_(std::move(rig)), settings_(settings), extractor_(settings_for(rig_, settings.features)) {
   for (const RigCamera& camera : rig_.cameras) {
     view_masks_.emplace_back(camera.camera, settings.view);
   }
