@@ -37,6 +37,17 @@ TEST(RecordedThreads, DoNotChangeTheAnswer) {
   EXPECT_EQ(hash(Timing::kLockstep), expected);
 }
 
+// The loop is closed some 70 frames before the end, so that the global adjustment beside the mapper
+// is taken in before it, too.
+TEST(RecordedThreads, DoNotChangeHowALoopIsClosed) {
+  const auto folder = recorded_sequence("sim_house_rgbd");
+  if (!folder) GTEST_SKIP() << "WAYMARK_DATA has no sim_house_rgbd";
+  const SessionResults alone = map_recorded(*folder, Setup::kRgbd, Timing::kInline).session;
+  EXPECT_GE(alone.summary.loops, 1u);
+  EXPECT_EQ(hash_of(map_recorded(*folder, Setup::kRgbd, Timing::kLockstep).session),
+            hash_of(alone));
+}
+
 TEST(Seed, IsHeard) {
   Recording recording = simulate(small_sequence(Setup::kMono, 40));
   const std::uint64_t first = hash_of(map_recording(recording, Timing::kInline));
