@@ -166,7 +166,8 @@ Rig make_rig(const CameraChain& chain, const CameraRegistry& registry) {
   WAYMARK_CHECK(!chain.cameras.empty());
   Rig rig;
   for (const ChainCamera& camera : chain.cameras) {
-    rig.cameras.push_back({registry.make_camera(camera.description), camera.cam_from_rig});
+    rig.cameras.push_back(
+        {registry.make_camera(camera.description), camera.cam_from_rig, camera.description});
   }
   return rig;
 }

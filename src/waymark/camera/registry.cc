@@ -31,6 +31,13 @@ void expect_finite(const CameraDescription& description,
 
 }  // namespace
 
+bool CameraDescription::is_same(const CameraDescription& other) const {
+  return camera_model == other.camera_model && intrinsics == other.intrinsics &&
+         distortion_model == other.distortion_model &&
+         distortion_coeffs == other.distortion_coeffs && width_px == other.width_px &&
+         height_px == other.height_px;
+}
+
 void CameraDescription::fail(const std::string& what) const { throw InputError(where, what); }
 
 CameraRegistry CameraRegistry::with_builtin_models() {

@@ -7,25 +7,11 @@
 #include <memory>
 #include <string>
 #include <string_view>
-#include <vector>
 
 #include "waymark/camera/camera.h"
+#include "waymark/camera/description.h"
 
 namespace waymark {
-
-/// A camera in words and numbers, as settings and map files hold it.
-struct CameraDescription {
-  std::string camera_model;        ///< "pinhole" or the name of another registered model.
-  std::vector<double> intrinsics;  ///< For pinhole fu fv pu pv, in pixels.
-  std::string distortion_model = "none";
-  std::vector<double> distortion_coeffs;
-  int width_px = 0;
-  int height_px = 0;
-  std::string where;  ///< Begins error messages, for example "camchain.yaml:3".
-
-  /// InputError at `where`, for factories.
-  [[noreturn]] void fail(const std::string& what) const;
-};
 
 /// Makes the camera that was described, or throws InputError (description.fail()) that says what is
 /// wrong and what was expected.

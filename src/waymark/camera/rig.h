@@ -3,9 +3,11 @@
 #pragma once
 
 #include <memory>
+#include <optional>
 #include <vector>
 
 #include "waymark/camera/camera.h"
+#include "waymark/camera/description.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {
@@ -14,6 +16,9 @@ namespace waymark {
 struct RigCamera {
   std::shared_ptr<const Camera> camera;
   Rigid3 cam_from_rig;
+  /// What make_rig() made the camera of; map files hold it. A map whose cameras lack it cannot be
+  /// saved.
+  std::optional<CameraDescription> description = std::nullopt;
 };
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.

@@ -36,7 +36,10 @@ std::shared_ptr<const Map> Map::freeze() {
 }
 
 LandmarkId Map::resolve(LandmarkId id) const {
-  while (id.is_valid() && !landmarks_.find(id)) id = landmark_forwarding_.at(id);
+  while (id.is_valid() && !landmarks_.find(id)) {
+    const LandmarkId* survivor = landmark_forwarding_.find(id);
+    id = survivor ? *survivor : LandmarkId{};  // Of those erased long ago there is no entry.
+  }
   return id;
 }
 

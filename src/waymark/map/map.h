@@ -19,6 +19,35 @@ struct Submap {
   SubmapId joined_into;    ///< Invalid while it is a part of its own.
 };
 
+/// All of a map in plain lists, as files hold it. Covisibility and the observations of the
+/// landmarks follow from the landmarks of the keyframes.
+struct MapParts {
+  struct StoredKeyframe {
+    KeyframeId id;
+    Keyframe keyframe;
+  };
+  struct StoredLandmark {
+    LandmarkId id;
+    Landmark landmark;  ///< Without observations.
+  };
+  struct ErasedKeyframe {
+    KeyframeId id;
+    KeyframeForwarding forwarding;
+  };
+  struct MergedLandmark {
+    LandmarkId id;
+    LandmarkId survivor;
+  };
+  std::vector<Submap> submaps;
+  std::vector<StoredKeyframe> keyframes;         ///< Ascending.
+  std::vector<StoredLandmark> landmarks;         ///< Ascending.
+  std::vector<ErasedKeyframe> erased_keyframes;  ///< Ascending.
+  std::vector<MergedLandmark> merged_landmarks;  ///< Ascending; that are gone.
+  std::vector<LoopEdge> loop_edges;              ///< As Map::measured_loop_edges() gives them.
+  KeyframeId end_keyframe;                       ///< One past the largest id ever given.
+  LandmarkId end_landmark;
+};
+
 /// The map of a session: a value with one owner, changed through its mutators only, which keep both
 /// sides of every association and the covisibility counts in step.
 ///
@@ -30,6 +59,10 @@ class Map {
   Map(Map&&) noexcept = default;
   Map& operator=(Map&&) noexcept = default;
 
+  /// The map that was taken apart. Ids must ascend below their ends, features and rigs be there;
+  /// of whatever else is wrong, list_broken_invariants() tells.
+  static Map restore(MapParts parts);
+
   /// Immutable copy that shares all unchanged pages; takes microseconds.
   std::shared_ptr<const Map> freeze();
 
@@ -40,12 +73,22 @@ class Map {
   const std::vector<CovisibilityEdge>& covisible(KeyframeId id) const {
     return covisibility_.at(id).edges;
   }
+  /// Where each keyframe that is gone went; for those that live the heir is invalid.
+  const CowTable<KeyframeId, KeyframeForwarding>& keyframe_forwarding() const {
+    return keyframe_forwarding_;
+  }
+  /// What each landmark that is gone was merged into; invalid for others.
+  const CowTable<LandmarkId, LandmarkId>& landmark_forwarding() const {
+    return landmark_forwarding_;
+  }
   /// The landmark that an id stands for now, through merges; invalid if erased.
   LandmarkId resolve(LandmarkId id) const;
   /// The sub-map that an id stands for now, through joins.
   SubmapId resolve(SubmapId id) const;
   /// Places seen again, in the order they were found, as measured then and in the units of now.
   std::vector<LoopEdge> loop_edges() const;
+  /// The same, lengths in the units before any correction. For writers of files.
+  const std::vector<LoopEdge>& measured_loop_edges() const { return loop_edges_; }
   bool has_loop_edge(KeyframeId id) const;
   /// Pose of a rig that was stored relative to a keyframe: the rig from the world as of now.
   /// scale_then is the keyframe's applied_scale when rig_from_keyframe was stored.
@@ -86,8 +129,10 @@ class Map {
   /// Adds to the counts of how often a landmark should have been and was seen.
   void count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found);
 
-  /// Recomputes everything derived from scratch; empty if sound, else what is wrong.
+  /// Recomputes everything derived from scratch; empty if sound, else what is wrong first.
   std::string broken_invariants() const;
+  /// Everything that is wrong, a line each, up to so many.
+  std::vector<std::string> list_broken_invariants(std::size_t max_count) const;
 
  private:
   void change_covisibility(KeyframeId a, KeyframeId b, int change);

@@ -1,0 +1,39 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/map/covisibility.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace waymark {
+
+Covisibility CovisibilityCounter::count(KeyframeId id, const Keyframe& keyframe) {
+  seen_.clear();
+  for (const LandmarkId landmark : keyframe.landmarks) {
+    if (landmark.is_valid()) seen_.push_back(landmark);
+  }
+  std::sort(seen_.begin(), seen_.end());
+  seen_.erase(std::unique(seen_.begin(), seen_.end()), seen_.end());
+  Covisibility result;
+  for (const LandmarkId landmark_id : seen_) {
+    const Landmark* landmark = landmarks_.find(landmark_id);
+    if (!landmark) continue;
+    KeyframeId last;
+    for (const Observation& observation : landmark->observations) {
+      const KeyframeId other = observation.keyframe;
+      if (other == last || other == id || !keyframes_.contains(other)) continue;
+      last = other;
+      if (num_shared_[other.value]++ == 0) result.edges.push_back({other, 0});
+    }
+  }
+  std::sort(
+      result.edges.begin(),
+      result.edges.end(),
+      [](const CovisibilityEdge& a, const CovisibilityEdge& b) { return a.keyframe < b.keyframe; });
+  for (CovisibilityEdge& edge : result.edges) {
+    edge.num_shared = std::exchange(num_shared_[edge.keyframe.value], 0u);
+  }
+  return result;
+}
+
+}  // namespace waymark
