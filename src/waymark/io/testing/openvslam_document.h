@@ -9,6 +9,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/rig.h"
+#include "waymark/io/openvslam_map.h"
 
 namespace waymark::testing {
 
@@ -133,6 +134,16 @@ inline SmallMap make_small_map(const Document& camera = perspective_document()) 
   document["keyframe_next_id"] = 3;
   document["landmark_next_id"] = 30;
   return map;
+}
+
+/// As a map, seen by a camera that is plain, distorted or fisheye.
+inline Map small_map(const std::string& kind) {
+  Document camera = perspective_document();
+  if (kind == "plain") {
+    for (const char* key : {"k1", "k2", "p1", "p2"}) camera[key] = 0.0;
+  }
+  if (kind == "fisheye") camera["model_type"] = "Fisheye";
+  return import_openvslam_map(make_small_map(camera).bytes(), "map.msg").map;
 }
 
 }  // namespace waymark::testing
