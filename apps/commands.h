@@ -18,6 +18,8 @@ void add_run_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);
 void add_simulate_command(CLI::App& program, Command& command);
 void add_config_command(CLI::App& program, Command& command);
+void add_export_command(CLI::App& program, Command& command);
+void add_import_command(CLI::App& program, Command& command);
 
 /// Exit status of the program.
 inline constexpr int kDone = 0;

@@ -49,6 +49,8 @@ int run_program(int argc, char** argv) {
   add_run_command(program, command);
   add_eval_command(program, command);
   add_simulate_command(program, command);
+  add_export_command(program, command);
+  add_import_command(program, command);
   add_config_command(program, command);
 
   check_command_name(program, argc, argv);
