@@ -55,7 +55,7 @@ void adjust_local_bundle(benchmark::State& state) {
   for (auto _ : state) {
     state.PauseTiming();
     BundleProblem problem = scene.problem;
-    problem.rig = &scene.rig;
+    problem.rigs.assign(problem.rig_from_world.size(), &scene.rig);
     state.ResumeTiming();
     result = adjust_bundle(problem, options);
     benchmark::DoNotOptimize(problem.points.data());
@@ -83,7 +83,7 @@ void adjust_global_bundle(benchmark::State& state) {
   options.relative_cost_tolerance = 0.0;
   for (auto _ : state) {
     BundleProblem problem = scene.problem;
-    problem.rig = &scene.rig;
+    problem.rigs.assign(problem.rig_from_world.size(), &scene.rig);
     benchmark::DoNotOptimize(adjust_bundle(problem, options).final_cost);
   }
 }

@@ -139,6 +139,7 @@ LandmarkMatches RevisitVerifier::match_by_projection(const Map& map, Revisit& re
     landmarks_.add(id, map.landmarks().at(id));
     features_of_match.push_back(i);
   }
+  projection_.look_with(in_query.rig);
   const ProjectionMatches& found =
       projection_.match(landmarks_,
                         *in_query.features,
@@ -176,6 +177,7 @@ Sightings RevisitVerifier::look_for(const Map& map,
       landmarks_.add(id, landmark);
     }
   }
+  projection_.look_with(map.keyframes().at(target).rig);
   const ProjectionMatches& found = projection_.match(landmarks_,
                                                      *map.keyframes().at(target).features,
                                                      {},

@@ -95,9 +95,9 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
   std::vector<KeyframeId> keyframes = window.moving;
   keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
   std::sort(keyframes.begin(), keyframes.end());
-  problem.rig = map.keyframes().at(keyframes.front()).rig.get();
   for (KeyframeId id : keyframes) {
     problem.rig_from_world.push_back(map.keyframes().at(id).rig_from_world);
+    problem.rigs.push_back(map.keyframes().at(id).rig.get());
     problem.is_pose_fixed.push_back(index_of(window.moving, id) == window.moving.size());
   }
   for (LandmarkId id : window.landmarks) {

@@ -71,10 +71,13 @@ void add_observations(const Map& map,
   append(scene.level_scales, level_scales);
 }
 
-/// The surroundings of the newest keyframe; its gauge is held by one pose only, since a wrong focal
-/// length also bends the motion between two.
+/// The surroundings of the newest keyframe, as far as its rig saw them; its gauge is held by one
+/// pose only, since a wrong focal length also bends the motion between two.
 Scene collect(const Map& map, KeyframeId newest) {
   std::vector<KeyframeId> keyframes = strongest_neighbours(map, newest, kNumKeyframes - 1);
+  std::erase_if(keyframes, [&](KeyframeId id) {
+    return map.keyframes().at(id).rig != map.keyframes().at(newest).rig;
+  });
   keyframes.push_back(newest);
   std::sort(keyframes.begin(), keyframes.end());
   Scene scene;
@@ -136,7 +139,7 @@ std::optional<FocalCheck> check_focal_length(const Map& map) {
     if (camera.camera->wrap_width_px() > 0.0) return std::nullopt;
   }
   Scene scene = collect(map, newest);
-  scene.problem.rig = &rig;
+  scene.problem.rigs.assign(scene.problem.rig_from_world.size(), &rig);
   if (scene.problem.points.size() < kMinLandmarks) return std::nullopt;
   const double num_unknowns = 6.0 * static_cast<double>(scene.problem.rig_from_world.size()) +
                               3.0 * static_cast<double>(scene.problem.points.size());

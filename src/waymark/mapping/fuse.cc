@@ -62,6 +62,7 @@ void fuse_into(Map& map,
                DirtyLandmarks& dirty) {
   const LandmarkSet landmarks = seen_only_by(map, sources, target);
   const std::shared_ptr<const Features> features = map.keyframes().at(target).features;
+  matcher.look_with(map.keyframes().at(target).rig);
   const ProjectionMatches& matches = matcher.match(landmarks,
                                                    *features,
                                                    {},

@@ -169,7 +169,6 @@ BundleObservation observation_of(const Features& features, std::uint32_t feature
 BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
   const PointCloud cloud = make_cloud();
   BundleProblem problem;
-  problem.rig = &rig;
   std::vector<std::vector<BundleObservation>> sightings(cloud.landmarks.size());
   for (int i = 0; i < kNumFrames; i += every) {
     const PointObservation seen =
@@ -183,6 +182,7 @@ BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
     }
     problem.is_pose_fixed.push_back(problem.rig_from_world.empty());
     problem.rig_from_world.push_back(truth(i).inverse());
+    problem.rigs.push_back(&rig);
   }
   for (std::size_t landmark = 0; landmark < sightings.size(); ++landmark) {
     if (sightings[landmark].size() < 2) continue;

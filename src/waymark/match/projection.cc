@@ -15,8 +15,14 @@ constexpr std::uint32_t kNoLandmark = UINT32_MAX;
 
 }  // namespace
 
-ProjectionMatcher::ProjectionMatcher(std::shared_ptr<const Rig> rig)
-    : rig_(std::move(rig)), pixel_angles_(*rig_->cameras.at(0).camera) {}
+ProjectionMatcher::ProjectionMatcher(std::shared_ptr<const Rig> rig) { look_with(rig); }
+
+void ProjectionMatcher::look_with(const std::shared_ptr<const Rig>& rig) {
+  const auto at =
+      std::find_if(views_.begin(), views_.end(), [&](const View& view) { return view.rig == rig; });
+  current_view_ = static_cast<std::size_t>(at - views_.begin());
+  if (at == views_.end()) views_.push_back({rig, PixelAngles(*rig->cameras.at(0).camera)});
+}
 
 const ProjectionMatches& ProjectionMatcher::match(const LandmarkSet& landmarks,
                                                   const Features& features,
@@ -40,7 +46,8 @@ void ProjectionMatcher::project(const LandmarkSet& landmarks,
                                 const Rigid3& rig_from_world,
                                 double min_direction_cos) {
   const std::size_t count = landmarks.size();
-  const Rigid3 cam_from_world = rig_->cameras[0].cam_from_rig * rig_from_world;
+  const RigCamera& camera = view().rig->cameras[0];
+  const Rigid3 cam_from_world = camera.cam_from_rig * rig_from_world;
   const Eigen::Matrix3d rotation = cam_from_world.rotation_matrix();
   const Eigen::Vector3d centre = cam_from_world.origin_in_source();
   points_in_cam_.resize(count);
@@ -49,7 +56,7 @@ void ProjectionMatcher::project(const LandmarkSet& landmarks,
   for (std::size_t i = 0; i < count; ++i) {
     points_in_cam_[i] = rotation * landmarks.positions_in_world[i] + cam_from_world.translation;
   }
-  rig_->cameras[0].camera->project(points_in_cam_, pixels_, matches_.is_visible);
+  camera.camera->project(points_in_cam_, pixels_, matches_.is_visible);
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d to_camera = centre - landmarks.positions_in_world[i];
     matches_.is_visible[i] &=
@@ -65,9 +72,9 @@ void ProjectionMatcher::find_candidates(std::size_t landmark,
   candidates_.clear();
   const Eigen::Vector2d pixel = pixels_[landmark];
   const double size_rad = landmarks.sizes_m[landmark] / points_in_cam_[landmark].norm();
-  const double scale = std::max(1.0, size_rad / pixel_angles_.at(pixel));
+  const double scale = std::max(1.0, size_rad / view().pixel_angles.at(pixel));
   const double radius = radius_px * scale;
-  const double stretch = pixel_angles_.column_stretch(pixel);
+  const double stretch = view().pixel_angles.column_stretch(pixel);
   const auto consider = [&](std::uint32_t feature) {
     const Keypoint& keypoint = features.keypoints[feature];
     const double dx = features.grid.column_distance_px(keypoint.x_px, pixel.x()) / stretch;

@@ -32,7 +32,11 @@ struct ProjectionMatches {
 /// metric size, so that frames of different cameras compare. Keeps its buffers.
 class ProjectionMatcher {
  public:
+  /// rig: the one that sees the frames.
   explicit ProjectionMatcher(std::shared_ptr<const Rig> rig);
+
+  /// From now on the frames are of this rig.
+  void look_with(const std::shared_ptr<const Rig>& rig);
 
   /// One feature serves one landmark: the more similar one. Features with is_taken set (may be
   /// empty) are left alone. The result stays valid until the next call.
@@ -56,8 +60,15 @@ class ProjectionMatcher {
               const Features& features,
               const ProjectionOptions& options);
 
-  std::shared_ptr<const Rig> rig_;
-  PixelAngles pixel_angles_;
+  struct View {
+    std::shared_ptr<const Rig> rig;
+    PixelAngles pixel_angles;
+  };
+
+  const View& view() const { return views_[current_view_]; }
+
+  std::vector<View> views_;  ///< One per rig used so far: there are few, but they alternate.
+  std::size_t current_view_ = 0;
   ProjectionMatches matches_;
   std::vector<Eigen::Vector3d> points_in_cam_;
   std::vector<Eigen::Vector2d> pixels_;

@@ -21,13 +21,13 @@ constexpr double kHuberSigmas = 2.0;
 constexpr double kMinNoisePx = 0.15;
 
 void check(const BundleProblem& problem) {
-  WAYMARK_CHECK(problem.rig != nullptr);
+  WAYMARK_CHECK(problem.rigs.size() == problem.rig_from_world.size());
   WAYMARK_CHECK(problem.is_pose_fixed.size() == problem.rig_from_world.size());
   std::uint32_t last_point = 0;
   for (const BundleObservation& observation : problem.observations) {
     WAYMARK_CHECK(observation.pose < problem.rig_from_world.size());
     WAYMARK_CHECK(observation.point < problem.points.size());
-    WAYMARK_CHECK(observation.camera < problem.rig->cameras.size());
+    WAYMARK_CHECK(observation.camera < problem.rigs[observation.pose]->cameras.size());
     WAYMARK_CHECK(observation.point >= last_point);
     last_point = observation.point;
   }
@@ -35,7 +35,8 @@ void check(const BundleProblem& problem) {
 
 /// Squared length of the residual of the bearing, px^2; not finite where an input is not.
 double squared_residual(const BundleProblem& problem, const BundleObservation& observation) {
-  const Rigid3& cam_from_rig = problem.rig->cameras[observation.camera].cam_from_rig;
+  const Rigid3& cam_from_rig =
+      problem.rigs[observation.pose]->cameras[observation.camera].cam_from_rig;
   const Rigid3& rig_from_world = problem.rig_from_world[observation.pose];
   const Sighting sighting =
       sight(cam_from_rig * (rig_from_world * problem.points[observation.point]));

@@ -15,7 +15,7 @@ namespace waymark {
 struct BundleObservation {
   std::uint32_t pose = 0;                              ///< Index in BundleProblem::rig_from_world.
   std::uint32_t point = 0;                             ///< Index in BundleProblem::points.
-  std::uint8_t camera = 0;                             ///< Index in the rig.
+  std::uint8_t camera = 0;                             ///< Index in the rig of the pose.
   Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();  ///< Measured, unit, in the camera.
   Matrix23f level_pixel_from_bearing = Matrix23f::Zero();  ///< W of Features.
   float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
@@ -24,8 +24,8 @@ struct BundleObservation {
 
 /// Poses and points in contiguous arrays, in the order of their ids, and what ties them.
 struct BundleProblem {
-  const Rig* rig = nullptr;
   std::vector<Rigid3> rig_from_world;
+  std::vector<const Rig*> rigs;                 ///< Per pose; sessions may differ in cameras.
   std::vector<std::uint8_t> is_pose_fixed;      ///< Per pose.
   std::vector<Eigen::Vector3d> points;          ///< In the world.
   std::vector<BundleObservation> observations;  ///< Sorted by point.

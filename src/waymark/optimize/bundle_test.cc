@@ -19,7 +19,7 @@ using testing::make_bundle_scene;
 
 BundleProblem problem_of(const BundleScene& scene) {
   BundleProblem problem = scene.problem;
-  problem.rig = &scene.rig;
+  problem.rigs.assign(problem.rig_from_world.size(), &scene.rig);
   return problem;
 }
 
@@ -83,6 +83,31 @@ TEST_P(Bundle, ConvergesDespiteOutliersAndNamesThem) {
     // In mono the baseline of the two fixed poses, 0.4 m, carries the scale of all.
     EXPECT_LT(worst_pose_error(problem, scene), num_cameras == 1 ? 0.1 : 0.03);
     EXPECT_LT(median_point_error(problem, scene), num_cameras == 1 ? 0.08 : 0.04);
+  }
+}
+
+TEST_P(Bundle, TakesPosesOfSeveralRigs) {
+  const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.3}, 5);
+  BundleProblem one = problem_of(scene);
+  // The same cameras, but the origin of the rig of every other pose is elsewhere.
+  Vector6d tangent;
+  tangent << 0.3, -0.2, 0.1, 0.2, 0.5, -0.3;
+  const Rigid3 other_from_rig = Rigid3::exp(tangent);
+  Rig other = scene.rig;
+  for (RigCamera& camera : other.cameras) {
+    camera.cam_from_rig = camera.cam_from_rig * other_from_rig.inverse();
+  }
+  BundleProblem two = one;
+  for (std::size_t i = 1; i < two.rigs.size(); i += 2) {
+    two.rigs[i] = &other;
+    two.rig_from_world[i] = other_from_rig * two.rig_from_world[i];
+  }
+  const BundleOptions options = {.solver = GetParam(), .max_iterations_per_round = 30};
+  const BundleResult result = adjust_bundle(one, options);
+  EXPECT_NEAR(adjust_bundle(two, options).final_cost, result.final_cost, 0.01 * result.final_cost);
+  for (std::size_t i = 1; i < two.rigs.size(); i += 2) {
+    const Rigid3 change = other_from_rig * one.rig_from_world[i] * two.rig_from_world[i].inverse();
+    EXPECT_LT(change.log().norm(), 3e-3);
   }
 }
 
@@ -190,7 +215,6 @@ TEST_P(Bundle, DegenerateInputStaysFinite) {
   expect_finite(only_points, adjust_bundle(only_points, options));
 
   BundleProblem empty;
-  empty.rig = &scene.rig;
   EXPECT_TRUE(adjust_bundle(empty, options).is_outlier.empty());
 }
 

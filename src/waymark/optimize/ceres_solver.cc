@@ -172,7 +172,8 @@ void add_residuals(const BundleProblem& problem,
   for (std::size_t i = 0; i < is_used.size(); ++i) {
     if (!is_used[i]) continue;
     const BundleObservation& observation = problem.observations[i];
-    const Rigid3& cam_from_rig = problem.rig->cameras[observation.camera].cam_from_rig;
+    const Rigid3& cam_from_rig =
+        problem.rigs[observation.pose]->cameras[observation.camera].cam_from_rig;
     double* pose = poses[observation.pose].data();
     double* point = points[observation.point].data();
     ceres_problem.AddResidualBlock(

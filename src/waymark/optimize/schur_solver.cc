@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "waymark/optimize/residual.h"
@@ -90,9 +91,7 @@ class SchurSolver {
     state_.rig_from_world = problem.rig_from_world;
     state_.points = problem.points;
     for (const Rigid3& pose : state_.rig_from_world) state_.frames.push_back(frame_of(pose));
-    for (const RigCamera& camera : problem.rig->cameras) {
-      cameras_.push_back(frame_of(camera.cam_from_rig));
-    }
+    list_cameras();
     candidate_ = state_;
     allocate();
   }
@@ -101,6 +100,10 @@ class SchurSolver {
   const State& state() const { return state_; }
 
  private:
+  void list_cameras();
+  const Frame& camera_of(const BundleObservation& observation) const {
+    return cameras_[first_camera_[observation.pose] + observation.camera];
+  }
   void allocate();
   double cost(const State& state) const;
   void linearize();
@@ -117,7 +120,8 @@ class SchurSolver {
   const BundleProblem& problem_;
   const BundleOptions& options_;
   const SchurPlan plan_;
-  std::vector<Frame> cameras_;
+  std::vector<Frame> cameras_;             // Of each rig.
+  std::vector<std::size_t> first_camera_;  // Of the rig of each pose.
   State state_;
   State candidate_;
   NormalBlocks blocks_;
@@ -126,6 +130,20 @@ class SchurSolver {
   Eigen::MatrixXd reduced_;                     // Lower triangle.
   Eigen::VectorXd reduced_gradient_;
 };
+
+void SchurSolver::list_cameras() {
+  std::vector<std::pair<const Rig*, std::size_t>> listed;
+  for (const Rig* rig : problem_.rigs) {
+    auto at = std::find_if(
+        listed.begin(), listed.end(), [&](const auto& entry) { return entry.first == rig; });
+    if (at == listed.end()) {
+      at = listed.insert(at, {rig, cameras_.size()});
+      for (const RigCamera& camera : rig->cameras)
+        cameras_.push_back(frame_of(camera.cam_from_rig));
+    }
+    first_camera_.push_back(at->second);
+  }
+}
 
 void SchurSolver::allocate() {
   blocks_.poses.resize(plan_.num_slots);
@@ -146,7 +164,7 @@ double SchurSolver::cost(const State& state) const {
     const BundleObservation& observation = problem_.observations[i];
     const Eigen::Vector3d point_in_rig =
         apply(state.frames[observation.pose], state.points[observation.point]);
-    const Sighting sighting = sight(apply(cameras_[observation.camera], point_in_rig));
+    const Sighting sighting = sight(apply(camera_of(observation), point_in_rig));
     if (!is_ahead(sighting, observation.bearing)) {
       sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
       continue;
@@ -170,7 +188,7 @@ void SchurSolver::accumulate(const Rows<kRows>& rows,
                              const Eigen::Vector3d& point_in_rig) {
   using Rows3 = Eigen::Matrix<double, kRows, 3>;
   const BundleObservation& observation = problem_.observations[plan_.observations[k]];
-  const Rows3 by_rig = rows.by_point_in_cam * cameras_[observation.camera].rotation;
+  const Rows3 by_rig = rows.by_point_in_cam * camera_of(observation).rotation;
   const Rows3 by_point = by_rig * state_.frames[observation.pose].rotation;
   blocks_.points[entry].noalias() += by_point.transpose() * by_point;
   blocks_.point_gradient[entry].noalias() += by_point.transpose() * rows.residual;
@@ -192,7 +210,7 @@ void SchurSolver::linearize_observation(std::size_t entry, std::size_t k) {
   const BundleObservation& observation = problem_.observations[plan_.observations[k]];
   const Eigen::Vector3d point_in_rig =
       apply(state_.frames[observation.pose], state_.points[observation.point]);
-  const Sighting sighting = sight(apply(cameras_[observation.camera], point_in_rig));
+  const Sighting sighting = sight(apply(camera_of(observation), point_in_rig));
   if (!is_ahead(sighting, observation.bearing)) return;
   const Eigen::Vector2d residual =
       bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);

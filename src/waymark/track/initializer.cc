@@ -119,8 +119,8 @@ RefinedPair refine_pair(const Rig& rig,
                         std::span<const FeatureMatch> matches,
                         const TwoViewGeometry& geometry) {
   BundleProblem problem;
-  problem.rig = &rig;
   problem.rig_from_world = {Rigid3{}, geometry.b_from_a};
+  problem.rigs = {&rig, &rig};
   problem.is_pose_fixed = {1, 0};
   std::vector<FeatureMatch> kept;
   for (std::size_t i = 0; i < matches.size(); ++i) {
