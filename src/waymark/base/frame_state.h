@@ -21,10 +21,10 @@ enum class FrameReason {
   kNone,
   kNoFeatures,
   kTooLittleParallax,
-  kTooFewMatches,
-  kTooFewInliers,
-  kNoCandidate,  ///< Relocalisation found no similar place.
-  kNotVerified,  ///< A similar place was found, but its geometry did not fit.
+  kTooFewMatches,  ///< Too few features look like those of the map or of the reference frame.
+  kTooFewInliers,  ///< Too few of them agree on a pose.
+  kNoCandidate,    ///< Relocalisation found no similar place.
+  kNotVerified,    ///< There was a pose, but from there more should have been recognised.
   kUnreadableImage,
   kWrongSize,
   kLate,

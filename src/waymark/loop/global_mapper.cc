@@ -14,6 +14,11 @@ GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            std::uint64_t seed)
     : settings_(loop), mapper_(rig, mapping), finder_(rig, seed), projection_(rig) {}
 
+void GlobalMapper::take_over(const MapSnapshot& before) {
+  mapper_.take_over(*before.map);
+  places_ = *before.places;
+}
+
 void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(message)); }
 
 void GlobalMapper::add(const NewKeyframe& message) {

@@ -31,6 +31,8 @@ class GlobalMapper {
                const LoopSettings& loop,
                std::uint64_t seed);
 
+  /// Goes on with a map made before, by whatever cameras; before the first message.
+  void take_over(const MapSnapshot& before);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
   /// The adjustment that a loop made necessary, once for each; nothing where there is none.

@@ -16,7 +16,7 @@ namespace waymark {
 
 /// A frame that stays in the map.
 struct Keyframe {
-  FrameId frame;
+  FrameId frame;  ///< Unique in a map: a session that extends one counts on.
   std::int64_t timestamp_ns = 0;
   SubmapId submap;
   Rigid3 rig_from_world;

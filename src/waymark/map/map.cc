@@ -22,6 +22,12 @@ std::vector<KeyframeId> observers_except(const Landmark& landmark, KeyframeId ex
 
 }  // namespace
 
+bool is_metric(const Map& map) {
+  return std::all_of(map.submaps().begin(), map.submaps().end(), [](const Submap& submap) {
+    return submap.joined_into.is_valid() || submap.is_metric;
+  });
+}
+
 std::shared_ptr<const Map> Map::freeze() {
   auto frozen = std::make_shared<Map>();
   frozen->keyframes_ = keyframes_.freeze();
@@ -33,6 +39,18 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->loop_edges_ = loop_edges_;
   last_frozen_ = frozen;
   return frozen;
+}
+
+Map Map::thaw(const Map& frozen) {
+  Map map;
+  map.keyframes_ = decltype(keyframes_)::thaw(frozen.keyframes_);
+  map.landmarks_ = decltype(landmarks_)::thaw(frozen.landmarks_);
+  map.covisibility_ = decltype(covisibility_)::thaw(frozen.covisibility_);
+  map.keyframe_forwarding_ = decltype(keyframe_forwarding_)::thaw(frozen.keyframe_forwarding_);
+  map.landmark_forwarding_ = decltype(landmark_forwarding_)::thaw(frozen.landmark_forwarding_);
+  map.submaps_ = frozen.submaps_;
+  map.loop_edges_ = frozen.loop_edges_;
+  return map;
 }
 
 LandmarkId Map::resolve(LandmarkId id) const {

@@ -63,6 +63,9 @@ class Map {
   /// of whatever else is wrong, list_broken_invariants() tells.
   static Map restore(MapParts parts);
 
+  /// Editable map that starts as a frozen one, which stays valid and unchanged.
+  static Map thaw(const Map& frozen);
+
   /// Immutable copy that shares all unchanged pages; takes microseconds.
   std::shared_ptr<const Map> freeze();
 
@@ -146,5 +149,8 @@ class Map {
   std::vector<LoopEdge> loop_edges_;        ///< Lengths in the units before any correction.
   std::shared_ptr<const Map> last_frozen_;  ///< Keeps references alive until the next freeze().
 };
+
+/// Whether all sub-maps have a scale in metres.
+bool is_metric(const Map& map);
 
 }  // namespace waymark

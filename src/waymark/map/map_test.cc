@@ -109,6 +109,23 @@ TEST(Map, FrozenCopiesNeverChange) {
   EXPECT_EQ(frozen->broken_invariants(), "");
 }
 
+TEST(Map, ThawedMapsGoOnAndLeaveTheFrozenOneAlone) {
+  Map original;
+  const SubmapId submap = original.add_submap(true);
+  const KeyframeId root = original.add_keyframe(make_keyframe(5, submap, {}));
+  const LandmarkId landmark = original.add_landmark(submap, Eigen::Vector3d::Zero(), root);
+  original.observe(root, 1, landmark);
+  const auto frozen = original.freeze();
+  Map thawed = Map::thaw(*frozen);
+  const KeyframeId next = thawed.add_keyframe(make_keyframe(5, submap, root));
+  thawed.observe(next, 2, landmark);
+  EXPECT_EQ(next, KeyframeId{root.value + 1});
+  EXPECT_EQ(thawed.broken_invariants(), "");
+  EXPECT_EQ(thawed.covisible(root).size(), 1u);
+  EXPECT_EQ(frozen->keyframes().size(), 1u);
+  EXPECT_EQ(frozen->broken_invariants(), "");
+}
+
 TEST(Map, CountsDistinctKeyframesNotFeatures) {
   Map map;
   const SubmapId submap = map.add_submap(true);

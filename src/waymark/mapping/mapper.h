@@ -21,6 +21,9 @@ class Mapper {
  public:
   Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings);
 
+  /// Goes on with a map made before, by whatever cameras; before the first message.
+  void take_over(const Map& frozen) { map_ = Map::thaw(frozen); }
+
   /// What a message did to the keyframes.
   struct Changes {
     std::vector<KeyframeId> added;

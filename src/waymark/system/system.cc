@@ -24,11 +24,32 @@ Timing checked(Timing timing) {
 }
 
 /// Whether a map comes late enough for the check of the focal length.
-bool has_focal_check(const Map& map) {
+bool has_focal_check(const Map& map, FrameId first) {
   constexpr std::uint32_t kFrame = 200;
   if (map.keyframes().size() == 0) return false;
   const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});
-  return newest.is_valid() && map.keyframes().at(newest).frame.value >= kFrame;
+  return newest.is_valid() && map.keyframes().at(newest).frame.value >= first.value + kFrame;
+}
+
+/// The id after those of all frames of a map, which may be null.
+FrameId frame_after(const Map* map) {
+  constexpr std::uint32_t kMaxFrame = UINT32_MAX / 2;
+  FrameId after{0};
+  if (!map) return after;
+  map->keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+    after = std::max(after, FrameId{keyframe.frame.value + 1});
+    if (keyframe.frame.value > kMaxFrame) {
+      throw InputError("map", "the numbers of its frames leave none for more");
+    }
+  });
+  return after;
+}
+
+/// Throws InputError for a map that cannot take ranges in metres.
+void check_has_scale(const Map& map) {
+  if (!is_metric(map)) {
+    throw InputError("map", "its scale is free, expected images of one camera without depth");
+  }
 }
 
 bool has_pose(FrameState state) {
@@ -39,15 +60,19 @@ bool has_pose(FrameState state) {
 
 class System::Impl {
  public:
-  Impl(Rig rig, const Settings& settings, Timing timing)
+  Impl(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
       : rig_(std::make_shared<const Rig>(std::move(rig))),
         settings_(settings),
         timing_(checked(timing)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
-        memory_(rig_),
+        memory_(rig_, frame_after(map.get())),
         mapper_(rig_, settings.mapping, settings.loop, static_cast<std::uint64_t>(settings.seed)),
         adjuster_(timing),
-        worker_(timing, [this](const MapTask& task) { return process(task); }) {}
+        worker_(timing, [this](const MapTask& task) { return process(task); }) {
+    if (!map) return;
+    visible_.snapshot = index_map(std::move(map));
+    mapper_.take_over(visible_.snapshot);
+  }
 
   TrackingResult feed(const FrameInput& input);
   void finish();
@@ -58,6 +83,7 @@ class System::Impl {
   const FocalCheck* focal_check() const;
 
  private:
+  void make_tracker(bool has_range);
   void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
   std::shared_ptr<const PublishedMap> process(const MapTask& task);
@@ -100,17 +126,13 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
                      "time stamp is not later than that of the frame before");
   }
   TrackingResult result;
-  const auto id = FrameId{static_cast<std::uint32_t>(past.size())};
+  const FrameId id = memory_.next();
+  if (!tracker_) make_tracker(!input.image1.is_empty() || !input.depth.is_empty());
   Frame frame{id,
               input.timestamp_ns,
               builder_.build({input.image0, input.image1, input.depth, input.mask})};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
-  if (!tracker_) {
-    const bool has_range = !input.image1.is_empty() || !input.depth.is_empty();
-    tracker_.emplace(
-        rig_, has_range, settings_.tracking, static_cast<std::uint64_t>(settings_.seed));
-  }
   {
     StageTimer timer(result.stages, Stage::kWait);
     look_at_map(id);
@@ -118,13 +140,14 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   TrackOutcome outcome = tracker_->track(frame, visible_.snapshot, result.stages);
   memory_.add(frame, outcome, *map());
   num_relocalizations_ += outcome.is_relocalized;
-  result.frame = id;
+  result.frame = FrameId{id.value - memory_.first().value};
   result.state = outcome.state;
   result.reason = outcome.reason;
   if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
   result.covariance = outcome.covariance;
   result.num_matches = outcome.num_matches;
   result.num_inliers = outcome.num_inliers;
+  result.num_candidates = outcome.num_candidates;
   result.is_keyframe = outcome.message.has_value();
   result.submap = outcome.submap;
   if (outcome.message) {
@@ -132,6 +155,12 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
     send(id, std::move(*outcome.message));
   }
   return result;
+}
+
+void System::Impl::make_tracker(bool has_range) {
+  if (has_range) check_has_scale(*map());
+  tracker_.emplace(rig_, has_range, settings_.tracking, static_cast<std::uint64_t>(settings_.seed));
+  if (!map()->submaps().empty()) tracker_->begin_in(*map(), TrackingPurpose::kMapping);
 }
 
 void System::Impl::look_at_map(FrameId frame) {
@@ -176,14 +205,14 @@ void System::Impl::add(const MapperMessage& message) {
   std::visit([&](const auto& content) { mapper_.add(content); }, message);
   mapping_ms_.push_back(
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count());
-  if (is_focal_checked_ || !has_focal_check(mapper_.map())) return;
+  if (is_focal_checked_ || !has_focal_check(mapper_.map(), memory_.first())) return;
   is_focal_checked_ = true;
   focal_check_ = check_focal_length(mapper_.map());
 }
 
 const FocalCheck* System::Impl::focal_check() const {
   // The map first: seeing it is what makes the result readable here.
-  if (!has_focal_check(*map()) || !focal_check_) return nullptr;
+  if (!has_focal_check(*map(), memory_.first()) || !focal_check_) return nullptr;
   return &*focal_check_;
 }
 
@@ -236,8 +265,8 @@ SystemStatistics System::Impl::statistics() const {
   return statistics;
 }
 
-System::System(Rig rig, const Settings& settings, Timing timing)
-    : impl_(std::make_unique<Impl>(std::move(rig), settings, timing)) {}
+System::System(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
+    : impl_(std::make_unique<Impl>(std::move(rig), settings, timing, std::move(map))) {}
 System::~System() = default;
 TrackingResult System::feed(const FrameInput& input) { return impl_->feed(input); }
 void System::finish() { impl_->finish(); }

@@ -29,15 +29,16 @@ struct FrameInput {
 
 /// What is known of a frame right after it was fed.
 struct TrackingResult {
-  FrameId frame;
+  FrameId frame;  ///< Of this session, from 0 on.
   FrameState state = FrameState::kLost;
   FrameReason reason = FrameReason::kNone;  ///< Why there is no pose.
   std::optional<Rigid3> world_from_rig;     ///< The pose, in metres (map units for mono).
   /// Covariance of the pose for perturbations exp(xi) * rig_from_world, xi = (rho, phi) in (m,
   /// rad).
   Matrix6d covariance = Matrix6d::Zero();
-  int num_matches = 0;
-  int num_inliers = 0;
+  int num_matches = 0;     ///< Where there is no pose, of the place in the map that came closest.
+  int num_inliers = 0;     ///< The same.
+  int num_candidates = 0;  ///< Places in the map compared when all else had failed.
   bool is_keyframe = false;
   SubmapId submap;
   StageTimes stages;
@@ -68,12 +69,19 @@ class System {
  public:
   /// Throws InputError for a rig or settings that cannot work together, and for kRealtime, which is
   /// not supported yet.
-  System(Rig rig, const Settings& settings, Timing timing);
+  ///
+  /// map: one made before, that is to be extended, by whatever cameras; a copy goes on. The camera
+  /// is looked for in it; where it is not found, a new sub-map begins, which is joined once it is.
+  System(Rig rig,
+         const Settings& settings,
+         Timing timing,
+         std::shared_ptr<const Map> map = nullptr);
   ~System();
   System(const System&) = delete;
   System& operator=(const System&) = delete;
 
-  /// Tracks one frame; timestamps must increase. Rethrows what failed in the mapper's thread.
+  /// Tracks one frame; timestamps must increase. A map without scale takes no images with range:
+  /// then the first frame throws InputError. Rethrows what failed in the mapper's thread.
   TrackingResult feed(const FrameInput& input);
 
   /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards;

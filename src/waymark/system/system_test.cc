@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "waymark/base/check.h"
 #include "waymark/simulate/sequence.h"
 
@@ -151,6 +153,69 @@ TEST(System, AnImageWithoutFeaturesIsLostAndTheNextIsFoundAgain) {
   EXPECT_EQ(system.feed(input_of(frames()[4])).state, FrameState::kTracked);
   system.finish();
   EXPECT_EQ(system.trajectory().size(), 4u);
+}
+
+/// The first half of the frames, then a new session with the second half in the same map.
+Played play_in_two_sessions(Timing timing) {
+  constexpr std::size_t kHalf = kNumFrames / 2;
+  System first(small_rig(), small_settings(), Timing::kInline);
+  for (std::size_t i = 0; i < kHalf; ++i) first.feed(input_of(frames()[i]));
+  first.finish();
+  const auto map = first.map();
+  const std::size_t num_before = map->keyframes().size();
+  System second(small_rig(), small_settings(), timing, map);
+  Played played;
+  for (std::size_t i = kHalf; i < frames().size(); ++i) {
+    played.results.push_back(second.feed(input_of(frames()[i])));
+  }
+  second.finish();
+  played.trajectory = second.trajectory();
+  played.statistics = second.statistics();
+  played.map = second.map();
+  EXPECT_EQ(map->keyframes().size(), num_before);
+  EXPECT_EQ(map->broken_invariants(), "");
+  return played;
+}
+
+TEST(System, GoesOnInAMapMadeBefore) {
+  const Played played = play_in_two_sessions(Timing::kInline);
+  EXPECT_EQ(played.statistics.num_submaps, 1);
+  EXPECT_EQ(played.map->broken_invariants(), "");
+  ASSERT_EQ(played.trajectory.size(), played.results.size());
+  const Rigid3 world_from_first = frames()[0].world_from_rig;
+  for (std::size_t i = 0; i < played.results.size(); ++i) {
+    EXPECT_EQ(played.results[i].state, FrameState::kTracked) << "frame " << i;
+    EXPECT_EQ(played.trajectory[i].frame, FrameId{static_cast<std::uint32_t>(i)});
+    const auto& truth = frames()[kNumFrames / 2 + i].world_from_rig;
+    const Rigid3 error =
+        (world_from_first.inverse() * truth).inverse() * played.trajectory[i].world_from_rig;
+    EXPECT_LT(error.translation.norm(), 0.03) << "frame " << i;
+  }
+  std::vector<FrameId> keyframes;
+  played.map->keyframes().for_each(
+      [&](KeyframeId, const Keyframe& keyframe) { keyframes.push_back(keyframe.frame); });
+  EXPECT_TRUE(std::is_sorted(keyframes.begin(), keyframes.end()));
+  EXPECT_EQ(std::adjacent_find(keyframes.begin(), keyframes.end()), keyframes.end());
+}
+
+TEST(System, GoesOnWithTheSameBitsInAllTimings) {
+  const Played alone = play_in_two_sessions(Timing::kInline);
+  const Played threaded = play_in_two_sessions(Timing::kLockstep);
+  ASSERT_EQ(alone.trajectory.size(), threaded.trajectory.size());
+  for (std::size_t i = 0; i < alone.trajectory.size(); ++i) {
+    EXPECT_EQ(alone.trajectory[i].world_from_rig.matrix(),
+              threaded.trajectory[i].world_from_rig.matrix());
+  }
+}
+
+TEST(System, TakesNoRangesIntoAMapWithoutScale) {
+  Map map;
+  map.add_submap(false);
+  System system(small_rig(), small_settings(), Timing::kInline, map.freeze());
+  EXPECT_THROW(system.feed(input_of(frames()[0])), InputError);
+  FrameInput grey = input_of(frames()[0]);
+  grey.depth = {};
+  EXPECT_EQ(system.feed(grey).state, FrameState::kLost);
 }
 
 TEST(System, FinishesTwiceAndThenTakesNoFrames) {

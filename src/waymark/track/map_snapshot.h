@@ -15,4 +15,7 @@ struct MapSnapshot {
   std::shared_ptr<const PlaceIndex> places = std::make_shared<const PlaceIndex>();
 };
 
+/// A frozen map with the index of all its keyframes.
+MapSnapshot index_map(std::shared_ptr<const Map> map);
+
 }  // namespace waymark

@@ -64,21 +64,28 @@ std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  std::uint64_t stream,
                                                  std::vector<LandmarkId>& landmarks) {
   collect_strongest_neighbours(map, candidate, matched_keyframes_);
-  if (match_by_appearance(features, map, landmarks) < kMinMatches) return std::nullopt;
+  const std::size_t num_matches = match_by_appearance(features, map, landmarks);
+  attempt_ = {FrameReason::kTooFewMatches, static_cast<int>(num_matches), 0};
+  if (num_matches < kMinMatches) return std::nullopt;
+  attempt_.failure = FrameReason::kTooFewInliers;
   const std::optional<Rigid3> consensus = find_consensus(features, map, stream, landmarks);
   if (!consensus) return std::nullopt;
   collect_found(features, landmarks, found_);
   gather_local_map(map, found_, candidate, local_);
   LocatedPlace place;
   place.frame = match_around(features, map, *consensus, kFirstRadiusPx, landmarks);
+  attempt_.num_inliers = place.frame.num_inliers;
   if (place.frame.num_inliers < kMinInliers / 2) return std::nullopt;
   collect_found(features, landmarks, found_);
   gather_local_map(map, found_, candidate, local_);
   place.frame = match_around(features, map, place.frame.rig_from_world, kSecondRadiusPx, landmarks);
+  attempt_.num_inliers = place.frame.num_inliers;
   if (place.frame.num_inliers < kMinInliers) return std::nullopt;
   place.reference = local_.reference;
   place.confidence = place_confidence(
       *rig_, features, landmarks, map, place.reference, place.frame.rig_from_world);
+  attempt_.failure =
+      place.confidence < kMinConfidence ? FrameReason::kNotVerified : FrameReason::kNone;
   if (place.confidence < kMinConfidence) return std::nullopt;
   return place;
 }
@@ -137,6 +144,7 @@ std::optional<Rigid3> PlaceLocator::find_consensus(const Features& features,
                static_cast<double>(kMinConsensus) / static_cast<double>(observations_.size()));
   const std::optional<PoseEstimate> estimate =
       waymark::locate(*rig_, observations_, PoseOptions{}, ransac_options, workspace_);
+  if (estimate) attempt_.num_inliers = static_cast<int>(estimate->num_inliers);
   if (!estimate || estimate->num_inliers < kMinConsensus) return std::nullopt;
   for (std::size_t k = 0; k < feature_of_observation_.size(); ++k) {
     if (!estimate->is_inlier[k]) landmarks[feature_of_observation_[k]] = LandmarkId{};

@@ -8,6 +8,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/base/frame_state.h"
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
@@ -22,6 +23,14 @@ struct LocatedPlace {
   LocatedFrame frame;
   KeyframeId reference;     ///< Shares most landmarks with the features.
   double confidence = 0.0;  ///< See place_confidence(), of the reference.
+};
+
+/// How far the comparison with a place got.
+struct PlaceAttempt {
+  /// kTooFewMatches, kTooFewInliers or kNotVerified, in this order; kNone of a success.
+  FrameReason failure = FrameReason::kTooFewMatches;
+  int num_matches = 0;
+  int num_inliers = 0;
 };
 
 /// Finds out whether features show the surroundings of a keyframe, and from where, without a
@@ -44,6 +53,9 @@ class PlaceLocator {
                                      KeyframeId candidate,
                                      std::uint64_t stream,
                                      std::vector<LandmarkId>& landmarks);
+
+  /// What became of the last locate().
+  const PlaceAttempt& attempt() const { return attempt_; }
 
   /// The keyframes whose landmarks the last locate() began with: the candidate and its strongest
   /// neighbours. Another try from one of them would hardly end otherwise.
@@ -84,6 +96,7 @@ class PlaceLocator {
   std::vector<std::uint32_t> feature_of_observation_;
   std::vector<std::uint8_t> is_taken_;
   std::vector<LandmarkId> found_;  ///< Ascending.
+  PlaceAttempt attempt_;
 };
 
 }  // namespace waymark

@@ -3,6 +3,7 @@
 #include "waymark/track/relocalizer.h"
 
 #include <algorithm>
+#include <tuple>
 #include <utility>
 
 namespace waymark {
@@ -11,6 +12,22 @@ namespace {
 constexpr std::size_t kMaxCandidates = 10;
 /// What merely looks alike does not get that far; the other candidates need not be tried.
 constexpr double kCertainConfidence = 0.5;
+
+/// How many steps of the search passed before it failed.
+int step_of(FrameReason reason) {
+  switch (reason) {
+    case FrameReason::kNone:
+      return 4;
+    case FrameReason::kNotVerified:
+      return 3;
+    case FrameReason::kTooFewInliers:
+      return 2;
+    case FrameReason::kTooFewMatches:
+      return 1;
+    default:
+      return 0;
+  }
+}
 
 }  // namespace
 
@@ -28,26 +45,50 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
   query.is_excluded = [&map](const PlaceRow& row) {
     return !map.keyframes().contains(row.keyframe);
   };
-  const auto candidates = places.find(frame.features->descriptors, query);
+  candidates_.clear();
+  for (const PlaceCandidate& candidate : places.find(frame.features->descriptors, query)) {
+    candidates_.push_back(candidate.keyframe);
+  }
+  return locate_among(frame, map, candidates_, landmarks);
+}
+
+std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
+                                                      const Map& map,
+                                                      std::span<const KeyframeId> candidates,
+                                                      std::vector<LandmarkId>& landmarks) {
   std::optional<LocatedPlace> best;
   matched_.clear();
-  for (const PlaceCandidate& candidate : candidates) {
-    if (std::find(matched_.begin(), matched_.end(), candidate.keyframe) != matched_.end()) continue;
-    const auto place =
-        locator_.locate(*frame.features, map, candidate.keyframe, frame.id.value, seen_);
+  diagnosis_ = {.reason = FrameReason::kNoCandidate};
+  for (const KeyframeId candidate : candidates) {
+    if (std::find(matched_.begin(), matched_.end(), candidate) != matched_.end()) continue;
+    const auto place = locator_.locate(*frame.features, map, candidate, frame.id.value, seen_);
     const auto matched = locator_.matched_keyframes();
     matched_.insert(matched_.end(), matched.begin(), matched.end());
-    if (!place || place->frame.num_inliers < min_inliers_) continue;
-    if (best && place->confidence <= best->confidence) continue;
+    const bool has_inliers = place && place->frame.num_inliers >= min_inliers_;
+    PlaceAttempt attempt = locator_.attempt();
+    if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;
+    note(attempt);
+    if (!has_inliers || (best && place->confidence <= best->confidence)) continue;
     best = place;
     landmarks = seen_;
     if (best->confidence >= kCertainConfidence) break;
   }
-  reason_ = best                 ? FrameReason::kNone
-            : candidates.empty() ? FrameReason::kNoCandidate
-                                 : FrameReason::kNotVerified;
   if (!best) return std::nullopt;
   return best->frame;
+}
+
+void Relocalizer::note(const PlaceAttempt& attempt) {
+  const auto how_far = [](FrameReason reason, int num_inliers, int num_matches) {
+    return std::tuple(step_of(reason), num_inliers, num_matches);
+  };
+  ++diagnosis_.num_candidates;
+  if (how_far(attempt.failure, attempt.num_inliers, attempt.num_matches) <
+      how_far(diagnosis_.reason, diagnosis_.num_inliers, diagnosis_.num_matches)) {
+    return;
+  }
+  diagnosis_.reason = attempt.failure;
+  diagnosis_.num_matches = attempt.num_matches;
+  diagnosis_.num_inliers = attempt.num_inliers;
 }
 
 }  // namespace waymark

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "waymark/base/frame_state.h"
@@ -15,6 +16,14 @@
 #include "waymark/track/settings.h"
 
 namespace waymark {
+
+/// What became of the search for a place: of the place that came closest, or was found.
+struct PlaceDiagnosis {
+  FrameReason reason = FrameReason::kNone;  ///< kNoCandidate or PlaceAttempt::failure.
+  int num_candidates = 0;                   ///< Places compared.
+  int num_matches = 0;
+  int num_inliers = 0;
+};
 
 /// Finds frames of which nothing is known in the map: similar places from the index, the first of
 /// which that shows what the frame shows is the answer. The cost is bounded whatever the size of
@@ -31,13 +40,22 @@ class Relocalizer {
                                      const PlaceIndex& places,
                                      std::vector<LandmarkId>& landmarks);
 
-  /// Why the last locate() found nothing: kNoCandidate, kNotVerified, else kNone.
-  FrameReason reason() const { return reason_; }
+  /// The same with the keyframes to compare given, the likeliest first.
+  std::optional<LocatedFrame> locate_among(const Frame& frame,
+                                           const Map& map,
+                                           std::span<const KeyframeId> candidates,
+                                           std::vector<LandmarkId>& landmarks);
+
+  /// What became of the last search.
+  const PlaceDiagnosis& diagnosis() const { return diagnosis_; }
 
  private:
+  void note(const PlaceAttempt& attempt);
+
   PlaceLocator locator_;
   const int min_inliers_;
-  FrameReason reason_ = FrameReason::kNone;
+  PlaceDiagnosis diagnosis_;
+  std::vector<KeyframeId> candidates_;
   std::vector<KeyframeId> matched_;  ///< Those already tried for this frame.
   std::vector<LandmarkId> seen_;
 };

@@ -61,7 +61,7 @@ TEST_F(RelocalizerTest, FindsFramesInTheSubmapThatShowsTheirPlace) {
   for (const std::uint32_t submap : {0u, 1u}) {
     const auto located = locate(submap == 0 ? first_ : scene_.cloud, truth);
     ASSERT_TRUE(located);
-    EXPECT_EQ(relocalizer_.reason(), FrameReason::kNone);
+    EXPECT_EQ(relocalizer_.diagnosis().reason, FrameReason::kNone);
     EXPECT_LT((located->rig_from_world.origin_in_source() - truth.translation).norm(), 0.02);
     EXPECT_EQ(found_submap(), SubmapId{submap});
   }
@@ -90,17 +90,21 @@ TEST_F(RelocalizerTest, PrefersThePlaceThatExplainsMore) {
 
 TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {
   EXPECT_FALSE(locate(another_cloud(77), pose_at(0.5)));
-  EXPECT_NE(relocalizer_.reason(), FrameReason::kNone);
+  EXPECT_NE(relocalizer_.diagnosis().reason, FrameReason::kNone);
   // The looks of the place, but not its shape.
   for (PointLandmark& point : first_.landmarks) point.position.x() *= -1.0;
   EXPECT_FALSE(locate(first_, pose_at(0.5)));
-  EXPECT_EQ(relocalizer_.reason(), FrameReason::kNotVerified);
+  const PlaceDiagnosis& diagnosis = relocalizer_.diagnosis();
+  EXPECT_EQ(diagnosis.reason, FrameReason::kNotVerified);
+  EXPECT_GE(diagnosis.num_candidates, 2);
+  EXPECT_GT(diagnosis.num_matches, 100);
+  EXPECT_LT(diagnosis.num_inliers, diagnosis.num_matches / 2);
 }
 
 TEST_F(RelocalizerTest, SaysThatThereIsNoCandidate) {
   places_ = PlaceIndex();
   EXPECT_FALSE(locate(first_, pose_at(0.5)));
-  EXPECT_EQ(relocalizer_.reason(), FrameReason::kNoCandidate);
+  EXPECT_EQ(relocalizer_.diagnosis().reason, FrameReason::kNoCandidate);
 }
 
 TEST_F(RelocalizerTest, LeavesOutKeyframesThatTheMapDoesNotHave) {

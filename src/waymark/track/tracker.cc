@@ -39,6 +39,13 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       locator_(rig),
       relocalizer_(rig, settings, seed) {}
 
+void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
+  purpose_ = purpose;
+  mode_ = Mode::kLost;
+  num_sent_ = map.keyframes().end_id().value;
+  num_submaps_ = static_cast<std::uint32_t>(map.submaps().size());
+}
+
 TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, StageTimes& times) {
   map_ = visible.map;
   places_ = visible.places;
@@ -85,10 +92,17 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame) {
 }
 
 TrackOutcome Tracker::follow(const Frame& frame, StageTimes& times) {
-  if (frame.features->num_primary == 0) return lose(frame, FrameReason::kNoFeatures, times);
+  if (frame.features->num_primary == 0) {
+    return lose(frame, {.reason = FrameReason::kNoFeatures}, times);
+  }
   std::optional<LocatedFrame> located = locate_near_last(frame, times);
   if (!located) located = relocalize(frame, times);
-  if (!located) return lose(frame, relocalizer_.reason(), times);
+  if (!located) {
+    PlaceDiagnosis diagnosis = relocalizer_.diagnosis();
+    // Found, but not again in the local map.
+    if (diagnosis.reason == FrameReason::kNone) diagnosis.reason = FrameReason::kTooFewInliers;
+    return lose(frame, diagnosis, times);
+  }
   StageTimer timer(times, Stage::kKeyframe);
   return accept(frame, *located);
 }
@@ -100,7 +114,8 @@ std::optional<LocatedFrame> Tracker::locate_near_last(const Frame& frame, StageT
     carry_over();
     located = locate_from_last(frame);
   }
-  if (!located && num_lost_ < kRecoveryFrames) {
+  const bool was_somewhere = last_pose_.reference.is_valid();
+  if (!located && was_somewhere && num_lost_ < kRecoveryFrames) {
     StageTimer timer(times, Stage::kRecover);
     located = recover(frame);
   }
@@ -171,18 +186,30 @@ std::optional<LocatedFrame> Tracker::locate_near_keyframe(const Frame& frame, Ke
 }
 
 std::optional<LocatedFrame> Tracker::recover(const Frame& frame) {
-  const SubmapId submap = map_->keyframes().at(map_->resolve(last_pose_.reference)).submap;
-  std::uint32_t tried = 0;
-  for (std::uint32_t value = map_->keyframes().end_id().value; value-- > 0;) {
-    const Keyframe* keyframe = map_->keyframes().find(KeyframeId{value});
-    if (!keyframe || keyframe->submap != submap) continue;
-    if (auto located = locate_near_keyframe(frame, KeyframeId{value})) {
+  for (const KeyframeId id : recovery_keyframes()) {
+    if (auto located = locate_near_keyframe(frame, id)) {
       local_map_source_.reset();
       return located;
     }
-    if (++tried == kRecoveryKeyframes) break;
   }
   return std::nullopt;
+}
+
+std::vector<KeyframeId> Tracker::recovery_keyframes() const {
+  std::vector<KeyframeId> keyframes;
+  if (purpose_ == TrackingPurpose::kLocalizing) {
+    keyframes = local_.keyframes;
+    keyframes.resize(std::min<std::size_t>(keyframes.size(), kRecoveryKeyframes));
+    return keyframes;
+  }
+  const SubmapId submap = map_->keyframes().at(map_->resolve(last_pose_.reference)).submap;
+  for (std::uint32_t value = map_->keyframes().end_id().value; value-- > 0;) {
+    const Keyframe* keyframe = map_->keyframes().find(KeyframeId{value});
+    if (!keyframe || keyframe->submap != submap) continue;
+    keyframes.push_back(KeyframeId{value});
+    if (keyframes.size() == kRecoveryKeyframes) break;
+  }
+  return keyframes;
 }
 
 void Tracker::refresh_local_map(const Frame& frame) {
@@ -224,6 +251,7 @@ LocatedFrame Tracker::locate_in_local_map(const Frame& frame, const LocatedFrame
 }
 
 void Tracker::count_sightings(const ProjectionMatches& matches) {
+  if (purpose_ == TrackingPurpose::kLocalizing) return;
   for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
     if (matches.is_visible[i]) sightings_.push_back({local_.landmarks.ids[i], 1, 0});
   }
@@ -248,6 +276,7 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
   outcome.pose = RelativePose{local_.reference,
                               located.rig_from_world * reference.rig_from_world.inverse(),
                               reference.applied_scale};
+  if (purpose_ == TrackingPurpose::kLocalizing) return outcome;
   if (should_make_keyframe(assess(frame, located), settings_)) {
     outcome.message = make_keyframe(frame, *outcome.pose);
     outcome.keyframe = KeyframeId{num_sent_ - 1};
@@ -255,7 +284,7 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
   return outcome;
 }
 
-TrackOutcome Tracker::lose(const Frame& frame, FrameReason reason, StageTimes& times) {
+TrackOutcome Tracker::lose(const Frame& frame, const PlaceDiagnosis& diagnosis, StageTimes& times) {
   if (mode_ != Mode::kLost) {
     mode_ = Mode::kLost;
     num_lost_ = 0;
@@ -265,13 +294,17 @@ TrackOutcome Tracker::lose(const Frame& frame, FrameReason reason, StageTimes& t
   ++num_lost_;
   // With keyframes outstanding a new sub-map could not show in the next frame.
   const bool is_up_to_date = num_sent_ == map_->keyframes().end_id().value;
-  if (is_up_to_date && (!has_range_ || num_lost_ > kPatience)) {
+  const bool may_start = purpose_ == TrackingPurpose::kMapping && is_up_to_date;
+  if (may_start && (!has_range_ || num_lost_ > kPatience)) {
     StageTimer timer(times, Stage::kInitialize);
     if (auto started = start_submap(frame)) return *std::move(started);
   }
   TrackOutcome outcome;
   outcome.state = FrameState::kLost;
-  outcome.reason = reason;
+  outcome.reason = diagnosis.reason;
+  outcome.num_candidates = diagnosis.num_candidates;
+  outcome.num_matches = diagnosis.num_matches;
+  outcome.num_inliers = diagnosis.num_inliers;
   return outcome;
 }
 

@@ -24,6 +24,9 @@
 
 namespace waymark {
 
+/// Whether frames are only located in a map or also extend it.
+enum class TrackingPurpose { kMapping, kLocalizing };
+
 /// What tracking a frame gave.
 struct TrackOutcome {
   FrameState state = FrameState::kLost;
@@ -31,8 +34,9 @@ struct TrackOutcome {
   std::optional<RelativePose> pose;
   Rigid3 rig_from_world;  ///< The pose as of now, where there is one.
   Matrix6d covariance = Matrix6d::Zero();
-  int num_matches = 0;
-  int num_inliers = 0;
+  int num_matches = 0;     ///< Where there is no pose, of the place that came closest.
+  int num_inliers = 0;     ///< The same.
+  int num_candidates = 0;  ///< Places compared when all else had failed.
   std::optional<MapperMessage> message;  ///< For the mapper; a frame with a message is a keyframe.
   std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
   std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
@@ -45,13 +49,17 @@ struct TrackOutcome {
 /// 2015): predict, match to the last frame, match to the local map, decide on a keyframe. A lost
 /// frame is looked for in every sub-map; if no place looks like it, it helps to start a new one.
 /// Reads frozen maps, writes messages. The mapper must take the messages in order and give
-/// keyframes and sub-maps consecutive ids from 0; a new sub-map must show in the next frame.
+/// keyframes and sub-maps consecutive ids; a new sub-map must show in the next frame.
 class Tracker {
  public:
   Tracker(std::shared_ptr<const Rig> rig,
           bool has_range,
           const TrackingSettings& settings,
           std::uint64_t seed);
+
+  /// Begins lost in a map made before, with or without the right to extend it; before the first
+  /// frame. Ids go on from those of the map.
+  void begin_in(const Map& map, TrackingPurpose purpose);
 
   /// visible: the newest map that this frame may see; empty before the first sub-map.
   TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
@@ -68,7 +76,7 @@ class Tracker {
   void carry_over();
   std::optional<LocatedFrame> locate_from_last(const Frame& frame);
   std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
-  /// Among the newest keyframes of the sub-map it was in.
+  /// Among the keyframes where it was last, or while mapping the newest ones of that sub-map.
   std::optional<LocatedFrame> recover(const Frame& frame);
   /// Anywhere in the map.
   std::optional<LocatedFrame> relocalize(const Frame& frame, StageTimes& times);
@@ -76,7 +84,8 @@ class Tracker {
   void refresh_local_map(const Frame& frame);
   void count_sightings(const ProjectionMatches& matches);
   TrackOutcome accept(const Frame& frame, const LocatedFrame& located);
-  TrackOutcome lose(const Frame& frame, FrameReason reason, StageTimes& times);
+  TrackOutcome lose(const Frame& frame, const PlaceDiagnosis& diagnosis, StageTimes& times);
+  std::vector<KeyframeId> recovery_keyframes() const;
   KeyframeSituation assess(const Frame& frame, const LocatedFrame& located) const;
   NewKeyframe make_keyframe(const Frame& frame, const RelativePose& pose);
   std::vector<Sighting> take_sightings();
@@ -91,6 +100,7 @@ class Tracker {
   FrameLocator locator_;
   Relocalizer relocalizer_;
 
+  TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;
   int num_lost_ = 0;  ///< Frames since the loss.
   std::shared_ptr<const Map> map_;

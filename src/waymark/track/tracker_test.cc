@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <memory>
 #include <variant>
 
 #include "waymark/track/test_map.h"
@@ -24,14 +25,16 @@ class TrackerTest : public ::testing::Test {
 
   static PointCloud cloud() { return scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 3); }
 
-  Tracker make_tracker() const { return {scene_.rig, true, TrackingSettings{}, 1}; }
+  std::unique_ptr<Tracker> make_tracker() const {
+    return std::make_unique<Tracker>(scene_.rig, true, TrackingSettings{}, 1);
+  }
 
   TrackOutcome track(std::uint32_t number, const Features& features) {
     StageTimes times;
     const Frame frame{FrameId{number},
                       50'000'000 * std::int64_t{number},
                       std::make_shared<const Features>(features)};
-    return tracker_.track(frame, {map_, std::make_shared<const PlaceIndex>()}, times);
+    return tracker_->track(frame, {map_, places_}, times);
   }
 
   /// Tracks a view and lets the mapper answer.
@@ -59,8 +62,9 @@ class TrackerTest : public ::testing::Test {
   }
 
   TestMap scene_;
-  Tracker tracker_;
+  std::unique_ptr<Tracker> tracker_;
   std::shared_ptr<const Map> map_ = std::make_shared<const Map>();
+  std::shared_ptr<const PlaceIndex> places_ = std::make_shared<const PlaceIndex>();
 };
 
 TEST_F(TrackerTest, StartsASubmapAndThenFollows) {
@@ -151,6 +155,59 @@ TEST_F(TrackerTest, IsLostWhereItSeesNothingKnownAndRecoversWhereItDoes) {
   ASSERT_EQ(back.state, FrameState::kTracked);
   expect_pose(back, pose_at(0.05, 0.05, -0.1, -0.03));
   EXPECT_EQ(track(12, path(3)).state, FrameState::kTracked);
+}
+
+TEST_F(TrackerTest, ExtendsAMapMadeBefore) {
+  follow_path(30);
+  const std::uint32_t num_keyframes = map_->keyframes().end_id().value;
+  places_ = index_map(map_).places;
+  tracker_ = make_tracker();
+  tracker_->begin_in(*map_, TrackingPurpose::kMapping);
+  const TrackOutcome found = track(50, path(12));
+  EXPECT_TRUE(found.is_relocalized);
+  expect_pose(found, path(12));
+  std::uint32_t num_new = found.keyframe.has_value();
+  for (std::uint32_t i = 51; i < 100; ++i) {
+    const TrackOutcome outcome = track(i, path(12 + 3 * (i - 50)));
+    ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
+    if (!outcome.keyframe) continue;
+    EXPECT_EQ(*outcome.keyframe, KeyframeId{num_keyframes + num_new++});
+    EXPECT_TRUE(std::holds_alternative<NewKeyframe>(*outcome.message));
+  }
+  EXPECT_GE(num_new, 2u);
+}
+
+TEST_F(TrackerTest, BeginsASubmapWhereTheMapDoesNotHelp) {
+  follow_path(5);
+  places_ = index_map(map_).places;
+  tracker_ = make_tracker();
+  tracker_->begin_in(*map_, TrackingPurpose::kMapping);
+  scene_.cloud = scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 99);
+  for (std::uint32_t i = 10; i < 20; ++i) {
+    const TrackOutcome outcome = track(i, *scene_.look(path(i), i).features);
+    if (outcome.state == FrameState::kLost) continue;
+    ASSERT_TRUE(outcome.message);
+    EXPECT_TRUE(std::holds_alternative<NewSubmap>(*outcome.message));
+    EXPECT_EQ(outcome.submap, SubmapId{1});
+    return;
+  }
+  FAIL() << "no sub-map";
+}
+
+TEST_F(TrackerTest, LeavesTheMapAloneWhereItOnlyLocalizes) {
+  follow_path(30);
+  places_ = index_map(map_).places;
+  tracker_ = make_tracker();
+  tracker_->begin_in(*map_, TrackingPurpose::kLocalizing);
+  for (std::uint32_t i = 0; i < 30; ++i) {
+    const bool is_away = i >= 10 && i < 20;
+    const Rigid3 pose = is_away ? pose_at(0.2, 0.0, 0.0, 3.1) : path(3 + 0.9 * i);
+    const TrackOutcome outcome = track(i, pose);
+    EXPECT_EQ(outcome.state, is_away ? FrameState::kLost : FrameState::kTracked) << i;
+    EXPECT_FALSE(outcome.message);
+    EXPECT_FALSE(outcome.keyframe);
+    if (!is_away) expect_pose(outcome, pose);
+  }
 }
 
 TEST_F(TrackerTest, SaysThatAFrameHasNoFeatures) {

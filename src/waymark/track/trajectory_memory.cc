@@ -22,7 +22,7 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
   if (!outcome.pose) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
   for (const FilledPose& filled : outcome.filled) {
-    Entry& entry = entries_.at(filled.frame.value);
+    Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
     entry.pose = filled.pose;
     unsettled_.push_back({filled.frame, {}, filled.features});
@@ -41,7 +41,7 @@ void TrajectoryMemory::settle(const Map& map) {
 }
 
 void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
-  RelativePose& pose = entries_.at(unsettled.frame.value).pose;
+  RelativePose& pose = entry_of(unsettled.frame).pose;
   const KeyframeId living = map.resolve(pose.reference);
   const Keyframe& keyframe = map.keyframes().at(living);
   if (keyframe.frame == unsettled.frame) return;  // Adjusted with the map.
@@ -61,8 +61,9 @@ void TrajectoryMemory::fill_gaps(const Map& map) {
 }
 
 void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
-  Entry& entry = entries_.at(unposed.frame.value);
-  const std::int64_t neighbour = std::int64_t{unposed.frame.value} + step;
+  Entry& entry = entry_of(unposed.frame);
+  const std::int64_t neighbour =
+      std::int64_t{unposed.frame.value} - std::int64_t{first_.value} + step;
   if (has_pose(entry) || neighbour < 0 || neighbour >= std::ssize(entries_)) return;
   const Entry& known = entries_[static_cast<std::size_t>(neighbour)];
   if (!has_pose(known)) return;
@@ -79,11 +80,11 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
   entry.pose = {living, *found * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
 }
 
-std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t frame,
+std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t index,
                                                        SubmapId submap,
                                                        const Map& map) const {
-  if (frame < 0 || frame >= std::ssize(entries_)) return std::nullopt;
-  const Entry& entry = entries_[static_cast<std::size_t>(frame)];
+  if (index < 0 || index >= std::ssize(entries_)) return std::nullopt;
+  const Entry& entry = entries_[static_cast<std::size_t>(index)];
   if (!has_pose(entry)) return std::nullopt;
   const RelativePose& pose = entry.pose;
   if (map.keyframes().at(map.resolve(pose.reference)).submap != submap) return std::nullopt;

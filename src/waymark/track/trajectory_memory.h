@@ -28,7 +28,15 @@ class TrajectoryMemory {
     RelativePose pose;  ///< Where state is kTracked or kFilled.
   };
 
-  explicit TrajectoryMemory(std::shared_ptr<const Rig> rig) : refiner_(std::move(rig)) {}
+  /// first: the id of the first frame; those of the others follow.
+  explicit TrajectoryMemory(std::shared_ptr<const Rig> rig, FrameId first = FrameId{0})
+      : first_(first), refiner_(std::move(rig)) {}
+
+  FrameId first() const { return first_; }
+  /// The id of the frame after those added so far.
+  FrameId next() const {
+    return FrameId{first_.value + static_cast<std::uint32_t>(entries_.size())};
+  }
 
   /// Adds the next frame; map is the one it was tracked in.
   void add(const Frame& frame, const TrackOutcome& outcome, const Map& map);
@@ -36,6 +44,7 @@ class TrajectoryMemory {
   /// frames before and after them that had none.
   void settle(const Map& map);
 
+  /// In the order of the frames.
   const std::vector<Entry>& entries() const { return entries_; }
 
  private:
@@ -52,12 +61,15 @@ class TrajectoryMemory {
     std::shared_ptr<const Features> features;
   };
 
+  Entry& entry_of(FrameId frame) { return entries_.at(frame.value - first_.value); }
   void settle(const Unsettled& unsettled, const Map& map);
   void fill_gaps(const Map& map);
   /// Looks for a frame near its neighbour, one step (1 or -1 frames) away.
   void fill(const Unposed& unposed, int step, const Map& map);
-  std::optional<Rigid3> rig_from_world(std::int64_t frame, SubmapId submap, const Map& map) const;
+  /// index: of an entry.
+  std::optional<Rigid3> rig_from_world(std::int64_t index, SubmapId submap, const Map& map) const;
 
+  const FrameId first_;
   std::vector<Entry> entries_;
   std::deque<Unsettled> unsettled_;
   std::deque<Unposed> unposed_;

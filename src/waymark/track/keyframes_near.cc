@@ -1,0 +1,83 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/keyframes_near.h"
+
+#include <algorithm>
+#include <cstdint>
+#include <tuple>
+
+namespace waymark {
+namespace {
+
+/// Of so many nearest keyframes, those that see what the rig should see are wanted.
+constexpr std::size_t kNumNearest = 40;
+/// What was seen from elsewhere does not look alike from here.
+constexpr double kMinDirectionCos = 0.5;
+
+std::vector<KeyframeId> nearest(const Map& map, SubmapId submap, const Eigen::Vector3d& centre) {
+  std::vector<std::tuple<double, KeyframeId>> distances;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.submap != submap) return;
+    distances.emplace_back((keyframe.rig_from_world.origin_in_source() - centre).norm(), id);
+  });
+  std::sort(distances.begin(), distances.end());
+  if (distances.size() > kNumNearest) distances.resize(kNumNearest);
+  std::vector<KeyframeId> ids;
+  for (const auto& [distance, id] : distances) ids.push_back(id);
+  return ids;
+}
+
+/// How many landmarks of a keyframe face the camera and lie within its image.
+std::size_t count_visible(const Map& map,
+                          const Keyframe& keyframe,
+                          const Camera& camera,
+                          const Rigid3& cam_from_world) {
+  const Eigen::Vector3d centre = cam_from_world.origin_in_source();
+  std::vector<Eigen::Vector3d> points_in_cam;
+  for (std::size_t i = 0; i < keyframe.features->num_primary; ++i) {
+    if (!keyframe.landmarks[i].is_valid()) continue;
+    const Landmark& landmark = map.landmarks().at(keyframe.landmarks[i]);
+    const Eigen::Vector3d to_camera = centre - landmark.position_in_world;
+    if (to_camera.dot(landmark.appearance.direction) < kMinDirectionCos * to_camera.norm()) {
+      continue;
+    }
+    points_in_cam.push_back(cam_from_world * landmark.position_in_world);
+  }
+  std::vector<Eigen::Vector2d> pixels(points_in_cam.size());
+  std::vector<std::uint8_t> is_visible(points_in_cam.size());
+  camera.project(points_in_cam, pixels, is_visible);
+  return static_cast<std::size_t>(
+      std::count(is_visible.begin(), is_visible.end(), std::uint8_t{1}));
+}
+
+}  // namespace
+
+std::vector<KeyframeId> keyframes_near(const Map& map,
+                                       SubmapId submap,
+                                       const Rig& rig,
+                                       const Rigid3& rig_from_world,
+                                       std::size_t max_count) {
+  const RigCamera& camera = rig.cameras.at(0);
+  const Rigid3 cam_from_world = camera.cam_from_rig * rig_from_world;
+  struct Ranked {
+    std::size_t num_visible;
+    KeyframeId id;
+  };
+  std::vector<Ranked> ranked;
+  for (const KeyframeId id : nearest(map, submap, rig_from_world.origin_in_source())) {
+    const std::size_t num_visible =
+        count_visible(map, map.keyframes().at(id), *camera.camera, cam_from_world);
+    if (num_visible > 0) ranked.push_back({num_visible, id});
+  }
+  std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) {
+    return a.num_visible > b.num_visible;
+  });
+  std::vector<KeyframeId> ids;
+  for (const Ranked& keyframe : ranked) {
+    if (ids.size() == max_count) break;
+    ids.push_back(keyframe.id);
+  }
+  return ids;
+}
+
+}  // namespace waymark
