@@ -1,0 +1,138 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/localizer.h"
+
+#include <utility>
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/image/frame_builder.h"
+#include "waymark/track/keyframes_near.h"
+#include "waymark/track/relocalizer.h"
+#include "waymark/track/tracker.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::size_t kMaxNearHint = 5;
+
+/// The sub-map of the landmarks that were recognised.
+SubmapId submap_of(const Map& map, const std::vector<LandmarkId>& landmarks) {
+  for (const LandmarkId id : landmarks) {
+    if (id.is_valid()) return map.landmarks().at(id).submap;
+  }
+  return {};
+}
+
+}  // namespace
+
+class Localizer::Impl {
+ public:
+  Impl(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
+      : rig_(std::make_shared<const Rig>(std::move(rig))),
+        uses_range_(is_metric(*map)),
+        builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
+        snapshot_(index_map(std::move(map))),
+        tracker_(rig_, uses_range_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
+        relocalizer_(rig_, settings.tracking, static_cast<std::uint64_t>(settings.seed)) {
+    tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
+  }
+
+  TrackingResult track(const FrameInput& input);
+  TrackingResult locate(const FrameInput& input, const std::optional<PoseHint>& hint);
+
+ private:
+  Frame build(const FrameInput& input, TrackingResult& result);
+  std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
+
+  const std::shared_ptr<const Rig> rig_;
+  const bool uses_range_;
+  FrameBuilder builder_;
+  const MapSnapshot snapshot_;
+  Tracker tracker_;
+  Relocalizer relocalizer_;
+  std::uint32_t num_frames_ = 0;
+  std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
+  std::vector<LandmarkId> landmarks_;
+};
+
+Frame Localizer::Impl::build(const FrameInput& input, TrackingResult& result) {
+  FrameImages images{input.image0, {}, {}, input.mask};
+  if (uses_range_) {
+    images.image1 = input.image1;
+    images.depth = input.depth;
+  }
+  Frame frame{FrameId{num_frames_}, input.timestamp_ns, builder_.build(images)};
+  ++num_frames_;
+  result.frame = frame.id;
+  result.stages[Stage::kFeatures] = builder_.times().features_ms;
+  result.stages[Stage::kDepth] = builder_.times().depth_ms;
+  return frame;
+}
+
+TrackingResult Localizer::Impl::track(const FrameInput& input) {
+  if (last_timestamp_ns_ && input.timestamp_ns <= *last_timestamp_ns_) {
+    throw InputError("frame " + std::to_string(num_frames_),
+                     "time stamp is not later than that of the frame before");
+  }
+  TrackingResult result;
+  const Frame frame = build(input, result);
+  last_timestamp_ns_ = input.timestamp_ns;
+  const TrackOutcome outcome = tracker_.track(frame, snapshot_, result.stages);
+  result.state = outcome.state;
+  result.reason = outcome.reason;
+  if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
+  result.covariance = outcome.covariance;
+  result.num_matches = outcome.num_matches;
+  result.num_inliers = outcome.num_inliers;
+  result.num_candidates = outcome.num_candidates;
+  result.submap = outcome.submap;
+  return result;
+}
+
+TrackingResult Localizer::Impl::locate(const FrameInput& input,
+                                       const std::optional<PoseHint>& hint) {
+  TrackingResult result;
+  const Frame frame = build(input, result);
+  StageTimer timer(result.stages, Stage::kRecover);
+  if (frame.features->num_primary == 0) {
+    result.reason = FrameReason::kNoFeatures;
+    return result;
+  }
+  const std::optional<LocatedFrame> located = search(frame, hint);
+  const PlaceDiagnosis& diagnosis = relocalizer_.diagnosis();
+  result.num_candidates = diagnosis.num_candidates;
+  result.reason = diagnosis.reason;
+  result.num_matches = diagnosis.num_matches;
+  result.num_inliers = diagnosis.num_inliers;
+  if (!located) return result;
+  result.state = FrameState::kTracked;
+  result.world_from_rig = located->rig_from_world.inverse();
+  result.covariance = located->covariance;
+  result.num_matches = located->num_matches;
+  result.num_inliers = located->num_inliers;
+  result.submap = submap_of(*snapshot_.map, landmarks_);
+  return result;
+}
+
+std::optional<LocatedFrame> Localizer::Impl::search(const Frame& frame,
+                                                    const std::optional<PoseHint>& hint) {
+  if (hint) {
+    const std::vector<KeyframeId> near = keyframes_near(
+        *snapshot_.map, hint->submap, *rig_, hint->world_from_rig.inverse(), kMaxNearHint);
+    if (auto located = relocalizer_.locate_among(frame, *snapshot_.map, near, landmarks_)) {
+      return located;
+    }
+  }
+  return relocalizer_.locate(frame, *snapshot_.map, *snapshot_.places, landmarks_);
+}
+
+Localizer::Localizer(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
+    : impl_(std::make_unique<Impl>(std::move(rig), settings, std::move(map))) {}
+Localizer::~Localizer() = default;
+TrackingResult Localizer::track(const FrameInput& input) { return impl_->track(input); }
+TrackingResult Localizer::locate(const FrameInput& input, const std::optional<PoseHint>& hint) {
+  return impl_->locate(input, hint);
+}
+
+}  // namespace waymark

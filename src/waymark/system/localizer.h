@@ -1,0 +1,48 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "waymark/camera/rig.h"
+#include "waymark/map/map.h"
+#include "waymark/system/settings.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// About where an image was taken, in the frame of a sub-map.
+struct PoseHint {
+  Rigid3 world_from_rig;
+  SubmapId submap{0};
+};
+
+/// Finds images in a map that stays as it is. The camera may be of another model, size and lens
+/// than those the map was made with. Poses are in the map's frame. Ranges of stereo and depth count
+/// only in maps with a scale in metres.
+///
+/// A result without a pose tells how far the search got: how many places were compared
+/// (num_candidates), and of the one that came closest the matches, the inliers and why it was
+/// refused (reason). One thread at a time.
+class Localizer {
+ public:
+  /// Throws InputError for a rig or settings that cannot work together.
+  Localizer(Rig rig, const Settings& settings, std::shared_ptr<const Map> map);
+  ~Localizer();
+  Localizer(const Localizer&) = delete;
+  Localizer& operator=(const Localizer&) = delete;
+
+  /// The next image of a stream: looked for near the one before, and anywhere where it is not.
+  TrackingResult track(const FrameInput& input);
+
+  /// An image by itself: looked for near the hint, if there is one, and anywhere where it is not.
+  /// Leaves the stream alone.
+  TrackingResult locate(const FrameInput& input, const std::optional<PoseHint>& hint = {});
+
+ private:
+  class Impl;
+  std::unique_ptr<Impl> impl_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,166 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/localizer.h"
+
+#include <gtest/gtest.h>
+
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kNumFrames = 25;
+
+CameraDescription pinhole(double focal_px, int width_px, int height_px) {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {focal_px, focal_px, 0.5 * (width_px - 1), 0.5 * (height_px - 1)};
+  camera.width_px = width_px;
+  camera.height_px = height_px;
+  return camera;
+}
+
+SequenceSpec spec_of(const CameraDescription& camera) {
+  SequenceSpec spec;
+  spec.name = "small";
+  spec.motion = "slide";
+  spec.seed = 3;
+  spec.num_frames = kNumFrames;
+  spec.chain = rgbd_chain(camera, 1000.0);
+  return spec;
+}
+
+FrameInput input_of(const SimulatedFrame& frame) {
+  FrameInput input;
+  input.timestamp_ns = frame.timestamp_ns;
+  input.image0 = frame.images[0].view();
+  input.depth = frame.depth.view();
+  return input;
+}
+
+Settings small_settings() {
+  Settings settings;
+  settings.features.count = 500;
+  settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
+  return settings;
+}
+
+/// A map with depth, and views of another, sharper camera on the same way. Made once.
+struct Scene {
+  Scene() : query(spec_of(pinhole(260.0, 400, 260))) {
+    SimulatedSequence sequence(spec_of(pinhole(210.0, 320, 240)));
+    System system(sequence.rig(), small_settings(), Timing::kInline);
+    for (int i = 0; i < kNumFrames; ++i) system.feed(input_of(sequence.frame(i)));
+    system.finish();
+    map = system.map();
+    truth_of_map = sequence.world_from_rig(0);
+    for (int i = 0; i < kNumFrames; ++i) frames.push_back(query.frame(i));
+  }
+
+  Rigid3 truth(std::size_t i) const { return truth_of_map.inverse() * frames[i].world_from_rig; }
+
+  SimulatedSequence query;
+  std::shared_ptr<const Map> map;
+  Rigid3 truth_of_map;  ///< World of the simulation from that of the map.
+  std::vector<SimulatedFrame> frames;
+};
+
+Scene& scene() {
+  static Scene made;
+  return made;
+}
+
+void expect_pose(const TrackingResult& result, std::size_t i) {
+  ASSERT_EQ(result.state, FrameState::kTracked) << "frame " << i;
+  EXPECT_EQ(result.reason, FrameReason::kNone);
+  EXPECT_EQ(result.submap, SubmapId{0});
+  EXPECT_FALSE(result.is_keyframe);
+  EXPECT_GE(result.num_inliers, 30);
+  EXPECT_GE(result.num_matches, result.num_inliers);
+  EXPECT_GT(result.covariance.trace(), 0.0);
+  const Rigid3 error = scene().truth(i).inverse() * *result.world_from_rig;
+  EXPECT_LT(error.translation.norm(), 0.03) << "frame " << i;
+  EXPECT_LT(error.log().tail<3>().norm(), 0.01) << "frame " << i;
+}
+
+TEST(Localizer, FollowsAStreamOfAnotherCamera) {
+  const std::size_t num_keyframes = scene().map->keyframes().size();
+  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  for (std::size_t i = 0; i < scene().frames.size(); ++i) {
+    expect_pose(localizer.track(input_of(scene().frames[i])), i);
+  }
+  EXPECT_EQ(scene().map->keyframes().size(), num_keyframes);
+  EXPECT_THROW(localizer.track(input_of(scene().frames[0])), InputError);
+}
+
+TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
+  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  for (const std::size_t i : {20u, 3u, 11u}) {
+    FrameInput grey = input_of(scene().frames[i]);
+    grey.depth = {};
+    const TrackingResult result = localizer.locate(grey);
+    expect_pose(result, i);
+    EXPECT_GE(result.num_candidates, 1);
+    Rigid3 about = scene().truth(i);
+    about.translation += Eigen::Vector3d(0.1, -0.05, 0.1);
+    expect_pose(localizer.locate(grey, PoseHint{about, SubmapId{0}}), i);
+    about.translation += Eigen::Vector3d(100.0, 0.0, 0.0);  // A hint that leads astray.
+    expect_pose(localizer.locate(grey, PoseHint{about, SubmapId{0}}), i);
+  }
+}
+
+TEST(Localizer, SaysWhatFailed) {
+  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  const Image black(400, 260);
+  FrameInput input = input_of(scene().frames[5]);
+  input.image0 = black.view();
+  for (const TrackingResult& blind : {localizer.locate(input), localizer.track(input)}) {
+    EXPECT_EQ(blind.state, FrameState::kLost);
+    EXPECT_EQ(blind.reason, FrameReason::kNoFeatures);
+    EXPECT_FALSE(blind.world_from_rig);
+  }
+  // Upside down nothing of the geometry fits; what looks alike is found.
+  Image mirrored(400, 260);
+  for (int v = 0; v < 260; ++v) {
+    for (int u = 0; u < 400; ++u) {
+      mirrored.row(v)[u] = scene().frames[5].images[0].row(v)[399 - u];
+    }
+  }
+  input.timestamp_ns += 1;
+  input.image0 = mirrored.view();
+  input.depth = {};
+  for (const TrackingResult& other : {localizer.locate(input), localizer.track(input)}) {
+    EXPECT_EQ(other.state, FrameState::kLost);
+    EXPECT_TRUE(other.reason == FrameReason::kTooFewMatches ||
+                other.reason == FrameReason::kTooFewInliers ||
+                other.reason == FrameReason::kNotVerified);
+    EXPECT_GE(other.num_candidates, 1);
+  }
+}
+
+TEST(Localizer, HasNothingToFindInAnEmptyMap) {
+  Localizer localizer(scene().query.rig(), small_settings(), std::make_shared<const Map>());
+  const TrackingResult result = localizer.locate(input_of(scene().frames[0]));
+  EXPECT_EQ(result.reason, FrameReason::kNoCandidate);
+  EXPECT_EQ(localizer.track(input_of(scene().frames[0])).reason, FrameReason::kNoCandidate);
+}
+
+TEST(Localizer, TheCameraMayChangeWhileAMapIsExtended) {
+  System system(scene().query.rig(), small_settings(), Timing::kInline, scene().map);
+  for (const SimulatedFrame& frame : scene().frames) system.feed(input_of(frame));
+  system.finish();
+  EXPECT_EQ(system.map()->broken_invariants(), "");
+  EXPECT_EQ(system.statistics().num_submaps, 1);
+  const std::vector<TrajectoryFrame> trajectory = system.trajectory();
+  ASSERT_EQ(trajectory.size(), scene().frames.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    const Rigid3 error = scene().truth(i).inverse() * trajectory[i].world_from_rig;
+    EXPECT_LT(error.translation.norm(), 0.02) << "frame " << i;
+  }
+}
+
+}  // namespace
+}  // namespace waymark
