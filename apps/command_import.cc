@@ -94,17 +94,14 @@ int import_map(const ImportOptions& options) {
 
 void add_import_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<ImportOptions>();
-  CLI::App& import = *program.add_subcommand(
+  CLI::App& importing = *program.add_subcommand(
       "import", "Take over a map of OpenVSLAM or stella_vslam, or the cameras of its settings");
-  import.add_option("MAP", options->map, "Map file (.msg)");
-  import.add_option("-o,--out", options->out, "Map file to write; without MAP a camchain");
-  import.add_option("--settings",
-                    options->settings,
-                    "Settings of the same program (YAML); without MAP they become a camchain");
-  import.callback([options, &command] { command = [options] { return import_map(*options);
-};
-}  // namespace waymark
-);
+  importing.add_option("MAP", options->map, "Map file (.msg)");
+  importing.add_option("-o,--out", options->out, "Map file to write; without MAP a camchain");
+  importing.add_option("--settings",
+                       options->settings,
+                       "Settings of the same program (YAML); without MAP they become a camchain");
+  importing.callback([options, &command] { command = [options] { return import_map(*options); }; });
 }
 
 }  // namespace waymark

@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "autosave.h"
 #include "choice_option.h"
 #include "commands.h"
 #include "interrupt.h"
@@ -26,6 +27,8 @@ namespace {
 struct RunOptions {
   SessionOptions session;
   std::filesystem::path out = "waymark-out";
+  std::filesystem::path map_out;  ///< Empty: the map is not saved.
+  double autosave_s = 60.0;
   std::filesystem::path log;
   bool is_quiet = false;
   bool is_verbose = false;
@@ -93,12 +96,18 @@ void report_focal_check(Reporter& reporter, const FocalCheck& check) {
   }
 }
 
-SessionResults map_input(Session& session, const RunOptions& options, Reporter& reporter) {
+SessionResults map_input(Session& session,
+                         const RunOptions& options,
+                         Autosave& autosave,
+                         Reporter& reporter) {
   catch_interrupts();
   const FrameObserver report = report_frames(reporter, session.input->info());
   bool is_focal_checked = false;
   const FrameObserver observer = [&](const FrameRecord& record) {
     report(record);
+    if (const auto failure = autosave.update(session.system->map())) {
+      reporter.warning("autosave: " + *failure);
+    }
     const FocalCheck* check = is_focal_checked ? nullptr : session.system->focal_check();
     if (check == nullptr) return;
     is_focal_checked = true;
@@ -111,18 +120,36 @@ SessionResults map_input(Session& session, const RunOptions& options, Reporter& 
   return run_session(*session.input, *session.system, is_interrupted, observer);
 }
 
+void save_final_map(const System& system,
+                    const RunOptions& options,
+                    Autosave& autosave,
+                    Reporter& reporter) {
+  if (system.map()->keyframes().is_empty()) {
+    reporter.warning(fmt::format("{}: there is no map to save, the file stays as it was",
+                                 options.map_out.string()));
+    return;
+  }
+  autosave.save(system.map());
+  reporter.info(fmt::format("map in {}", options.map_out.string()));
+}
+
 int run(const RunOptions& options, Reporter& reporter) {
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
   make_output_folder(options.out);
+  const bool has_map_out = !options.map_out.empty();
+  if (has_map_out) AtomicFile{options.map_out};  // Fails now rather than in the end.
+  Autosave autosave(
+      options.map_out, has_map_out ? options.autosave_s : 0.0, settings_as_yaml(session.settings));
 
-  SessionResults results = map_input(session, options, reporter);
+  SessionResults results = map_input(session, options, autosave, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(session.input->info().setup);
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
+  if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
   write_results(options.out, results);
   report_results(reporter, results, options);
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
@@ -188,6 +215,17 @@ void add_selection_options(CLI::App& command, RunOptions& options) {
       ->check(CLI::Range(1e-3, 1e3));
 }
 
+void add_map_options(CLI::App& command, RunOptions& options) {
+  CLI::Option& map_out = *command.add_option(
+      "--map-out", options.map_out, "Save the map to this file (.wmap) [not saved]");
+  command
+      .add_option("--autosave",
+                  options.autosave_s,
+                  "Save it every so many seconds while running, too; 0: at the end only [60]")
+      ->needs(&map_out)
+      ->check(CLI::Range(0.0, 1e6));
+}
+
 void add_report_options(CLI::App& command, RunOptions& options) {
   CLI::Option& quiet = *command.add_flag("--quiet", options.is_quiet, "Errors only [off]");
   command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
@@ -209,6 +247,7 @@ void add_run_command(CLI::App& program, Command& command) {
                      "inline (one thread) or lockstep (threads, same results) [lockstep]");
   run_command.add_option("--seed", options->session.seed, "Seed of all random numbers [0]")
       ->check(CLI::Range(0, 1000000000));
+  add_map_options(run_command, *options);
   add_report_options(run_command, *options);
   run_command.callback(
       [options, &command] { command = [options] { return run_and_log(*options); }; });

@@ -47,13 +47,13 @@ class Usage(CliTest):
         top = waymark("--help")
         self.assertEqual(top.returncode, 0)
         self.assertIn("Exit status", top.stdout)
-        for command in ("run", "eval", "simulate", "config"):
+        for command in ("run", "map", "eval", "simulate", "config"):
             self.assertIn(command, top.stdout)
             self.assertEqual(waymark(command, "--help").returncode, 0)
         text = waymark("run", "--help").stdout
         for option in ("--config", "--set", "--setup", "--out", "--timing", "--first", "--frames",
                        "--every", "--mask", "--pace", "--seed", "--quiet", "--verbose", "--log",
-                       "--format"):
+                       "--format", "--map-out", "--autosave"):
             self.assertIn(option, text)
 
     def test_config_makes_a_camchain_of_other_calibrations(self):
@@ -71,7 +71,7 @@ class Usage(CliTest):
 
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
-        self.assert_fails(waymark("fly"), 2, "'fly'", "run, eval, simulate, config")
+        self.assert_fails(waymark("fly"), 2, "'fly'", "run, map, eval, simulate")
         self.assert_fails(waymark("run"), 2, "INPUT")
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")

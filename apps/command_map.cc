@@ -1,0 +1,115 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "commands.h"
+#include "waymark/base/check.h"
+#include "waymark/io/map_file.h"
+
+namespace waymark {
+namespace {
+
+/// What a sub-map holds.
+struct SubmapSize {
+  std::size_t num_keyframes = 0;
+  std::size_t num_landmarks = 0;
+};
+
+std::vector<SubmapSize> measure_submaps(const Map& map) {
+  std::vector<SubmapSize> sizes(map.submaps().size());
+  map.keyframes().for_each(
+      [&](KeyframeId, const Keyframe& keyframe) { ++sizes[keyframe.submap.value].num_keyframes; });
+  map.landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { ++sizes[landmark.submap.value].num_landmarks; });
+  return sizes;
+}
+
+void print_submaps(const Map& map) {
+  const std::vector<SubmapSize> sizes = measure_submaps(map);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    const Submap& submap = map.submaps()[i];
+    if (submap.joined_into.is_valid()) {
+      fmt::print("sub-map {}: joined into sub-map {}\n", i, submap.joined_into.value);
+    } else {
+      fmt::print("sub-map {}: {} keyframes, {} landmarks, {}\n",
+                 i,
+                 sizes[i].num_keyframes,
+                 sizes[i].num_landmarks,
+                 submap.is_metric ? "in metres" : "scale free");
+    }
+  }
+}
+
+void print_rigs(const Map& map) {
+  std::vector<const Rig*> rigs;
+  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+    const Rig* rig = keyframe.rig.get();
+    if (std::find(rigs.begin(), rigs.end(), rig) == rigs.end()) rigs.push_back(rig);
+  });
+  for (std::size_t i = 0; i < rigs.size(); ++i) {
+    for (std::size_t j = 0; j < rigs[i]->cameras.size(); ++j) {
+      const CameraDescription& camera = rigs[i]->cameras[j].description.value();
+      fmt::print("rig {}, camera {}: {}, distortion {}, {}x{} px\n",
+                 i,
+                 j,
+                 camera.camera_model,
+                 camera.distortion_model,
+                 camera.width_px,
+                 camera.height_px);
+    }
+  }
+}
+
+int print_info(const std::filesystem::path& path) {
+  const StoredMap stored = load_map(path);
+  const Map& map = *stored.map;
+  const auto num_bytes = static_cast<double>(std::filesystem::file_size(path));
+  fmt::print("{}: written by {}, {:.1f} MB\n", path.string(), stored.producer, 1e-6 * num_bytes);
+  print_rigs(map);
+  print_submaps(map);
+  fmt::print("{} keyframes, {} landmarks, {} loop edges, {} images\n",
+             map.keyframes().size(),
+             map.landmarks().size(),
+             map.measured_loop_edges().size(),
+             stored.images.size());
+  return kDone;
+}
+
+int check_map(const std::filesystem::path& path) {
+  const std::vector<std::string> faults = find_map_faults(path);
+  for (const std::string& fault : faults) fmt::print("{}\n", fault);
+  if (!faults.empty()) {
+    throw InputError(path.string(), fmt::format("has {} faults, expected none", faults.size()));
+  }
+  fmt::print("{}: sound\n", path.string());
+  return kDone;
+}
+
+void add_task(CLI::App& maps,
+              const char* name,
+              const char* help,
+              int (*task)(const std::filesystem::path&),
+              Command& command) {
+  const auto path = std::make_shared<std::filesystem::path>();
+  CLI::App& added = *maps.add_subcommand(name, help);
+  added.add_option("MAP", *path, "Map file (.wmap)")->required();
+  added.callback([path, task, &command] { command = [path, task] { return task(*path); }; });
+}
+
+}  // namespace
+
+void add_map_command(CLI::App& program, Command& command) {
+  CLI::App& maps = *program.add_subcommand("map", "Look at or verify saved maps");
+  maps.require_subcommand(1);
+  add_task(maps, "info", "Print what a map holds", print_info, command);
+  add_task(maps, "check", "Name everything that is wrong with a map", check_map, command);
+}
+
+}  // namespace waymark
