@@ -6,6 +6,7 @@
 #include <filesystem>
 #include <memory>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "choice_option.h"
@@ -16,6 +17,7 @@
 #include "waymark/io/export_nerfstudio.h"
 #include "waymark/io/export_ply.h"
 #include "waymark/io/export_scene.h"
+#include "waymark/io/export_split.h"
 #include "waymark/io/map_file.h"
 
 namespace waymark {
@@ -28,6 +30,7 @@ struct ExportOptions {
   std::filesystem::path out;
   ExportFormat format = ExportFormat::kPly;
   bool is_text = false;
+  int split_views = 0;  ///< 0: as they are.
 };
 
 /// "points.ply", "points_1.ply" and so on.
@@ -37,35 +40,60 @@ std::filesystem::path numbered(std::filesystem::path path, std::size_t number) {
       fmt::format("{}_{}{}", path.stem().string(), number, path.extension().string()));
 }
 
+void write_nerfstudio(const std::filesystem::path& folder,
+                      const ExportScene& scene,
+                      std::size_t number) {
+  NerfstudioPaths paths;
+  paths.point_file = numbered(paths.point_file, number).string();
+  const std::string json = format_nerfstudio(scene, paths);  // Before anything is written.
+  make_output_folder(folder);
+  write_ply(folder / paths.point_file, scene);
+  write_file_atomically(folder / numbered("transforms.json", number), json);
+}
+
+/// A model for COLMAP or nerfstudio, with images.
+void export_model(const ExportOptions& options,
+                  const StoredMap& stored,
+                  ExportScene scene,
+                  std::size_t number) {
+  SplitScene split;
+  if (options.split_views > 0) {
+    split = split_scene(scene, options.split_views, CameraRegistry::with_builtin_models());
+  } else {
+    split.parts.resize(scene.views.size());
+    split.scene = std::move(scene);
+  }
+  if (options.format == ExportFormat::kColmap) {
+    write_colmap(options.out / "sparse" / fmt::to_string(number),
+                 split.scene,
+                 options.is_text ? ColmapForm::kText : ColmapForm::kBinary);
+  } else {
+    write_nerfstudio(options.out, split.scene, number);
+  }
+  if (stored.images.empty()) return;
+  write_split_images(options.out / "images", options.out / "masks", split, stored.images);
+}
+
 /// The number-th largest sub-map.
 void export_submap(const ExportOptions& options,
                    const StoredMap& stored,
                    SubmapId submap,
                    std::size_t number) {
-  if (options.format == ExportFormat::kTum || options.format == ExportFormat::kKitti) {
-    const auto format =
-        options.format == ExportFormat::kTum ? TrajectoryFormat::kTum : TrajectoryFormat::kKitti;
-    write_trajectory(
-        numbered(options.out, number), keyframe_trajectory(*stored.map, submap), format);
-    return;
+  const std::filesystem::path file = numbered(options.out, number);
+  switch (options.format) {
+    case ExportFormat::kTum:
+      return write_trajectory(
+          file, keyframe_trajectory(*stored.map, submap), TrajectoryFormat::kTum);
+    case ExportFormat::kKitti:
+      return write_trajectory(
+          file, keyframe_trajectory(*stored.map, submap), TrajectoryFormat::kKitti);
+    case ExportFormat::kPly:
+      return write_ply(file, make_export_scene(*stored.map, submap, stored.images));
+    case ExportFormat::kColmap:
+    case ExportFormat::kNerfstudio:
+      return export_model(
+          options, stored, make_export_scene(*stored.map, submap, stored.images), number);
   }
-  const ExportScene scene = make_export_scene(*stored.map, submap, stored.images);
-  if (options.format == ExportFormat::kPly) {
-    write_ply(numbered(options.out, number), scene);
-    return;
-  }
-  if (options.format == ExportFormat::kColmap) {
-    write_colmap(options.out / "sparse" / fmt::to_string(number),
-                 scene,
-                 options.is_text ? ColmapForm::kText : ColmapForm::kBinary);
-  } else {
-    const std::filesystem::path points = numbered("points.ply", number);
-    const std::string json = format_nerfstudio(scene, "images", points.string());
-    make_output_folder(options.out);
-    write_ply(options.out / points, scene);
-    write_file_atomically(options.out / numbered("transforms.json", number), json);
-  }
-  if (!stored.images.empty()) write_view_images(options.out / "images", scene, stored.images);
 }
 
 int export_map(const ExportOptions& options) {
@@ -108,6 +136,12 @@ void add_export_command(CLI::App& program, Command& command) {
                             {"kitti", ExportFormat::kKitti}},
                            "ply, colmap, nerfstudio, tum or kitti [ply]");
   exporting.add_flag("--text", options->is_text, "COLMAP's text form instead of its binary one");
+  exporting
+      .add_option("--split-views",
+                  options->split_views,
+                  "Split 360 degree and fisheye keyframes into so many perspective views of 90 "
+                  "degrees; 6 of 360 degrees are a cube")
+      ->check(CLI::Range(kMinSplitViews, kMaxSplitViews));
   exporting.callback([options, &command] { command = [options] { return export_map(*options); }; });
 }
 

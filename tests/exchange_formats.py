@@ -33,14 +33,14 @@ def rotate(quaternion_wxyz, point):
     return [point[i] + 2 * (w * cross[i] + again[i]) for i in range(3)]
 
 
-def small_msg():
-    """A map of stella_vslam: a camera that moves to the right before 40 points."""
+def small_msg(num_points=40):
+    """A map of stella_vslam: a camera that moves to the right before some points."""
     rng = random.Random(1)
     camera = {"model_type": "Perspective", "setup_type": "Monocular", "color_order": "Gray",
               "cols": 640, "rows": 480, "fps": 30.0, "focal_x_baseline": 0.0, "fx": 400.0,
               "fy": 402.0, "cx": 320.0, "cy": 240.0, "k1": -0.1, "k2": 0.02, "p1": 0.0,
               "p2": 0.0, "k3": 0.0}
-    points = [[rng.uniform(-2, 2), rng.uniform(-1, 1), rng.uniform(4, 8)] for _ in range(40)]
+    points = [[rng.uniform(-2, 2), rng.uniform(-1, 1), rng.uniform(4, 8)] for _ in range(num_points)]
     keyframes = {}
     for i in range(3):
         seen = [[p[0] - 0.2 * i, p[1], p[2]] for p in points]
@@ -58,7 +58,7 @@ def small_msg():
                  for i, p in enumerate(points)}
     orb = {"name": "orb", "scale_factor": 1.2, "num_levels": 8}
     return {"cameras": {"cam": camera}, "orb_params": {"orb": orb}, "keyframes": keyframes,
-            "landmarks": landmarks, "keyframe_next_id": 3, "landmark_next_id": 40}
+            "landmarks": landmarks, "keyframe_next_id": 3, "landmark_next_id": num_points}
 
 
 def distort(k1, k2, p1, p2, k3, x, y):

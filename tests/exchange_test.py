@@ -101,6 +101,19 @@ class Export(Exchange):
         last = transforms["frames"][2]["transform_matrix"]
         self.assertEqual(last, [[1, 0, 0, 0.4], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
 
+    def test_split_views(self):
+        document = small_msg()
+        document["cameras"]["cam"].update(model_type="Fisheye", k4=0.0)
+        self.import_map(document)
+        folder = self.export("colmap", "split", "--split-views", 5) / "sparse" / "0"
+        model = ColmapModel(folder, ".bin")
+        self.assertEqual(len(model.images), 15)
+        self.assertEqual(len(model.points), 40)
+        self.assertLess(rms(model.errors()), 0.1)
+        done = waymark("export", self.map, "--format", "colmap", "-o", self.out / "x",
+                       "--split-views", 2)
+        self.assertEqual(done.returncode, 2)
+
     def test_every_submap_gets_files(self):
         document = small_msg()
         document["keyframes"]["2"]["span_parent"] = -1

@@ -13,6 +13,8 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/base/check.h"
+
 namespace waymark {
 namespace {
 
@@ -54,11 +56,13 @@ bool is_complete(std::string_view bytes) {
   return true;
 }
 
-std::optional<cv::Mat> decode(const std::filesystem::path& path, int flags) {
-  std::optional<std::string> bytes = read_bytes(path);
-  if (!bytes || !is_complete(*bytes)) return std::nullopt;
+std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
+  if (bytes.empty() || bytes.size() > kMaxFileBytes || !is_complete(bytes)) return std::nullopt;
   try {
-    const cv::Mat encoded(1, static_cast<int>(bytes->size()), CV_8UC1, bytes->data());
+    const cv::Mat encoded(1,
+                          static_cast<int>(bytes.size()),
+                          CV_8UC1,
+                          const_cast<char*>(bytes.data()));  // Is only read.
     cv::Mat decoded = cv::imdecode(encoded, flags);
     if (decoded.empty()) return std::nullopt;
     return decoded;
@@ -67,6 +71,17 @@ std::optional<cv::Mat> decode(const std::filesystem::path& path, int flags) {
   } catch (const std::bad_alloc&) {  // A small file may claim to be a huge image.
     return std::nullopt;
   }
+}
+
+std::optional<cv::Mat> decode(const std::filesystem::path& path, int flags) {
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? decode_bytes(*bytes, flags) : std::nullopt;
+}
+
+std::string encode(const cv::Mat& image, const char* extension) {
+  std::vector<std::uint8_t> bytes;
+  WAYMARK_CHECK(cv::imencode(extension, image, bytes));
+  return {bytes.begin(), bytes.end()};
 }
 
 template <class T>
@@ -94,6 +109,39 @@ std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
   const std::optional<cv::Mat> mat = decode(path, cv::IMREAD_UNCHANGED);
   if (!mat || mat->type() != CV_16UC1) return std::nullopt;
   return copy_rows<std::uint16_t>(*mat);
+}
+
+std::optional<ColorImage> decode_color_image(std::string_view bytes) {
+  const std::optional<cv::Mat> mat =
+      decode_bytes(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!mat || mat->type() != CV_8UC3) return std::nullopt;
+  ColorImage image(mat->cols, mat->rows);
+  for (int y = 0; y < mat->rows; ++y) {
+    for (int x = 0; x < mat->cols; ++x) {
+      const cv::Vec3b& bgr = mat->at<cv::Vec3b>(y, x);
+      image.row(y)[x] = {bgr[2], bgr[1], bgr[0]};
+    }
+  }
+  return image;
+}
+
+std::string encode_jpeg(const ColorImage& image) {
+  cv::Mat mat(image.height_px, image.width_px, CV_8UC3);
+  for (int y = 0; y < mat.rows; ++y) {
+    for (int x = 0; x < mat.cols; ++x) {
+      const Rgb& rgb = image.row(y)[x];
+      mat.at<cv::Vec3b>(y, x) = {rgb[2], rgb[1], rgb[0]};
+    }
+  }
+  return encode(mat, ".jpg");
+}
+
+std::string encode_png(const Image& image) {
+  const cv::Mat mat(image.height_px,
+                    image.width_px,
+                    CV_8UC1,
+                    const_cast<std::uint8_t*>(image.values.data()));  // Is only read.
+  return encode(mat, ".png");
 }
 
 void silence_image_library() {

@@ -9,7 +9,6 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/io/atomic_file.h"
 
 namespace waymark {
 namespace {
@@ -69,28 +68,20 @@ Json transform_of(const ExportView& view) {
 
 }  // namespace
 
-std::string format_nerfstudio(const ExportScene& scene,
-                              const std::string& image_folder,
-                              const std::string& point_file) {
+std::string format_nerfstudio(const ExportScene& scene, const NerfstudioPaths& paths) {
   Json json = {{"camera_model", model_of(scene)}};
   const bool is_shared = scene.cameras.size() == 1;
   if (is_shared) json.update(intrinsics_of(scene.cameras[0]));
-  json["ply_file_path"] = point_file;
+  json["ply_file_path"] = paths.point_file;
   json["frames"] = Json::array();
   for (const ExportView& view : scene.views) {
-    Json frame = {{"file_path", image_folder + "/" + view.name},
+    Json frame = {{"file_path", paths.image_folder + "/" + view.name},
                   {"transform_matrix", transform_of(view)}};
+    if (!view.mask_name.empty()) frame["mask_path"] = paths.mask_folder + "/" + view.mask_name;
     if (!is_shared) frame.update(intrinsics_of(scene.cameras[view.camera]));
     json["frames"].push_back(std::move(frame));
   }
   return json.dump(1) + "\n";
-}
-
-void write_nerfstudio(const std::filesystem::path& path,
-                      const ExportScene& scene,
-                      const std::string& image_folder,
-                      const std::string& point_file) {
-  write_file_atomically(path, format_nerfstudio(scene, image_folder, point_file));
 }
 
 }  // namespace waymark

@@ -6,13 +6,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <new>
-#include <opencv2/imgcodecs.hpp>
 #include <optional>
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/io/atomic_file.h"
+#include "waymark/io/decode.h"
 
 namespace waymark {
 namespace {
@@ -112,39 +110,23 @@ void SceneBuilder::add_point(LandmarkId id, const Landmark& landmark) {
   scene_.points.push_back(std::move(point));
 }
 
-/// A colour image of the size of the camera's, empty where the bytes are none.
-cv::Mat decode_color(const std::string& bytes, const CameraDescription& camera) {
-  if (bytes.empty()) return {};
-  try {
-    const cv::Mat encoded(1,
-                          static_cast<int>(bytes.size()),
-                          CV_8UC1,
-                          const_cast<char*>(bytes.data()));  // Is only read.
-    const cv::Mat image = cv::imdecode(encoded, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-    return image.cols == camera.width_px && image.rows == camera.height_px ? image : cv::Mat();
-  } catch (const cv::Exception&) {
-    return {};
-  } catch (const std::bad_alloc&) {  // A small file may claim to be a huge image.
-    return {};
-  }
-}
-
 /// The mean of what the images show of each point.
 void color_points(const KeyframeImages& images, ExportScene& scene) {
   std::vector<Eigen::Vector4i> sums(scene.points.size(), Eigen::Vector4i::Zero());
   for (const ExportView& view : scene.views) {
     const auto found = images.find(view.keyframe);
     if (found == images.end()) continue;
-    const cv::Mat image = decode_color(found->second, scene.cameras[view.camera]);
-    if (image.empty()) continue;
+    const CameraDescription& camera = scene.cameras[view.camera];
+    const std::optional<ColorImage> image = decode_color_image(found->second);
+    if (!image || image->width_px != camera.width_px || image->height_px != camera.height_px) {
+      continue;
+    }
     for (std::size_t i = 0; i < view.pixels.size(); ++i) {
       if (view.points[i] == kNoPoint) continue;
-      const int x =
-          std::clamp(static_cast<int>(std::lround(view.pixels[i].x())), 0, image.cols - 1);
-      const int y =
-          std::clamp(static_cast<int>(std::lround(view.pixels[i].y())), 0, image.rows - 1);
-      const cv::Vec3b& bgr = image.at<cv::Vec3b>(y, x);
-      sums[view.points[i]] += Eigen::Vector4i(bgr[2], bgr[1], bgr[0], 1);
+      const long x = std::clamp(std::lround(view.pixels[i].x()), 0l, image->width_px - 1l);
+      const long y = std::clamp(std::lround(view.pixels[i].y()), 0l, image->height_px - 1l);
+      const Rgb& rgb = image->row(static_cast<int>(y))[x];
+      sums[view.points[i]] += Eigen::Vector4i(rgb[0], rgb[1], rgb[2], 1);
     }
   }
   for (std::size_t i = 0; i < sums.size(); ++i) {
@@ -190,16 +172,6 @@ ExportScene make_export_scene(const Map& map, SubmapId submap, const KeyframeIma
   ExportScene scene = SceneBuilder(map, submap).build();
   color_points(images, scene);
   return scene;
-}
-
-void write_view_images(const std::filesystem::path& folder,
-                       const ExportScene& scene,
-                       const KeyframeImages& images) {
-  make_output_folder(folder);
-  for (const ExportView& view : scene.views) {
-    const auto found = images.find(view.keyframe);
-    if (found != images.end()) write_file_atomically(folder / view.name, found->second);
-  }
 }
 
 }  // namespace waymark

@@ -5,7 +5,6 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
-#include <filesystem>
 #include <map>
 #include <string>
 #include <vector>
@@ -30,6 +29,7 @@ inline constexpr std::uint32_t kNoPoint = UINT32_MAX;
 /// What camera 0 of a keyframe saw, or a part of it.
 struct ExportView {
   std::string name;        ///< Of its image file.
+  std::string mask_name;   ///< Of the mask that belongs to it; empty if everything is seen.
   KeyframeId keyframe;     ///< Whose it is.
   std::size_t camera = 0;  ///< Index in ExportScene::cameras.
   Rigid3 cam_from_world;
@@ -66,10 +66,5 @@ ExportScene make_export_scene(const Map& map, SubmapId submap, const KeyframeIma
 /// Features far up the pyramid may be off by more of the image's pixels than tools for dense
 /// reconstruction expect: 4 px is where COLMAP draws the line, too (its filter_max_reproj_error).
 inline constexpr double kMaxExportErrorPx = 4.0;
-
-/// Writes the images of the views into the folder under their names. Throws OutputError.
-void write_view_images(const std::filesystem::path& folder,
-                       const ExportScene& scene,
-                       const KeyframeImages& images);
 
 }  // namespace waymark
