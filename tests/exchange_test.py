@@ -75,6 +75,7 @@ class Export(Exchange):
         done = self.import_map(document)
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("3 keyframes, 40 landmarks", done.stdout)
+        self.assertIn("sound", waymark("map", "check", self.map).stdout)
         points = [landmark["pos_w"] for landmark in document["landmarks"].values()]
         for model in self.colmap_models():
             self.assertEqual(len(model.images), 3)
@@ -129,6 +130,7 @@ class Export(Exchange):
         done = self.import_map(self.real_map())
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("26 keyframes, 3158 landmarks", done.stdout)
+        self.assertIn("sound", waymark("map", "check", self.map).stdout)
         for model in self.colmap_models():
             self.assertGreater(len(model.points), 3000)
             self.assertLess(rms(model.errors()), 1.5)

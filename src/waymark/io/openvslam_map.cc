@@ -159,7 +159,7 @@ void Importer::add_keyframe(std::int64_t id, const OpenvslamKeyframe& keyframe) 
                                                            camera.undistorted_intrinsics,
                                                            where(id)});
   Keyframe added;
-  added.frame = FrameId{static_cast<std::uint32_t>(id)};
+  added.frame = FrameId{static_cast<std::uint32_t>(placed_.size())};
   added.timestamp_ns = std::llround(keyframe.timestamp_s * 1e9);
   if (keyframe.parent >= 0) {
     added.parent = placed_.at(keyframe.parent).id;
