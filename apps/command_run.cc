@@ -3,64 +3,30 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
-#include <exception>
 #include <memory>
-#include <optional>
 #include <string>
-#include <vector>
 
 #include "autosave.h"
 #include "choice_option.h"
 #include "commands.h"
+#include "input_command.h"
 #include "interrupt.h"
 #include "paced_input.h"
 #include "reporter.h"
 #include "session.h"
 #include "session_options.h"
-#include "waymark/base/frame_state.h"
 #include "waymark/io/atomic_file.h"
-#include "waymark/io/decode.h"
 
 namespace waymark {
 namespace {
 
 struct RunOptions {
   SessionOptions session;
-  std::filesystem::path out = "waymark-out";
+  ReportOptions report;
   std::filesystem::path map_out;  ///< Empty: the map is not saved.
   double autosave_s = 60.0;
-  std::filesystem::path log;
-  bool is_quiet = false;
-  bool is_verbose = false;
   double pace = 0.0;  ///< Times the input's own rate; 0: as fast as possible.
-
-  Verbosity verbosity() const {
-    if (is_quiet) return Verbosity::kQuiet;
-    return is_verbose ? Verbosity::kVerbose : Verbosity::kNormal;
-  }
 };
-
-FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
-  return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
-             const FrameRecord& frame) mutable {
-    const bool has_reason = frame.reason != FrameReason::kNone;
-    const std::string state =
-        fmt::format("{}{}{}{}",
-                    to_string(frame.state),
-                    frame.submap ? fmt::format(" in sub-map {}", *frame.submap) : "",
-                    has_reason ? ": " : "",
-                    has_reason ? to_string(frame.reason) : "");
-    if (frame.state == FrameState::kUnreadable) {
-      reporter.warning(fmt::format("frame {}: {}, skipped", frame.index, state));
-    }
-    reporter.detail(fmt::format("frame {}: {}, {} inliers of {} matches",
-                                frame.index,
-                                state,
-                                frame.num_inliers,
-                                frame.num_matches));
-    reporter.progress(++num_done, total, to_string(frame.state));
-  };
-}
 
 void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
   const RunSummary& summary = results.summary;
@@ -80,7 +46,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             format_duration(summary.wall_s),
                             1e3 * summary.wall_s / num_frames,
                             summary.tracking_ms.mean,
-                            options.out.string()));
+                            options.report.out.string()));
 }
 
 void report_focal_check(Reporter& reporter, const FocalCheck& check) {
@@ -136,7 +102,7 @@ void save_final_map(const System& system,
 int run(const RunOptions& options, Reporter& reporter) {
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
-  make_output_folder(options.out);
+  make_output_folder(options.report.out);
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) AtomicFile{options.map_out};  // Fails now rather than in the end.
   Autosave autosave(
@@ -150,61 +116,12 @@ int run(const RunOptions& options, Reporter& reporter) {
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
   if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
-  write_results(options.out, results);
+  write_results(options.report.out, results);
   report_results(reporter, results, options);
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
 }
 
-int run_and_log(const RunOptions& options) {
-  silence_image_library();
-  Reporter reporter(options.verbosity(), options.log);
-  try {
-    return run(options, reporter);
-  } catch (const std::exception& error) {
-    reporter.failure(error.what());
-    throw;
-  }
-}
-
-void add_input_options(CLI::App& command, SessionOptions& options) {
-  command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
-      ->required();
-  command
-      .add_option("-c,--config",
-                  options.configs,
-                  "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
-                  "files override [none]")
-      ->allow_extra_args(false);
-  command
-      .add_option(
-          "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500 [none]")
-      ->allow_extra_args(false);
-  command
-      .add_option("--format",
-                  options.reading.format,
-                  "Layout of INPUT: euroc, kitti, tum, images or video [recognised]")
-      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video"}));
-  add_choice<std::optional<Setup>>(
-      command,
-      "--setup",
-      options.reading.setup,
-      {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
-      "mono, stereo or rgbd [all that INPUT offers]");
-}
-
-/// Which part of the input, of the images, and how fast.
-void add_selection_options(CLI::App& command, RunOptions& options) {
-  InputOptions& reading = options.session.reading;
-  command.add_option("--first", reading.first, "Index of the first frame to use [0]")
-      ->check(CLI::NonNegativeNumber);
-  command.add_option("--frames", reading.frames, "Use at most so many frames [all]")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--every", reading.every, "Use each N-th frame [1]")
-      ->check(CLI::PositiveNumber);
-  command.add_option(
-      "--mask",
-      reading.mask,
-      "Mask image, or a folder with one per frame by name; black is not used [none]");
+void add_pace_option(CLI::App& command, RunOptions& options) {
   command
       .add_option("--pace",
                   options.pace,
@@ -216,6 +133,9 @@ void add_selection_options(CLI::App& command, RunOptions& options) {
 }
 
 void add_map_options(CLI::App& command, RunOptions& options) {
+  command.add_option("--map-in",
+                     options.session.map_in,
+                     "Start from a saved map: find the camera in it and extend it [a new map]");
   CLI::Option& map_out = *command.add_option(
       "--map-out", options.map_out, "Save the map to this file (.wmap) [not saved]");
   command
@@ -226,31 +146,27 @@ void add_map_options(CLI::App& command, RunOptions& options) {
       ->check(CLI::Range(0.0, 1e6));
 }
 
-void add_report_options(CLI::App& command, RunOptions& options) {
-  CLI::Option& quiet = *command.add_flag("--quiet", options.is_quiet, "Errors only [off]");
-  command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
-  command.add_option("--log", options.log, "Write all messages to this file, too [none]");
-}
-
 }  // namespace
 
 void add_run_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<RunOptions>();
   CLI::App& run_command = *program.add_subcommand("run", "Map INPUT; write results to --out");
   add_input_options(run_command, options->session);
-  add_selection_options(run_command, *options);
-  run_command.add_option("-o,--out", options->out, "Folder for the results [waymark-out]");
+  add_selection_options(run_command, options->session.reading);
+  add_pace_option(run_command, *options);
   add_choice<Timing>(run_command,
                      "--timing",
                      options->session.timing,
                      {{"inline", Timing::kInline}, {"lockstep", Timing::kLockstep}},
                      "inline (one thread) or lockstep (threads, same results) [lockstep]");
-  run_command.add_option("--seed", options->session.seed, "Seed of all random numbers [0]")
-      ->check(CLI::Range(0, 1000000000));
   add_map_options(run_command, *options);
-  add_report_options(run_command, *options);
-  run_command.callback(
-      [options, &command] { command = [options] { return run_and_log(*options); }; });
+  add_report_options(run_command, options->report, options->session.seed);
+  run_command.callback([options, &command] {
+    command = [options] {
+      return run_and_log(options->report,
+                         [&](Reporter& reporter) { return run(*options, reporter); });
+    };
+  });
 }
 
 }  // namespace waymark

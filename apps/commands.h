@@ -15,6 +15,7 @@ using Command = std::function<int()>;
 
 /// Each adds one subcommand with its options and, once parsed, leaves in command what to do.
 void add_run_command(CLI::App& program, Command& command);
+void add_localize_command(CLI::App& program, Command& command);
 void add_map_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);
 void add_simulate_command(CLI::App& program, Command& command);

@@ -6,8 +6,10 @@
 #include <filesystem>
 #include <functional>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "frame_feed.h"
 #include "waymark/io/input.h"
 #include "waymark/io/results.h"
 #include "waymark/io/trajectory.h"
@@ -20,12 +22,9 @@ struct SessionResults {
   FrameTable table;  ///< A row per input frame, in order.
   /// One trajectory per sub-map, that with most frames first; world_from_camera0.
   std::vector<std::vector<StampedPose>> trajectories;
-  std::vector<StampedPose> keyframes;  ///< Those of the first trajectory.
+  std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
   RunSummary summary;
 };
-
-/// Hears of each frame once it is done.
-using FrameObserver = std::function<void(const FrameRecord&)>;
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and
 /// collects the results. Frames with a fault are not fed, but have their row. setup, timing, seed
@@ -34,6 +33,11 @@ SessionResults run_session(Input& input,
                            System& system,
                            const std::function<bool()>& should_stop,
                            const FrameObserver& observer);
+
+/// Fills in the trajectories of all sub-maps, and what follows from them.
+void add_trajectories(const Map& map,
+                      const std::vector<std::pair<SubmapId, StampedPose>>& poses,
+                      SessionResults& results);
 
 /// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json; throws
 /// OutputError.

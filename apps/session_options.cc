@@ -9,6 +9,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/io/map_file.h"
 
 namespace waymark {
 namespace {
@@ -36,34 +37,62 @@ std::string describe(const ChainCamera& camera, std::size_t index) {
 
 }  // namespace
 
-Session open_session(const SessionOptions& options) {
-  Session session;
+std::string describe(const Map& map, const std::filesystem::path& path) {
+  return fmt::format("map {}: {} keyframes, {} landmarks, {}",
+                     path.string(),
+                     map.keyframes().size(),
+                     map.landmarks().size(),
+                     is_metric(map) ? "in metres" : "scale free");
+}
+
+PreparedInput prepare_input(const SessionOptions& options) {
+  PreparedInput prepared;
   const ConfigNode config = read_configuration(options);
-  read_settings(session.settings, config);
-  if (options.seed) session.settings.seed = *options.seed;
+  read_settings(prepared.settings, config);
+  if (options.seed) prepared.settings.seed = *options.seed;
 
   InputOptions reading = options.reading;
   reading.calibration = read_camchain(config);
-  session.input = open_input(options.input, reading);
+  prepared.input = open_input(options.input, reading);
 
-  const InputInfo& info = session.input->info();
+  const InputInfo& info = prepared.input->info();
   if (!info.calibration) {
     throw InputError(options.input.string(),
                      "carries no calibration, expected its cameras in a file given with -c");
   }
   if (info.calibration->depth_factor) {
-    session.settings.depth.factor = *info.calibration->depth_factor;
+    prepared.settings.depth.factor = *info.calibration->depth_factor;
   }
-  session.system =
-      std::make_unique<System>(make_rig(*info.calibration), session.settings, options.timing);
+  prepared.rig = make_rig(*info.calibration);
 
-  session.description = info.lines;
+  prepared.description = info.lines;
   for (std::size_t i = 0; i < info.calibration->cameras.size(); ++i) {
-    session.description.push_back(describe(info.calibration->cameras[i], i));
+    prepared.description.push_back(describe(info.calibration->cameras[i], i));
   }
   for (const std::string& note : info.calibration->notes) {
-    session.description.push_back("note: " + note);
+    prepared.description.push_back("note: " + note);
   }
+  return prepared;
+}
+
+Session open_session(const SessionOptions& options) {
+  PreparedInput prepared = prepare_input(options);
+  Session session;
+  session.input = std::move(prepared.input);
+  session.settings = std::move(prepared.settings);
+  session.description = std::move(prepared.description);
+  std::shared_ptr<const Map> map;
+  if (!options.map_in.empty()) {
+    map = load_map(options.map_in).map;
+    if (session.input->info().setup != Setup::kMono && !is_metric(*map)) {
+      throw InputError(
+          options.map_in.string(),
+          "has no scale in metres, which stereo and depth need, expected --setup mono");
+    }
+    session.description.push_back(describe(*map, options.map_in));
+  }
+  session.system = std::make_unique<System>(
+      std::move(prepared.rig), session.settings, options.timing, std::move(map));
   return session;
 }
 

@@ -20,9 +20,18 @@ struct SessionOptions {
   std::filesystem::path input;
   std::vector<std::filesystem::path> configs;  ///< Cameras and settings, later ones override.
   std::vector<std::string> assignments;        ///< KEY=VALUE, override the files.
+  std::filesystem::path map_in;                ///< Map to go on in; empty: a new one.
   InputOptions reading;                        ///< The calibration is filled in.
   Timing timing = Timing::kLockstep;
   std::optional<int> seed;  ///< Overrides the settings.
+};
+
+/// An input with its cameras and the settings to use it with.
+struct PreparedInput {
+  std::unique_ptr<Input> input;
+  Settings settings;
+  Rig rig;
+  std::vector<std::string> description;  ///< What was understood, in words.
 };
 
 /// An input and the system to feed it to.
@@ -33,7 +42,13 @@ struct Session {
   std::vector<std::string> description;  ///< What was understood, in words.
 };
 
-/// Reads the configuration, opens the input and makes the system for its cameras. Throws
+/// What is in a map, in words.
+std::string describe(const Map& map, const std::filesystem::path& path);
+
+/// Reads the configuration and opens the input. Throws InputError.
+PreparedInput prepare_input(const SessionOptions& options);
+
+/// Prepares the input and makes the system for its cameras, with the map to go on in. Throws
 /// InputError.
 Session open_session(const SessionOptions& options);
 

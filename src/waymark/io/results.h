@@ -25,6 +25,7 @@ struct FrameRecord {
   FrameReason reason = FrameReason::kNone;
   int num_matches = 0;
   int num_inliers = 0;
+  int num_candidates = 0;  ///< Places compared while relocalising; for people, not in the file.
   bool is_keyframe = false;
   std::optional<std::uint32_t> submap;  ///< Empty field when the frame belongs to none.
   /// In the order of the table's stages; empty for a frame that was not processed.

@@ -38,6 +38,7 @@ class Localizer::Impl {
     tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   }
 
+  const Map& map() const { return *snapshot_.map; }
   TrackingResult track(const FrameInput& input);
   TrackingResult locate(const FrameInput& input, const std::optional<PoseHint>& hint);
 
@@ -130,6 +131,7 @@ std::optional<LocatedFrame> Localizer::Impl::search(const Frame& frame,
 Localizer::Localizer(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
     : impl_(std::make_unique<Impl>(std::move(rig), settings, std::move(map))) {}
 Localizer::~Localizer() = default;
+const Map& Localizer::map() const { return impl_->map(); }
 TrackingResult Localizer::track(const FrameInput& input) { return impl_->track(input); }
 TrackingResult Localizer::locate(const FrameInput& input, const std::optional<PoseHint>& hint) {
   return impl_->locate(input, hint);

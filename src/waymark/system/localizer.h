@@ -33,6 +33,8 @@ class Localizer {
   Localizer(const Localizer&) = delete;
   Localizer& operator=(const Localizer&) = delete;
 
+  const Map& map() const;
+
   /// The next image of a stream: looked for near the one before, and anywhere where it is not.
   TrackingResult track(const FrameInput& input);
 

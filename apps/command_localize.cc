@@ -1,0 +1,90 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "input_command.h"
+#include "interrupt.h"
+#include "localization.h"
+#include "waymark/io/atomic_file.h"
+#include "waymark/io/map_file.h"
+
+namespace waymark {
+namespace {
+
+struct LocalizeOptions {
+  std::filesystem::path map;
+  SessionOptions session;
+  ReportOptions report;
+  bool is_unordered = false;
+};
+
+void report_results(Reporter& reporter,
+                    const SessionResults& results,
+                    const LocalizeOptions& options) {
+  const RunSummary& summary = results.summary;
+  reporter.info(fmt::format("{} of {} images localized ({} unreadable)",
+                            *summary.localized,
+                            summary.counts.frames,
+                            summary.counts.unreadable));
+  reporter.info(fmt::format("{}: {:.1f} ms per image; results in {}",
+                            format_duration(summary.wall_s),
+                            summary.tracking_ms.mean,
+                            options.report.out.string()));
+}
+
+int localize(const LocalizeOptions& options, Reporter& reporter) {
+  PreparedInput prepared = prepare_input(options.session);
+  for (const std::string& line : prepared.description) reporter.info(line);
+  const StoredMap stored = load_map(options.map);
+  reporter.info(describe(*stored.map, options.map));
+  const bool has_range = prepared.input->info().setup != Setup::kMono;
+  if (has_range && !is_metric(*stored.map)) {
+    reporter.info("the map has no scale in metres: only camera 0 is used, without depth");
+  }
+  make_output_folder(options.report.out);
+
+  Localizer localizer(prepared.rig, prepared.settings, stored.map);
+  catch_interrupts();
+  SessionResults results =
+      localize_input(*prepared.input,
+                     localizer,
+                     options.is_unordered ? ImageOrder::kUnordered : ImageOrder::kStream,
+                     is_interrupted,
+                     report_frames(reporter, prepared.input->info()));
+  reporter.finish_progress();
+  if (is_interrupted()) reporter.info("interrupted: the input ends here");
+  results.summary.setup = to_string(prepared.input->info().setup);
+  results.summary.timing = to_string(Timing::kInline);
+  results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
+  results.summary.version = WAYMARK_VERSION;
+  write_results(options.report.out, results);
+  report_results(reporter, results, options);
+  return *results.summary.localized == 0 ? kNoPose : kDone;
+}
+
+}  // namespace
+
+void add_localize_command(CLI::App& program, Command& command) {
+  const auto options = std::make_shared<LocalizeOptions>();
+  CLI::App& localize_command = *program.add_subcommand(
+      "localize", "Find the images of INPUT in a saved map, which stays as it is");
+  localize_command.add_option("MAP", options->map, "Map file (.wmap)")->required();
+  add_input_options(localize_command, options->session);
+  add_selection_options(localize_command, options->session.reading);
+  localize_command.add_flag(
+      "--unordered", options->is_unordered, "Each image by itself, rather than a stream [off]");
+  add_report_options(localize_command, options->report, options->session.seed);
+  localize_command.callback([options, &command] {
+    command = [options] {
+      return run_and_log(options->report,
+                         [&](Reporter& reporter) { return localize(*options, reporter); });
+    };
+  });
+}
+
+}  // namespace waymark

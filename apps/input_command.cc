@@ -1,0 +1,102 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "input_command.h"
+
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <exception>
+#include <optional>
+#include <string>
+
+#include "choice_option.h"
+#include "waymark/base/frame_state.h"
+#include "waymark/io/decode.h"
+
+namespace waymark {
+
+void add_input_options(CLI::App& command, SessionOptions& options) {
+  command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
+      ->required();
+  command
+      .add_option("-c,--config",
+                  options.configs,
+                  "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
+                  "files override [none]")
+      ->allow_extra_args(false);
+  command
+      .add_option(
+          "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500 [none]")
+      ->allow_extra_args(false);
+  command
+      .add_option("--format",
+                  options.reading.format,
+                  "Layout of INPUT: euroc, kitti, tum, images or video [recognised]")
+      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video"}));
+  add_choice<std::optional<Setup>>(
+      command,
+      "--setup",
+      options.reading.setup,
+      {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
+      "mono, stereo or rgbd [all that INPUT offers]");
+}
+
+void add_selection_options(CLI::App& command, InputOptions& reading) {
+  command.add_option("--first", reading.first, "Index of the first frame to use [0]")
+      ->check(CLI::NonNegativeNumber);
+  command.add_option("--frames", reading.frames, "Use at most so many frames [all]")
+      ->check(CLI::PositiveNumber);
+  command.add_option("--every", reading.every, "Use each N-th frame [1]")
+      ->check(CLI::PositiveNumber);
+  command.add_option(
+      "--mask",
+      reading.mask,
+      "Mask image, or a folder with one per frame by name; black is not used [none]");
+}
+
+void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed) {
+  command.add_option("-o,--out", options.out, "Folder for the results [waymark-out]");
+  command.add_option("--seed", seed, "Seed of all random numbers [0]")
+      ->check(CLI::Range(0, 1000000000));
+  CLI::Option& quiet = *command.add_flag("--quiet", options.is_quiet, "Errors only [off]");
+  command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
+  command.add_option("--log", options.log, "Write all messages to this file, too [none]");
+}
+
+FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
+  return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
+             const FrameRecord& frame) mutable {
+    const bool has_reason = frame.reason != FrameReason::kNone;
+    const std::string state =
+        fmt::format("{}{}{}{}",
+                    to_string(frame.state),
+                    frame.submap ? fmt::format(" in sub-map {}", *frame.submap) : "",
+                    has_reason ? ": " : "",
+                    has_reason ? to_string(frame.reason) : "");
+    if (frame.state == FrameState::kUnreadable) {
+      reporter.warning(fmt::format("frame {}: {}, skipped", frame.index, state));
+    }
+    const int num_candidates = frame.num_candidates;
+    reporter.detail(
+        fmt::format("frame {}: {}, {} inliers of {} matches{}",
+                    frame.index,
+                    state,
+                    frame.num_inliers,
+                    frame.num_matches,
+                    num_candidates > 0 ? fmt::format(", best of {} places", num_candidates) : ""));
+    reporter.progress(++num_done, total, to_string(frame.state));
+  };
+}
+
+int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work) {
+  silence_image_library();
+  Reporter reporter(options.verbosity(), options.log);
+  try {
+    return work(reporter);
+  } catch (const std::exception& error) {
+    reporter.failure(error.what());
+    throw;
+  }
+}
+
+}  // namespace waymark

@@ -1,0 +1,45 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <functional>
+
+#include "frame_feed.h"
+#include "reporter.h"
+#include "session_options.h"
+#include "waymark/io/results.h"
+
+namespace CLI {
+class App;
+}
+
+/// What commands that read an INPUT have in common.
+namespace waymark {
+
+struct ReportOptions {
+  std::filesystem::path out = "waymark-out";
+  std::filesystem::path log;
+  bool is_quiet = false;
+  bool is_verbose = false;
+
+  Verbosity verbosity() const {
+    if (is_quiet) return Verbosity::kQuiet;
+    return is_verbose ? Verbosity::kVerbose : Verbosity::kNormal;
+  }
+};
+
+/// INPUT, its cameras, the settings.
+void add_input_options(CLI::App& command, SessionOptions& options);
+/// Which part of the input and of the images.
+void add_selection_options(CLI::App& command, InputOptions& reading);
+/// Where results and messages go, and the seed.
+void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed);
+
+/// Tells of every frame.
+FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
+
+/// Calls work with a reporter; what it throws also goes to the log.
+int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work);
+
+}  // namespace waymark
