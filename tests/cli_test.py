@@ -47,13 +47,16 @@ class Usage(CliTest):
         top = waymark("--help")
         self.assertEqual(top.returncode, 0)
         self.assertIn("Exit status", top.stdout)
-        for command in ("run", "map", "eval", "simulate", "config"):
+        for command in ("run", "localize", "map", "eval", "simulate", "config"):
             self.assertIn(command, top.stdout)
             self.assertEqual(waymark(command, "--help").returncode, 0)
         text = waymark("run", "--help").stdout
         for option in ("--config", "--set", "--setup", "--out", "--timing", "--first", "--frames",
                        "--every", "--mask", "--pace", "--seed", "--quiet", "--verbose", "--log",
-                       "--format", "--map-out", "--autosave"):
+                       "--format", "--map-in", "--map-out", "--autosave"):
+            self.assertIn(option, text)
+        text = waymark("localize", "--help").stdout
+        for option in ("MAP", "INPUT", "--config", "--unordered", "--out", "--first", "--verbose"):
             self.assertIn(option, text)
 
     def test_config_makes_a_camchain_of_other_calibrations(self):
