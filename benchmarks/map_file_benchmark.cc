@@ -15,18 +15,16 @@
 #include <string>
 
 #include "waymark/io/map_file.h"
+#include "waymark/map/parts.h"
 #include "waymark/place/place_index.h"
 
 namespace {
 
 using waymark::Keyframe;
 using waymark::KeyframeId;
-using waymark::Landmark;
-using waymark::LandmarkId;
 using waymark::Map;
 using waymark::MapParts;
 using waymark::StoredMap;
-using waymark::SubmapId;
 
 /// A line of /proc/self/status in MB.
 double memory_mb(const std::string& key) {
@@ -48,53 +46,17 @@ double time_ms(const Task& task) {
   return 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
-template <class IdType>
-IdType shifted(IdType id, std::uint32_t by) {
-  return id.is_valid() ? IdType{id.value + by} : id;
-}
-
-/// Appends a copy of the features' bytes too, as if all of it had been seen.
-void append(const Map& map, MapParts& parts) {
-  const std::uint32_t first_keyframe = parts.end_keyframe.value;
-  const std::uint32_t first_landmark = parts.end_landmark.value;
-  const auto first_submap = static_cast<std::uint32_t>(parts.submaps.size());
-  for (waymark::Submap submap : map.submaps()) {
-    submap.root = shifted(submap.root, first_keyframe);
-    submap.joined_into = shifted(submap.joined_into, first_submap);
-    parts.submaps.push_back(submap);
+/// The features' bytes again for each copy, as if all of it had been seen.
+void copy_features(MapParts& parts) {
+  for (MapParts::StoredKeyframe& stored : parts.keyframes) {
+    stored.keyframe.features = std::make_shared<const waymark::Features>(*stored.keyframe.features);
   }
-  map.keyframes().for_each([&](KeyframeId id, Keyframe keyframe) {
-    keyframe.submap.value += first_submap;
-    keyframe.parent = shifted(keyframe.parent, first_keyframe);
-    keyframe.features = std::make_shared<const waymark::Features>(*keyframe.features);
-    for (LandmarkId& landmark : keyframe.landmarks) landmark = shifted(landmark, first_landmark);
-    parts.keyframes.push_back({shifted(id, first_keyframe), std::move(keyframe)});
-  });
-  map.landmarks().for_each([&](LandmarkId id, Landmark landmark) {
-    landmark.submap.value += first_submap;
-    landmark.reference.value += first_keyframe;
-    landmark.observations.clear();
-    parts.landmarks.push_back({shifted(id, first_landmark), std::move(landmark)});
-  });
-  map.keyframe_forwarding().for_each([&](KeyframeId id, waymark::KeyframeForwarding forwarding) {
-    if (!forwarding.heir.is_valid()) return;
-    forwarding.heir.value += first_keyframe;
-    parts.erased_keyframes.push_back({shifted(id, first_keyframe), forwarding});
-  });
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (!survivor.is_valid()) return;
-    parts.merged_landmarks.push_back(
-        {shifted(id, first_landmark), shifted(survivor, first_landmark)});
-  });
-  parts.end_keyframe.value += map.keyframes().end_id().value;
-  parts.end_landmark.value += map.landmarks().end_id().value;
 }
 
 std::shared_ptr<const Map> repeat(const Map& map, std::size_t num_keyframes) {
   MapParts parts;
-  parts.end_keyframe = KeyframeId{0};
-  parts.end_landmark = LandmarkId{0};
-  while (parts.keyframes.size() < num_keyframes) append(map, parts);
+  while (parts.keyframes.size() < num_keyframes) waymark::append_parts(map, parts);
+  copy_features(parts);
   return Map::restore(std::move(parts)).freeze();
 }
 

@@ -8,14 +8,14 @@
 #include <cstring>
 #include <functional>
 #include <limits>
-#include <msgpack.hpp>
 #include <sstream>
 
-#include "waymark/io/crc32c.h"
 #include "waymark/io/map_file.h"
 #include "waymark/io/testing/errors.h"
+#include "waymark/io/testing/map_checksums.h"
 #include "waymark/io/testing/temporary_folder.h"
 #include "waymark/io/text.h"
+#include "waymark/map/parts.h"
 #include "waymark/map/testing/random_map.h"
 
 namespace waymark {
@@ -23,36 +23,14 @@ namespace {
 
 using ::testing::HasSubstr;
 using testing::input_error_of;
+using testing::join_records;
 using ::testing::Not;
 using testing::RandomMap;
+using testing::seal_record;
+using testing::split_records;
 using ::testing::StartsWith;
-using testing::take_apart;
 using testing::TemporaryFolder;
 using Records = std::vector<std::string>;
-
-std::string join(const Records& records) {
-  std::string bytes;
-  for (const std::string& record : records) bytes += record;
-  return bytes;
-}
-
-Records split(const std::string& bytes) {
-  Records records;
-  for (std::size_t end = 0; end < bytes.size();) {
-    const std::size_t begin = end;
-    msgpack::unpack(bytes.data(), bytes.size(), end);
-    records.push_back(bytes.substr(begin, end - begin));
-  }
-  return records;
-}
-
-/// Makes the checksum right after an edit.
-void seal(std::string& record) {
-  const std::uint32_t checksum = crc32c(std::string_view(record).substr(0, record.size() - 5));
-  for (std::size_t i = 0; i < 4; ++i) {
-    record[record.size() - 4 + i] = static_cast<char>(checksum >> (24 - 8 * i) & 0xFF);
-  }
-}
 
 /// The n-th record of a kind.
 std::string& find(Records& records, const std::string& kind, int n = 0) {
@@ -74,7 +52,7 @@ void patch(std::string& record,
   std::copy(bytes.begin(),
             bytes.end(),
             record.begin() + static_cast<std::ptrdiff_t>(at + packed.size() + offset));
-  seal(record);
+  seal_record(record);
 }
 
 /// The other name must be as long.
@@ -125,14 +103,16 @@ class MapDamage : public ::testing::Test {
   }
 
   void expect_error(const Records& records, const std::string& expected) const {
-    expect_error(join(records), expected);
+    expect_error(join_records(records), expected);
   }
 
   const std::string bytes_ = bytes_of(RandomMap(7, 120).map().freeze());
-  Records records_ = split(bytes_);
+  Records records_ = split_records(bytes_);
 };
 
-TEST_F(MapDamage, OfNothingThereIsNoError) { EXPECT_EQ(error_of(join(records_)), "no error"); }
+TEST_F(MapDamage, OfNothingThereIsNoError) {
+  EXPECT_EQ(error_of(join_records(records_)), "no error");
+}
 
 TEST_F(MapDamage, OtherFiles) {
   expect_error("", "record 0 at byte 0: is truncated");
@@ -319,8 +299,8 @@ TEST_F(MapDamage, EditsWithRightChecksumsAreRefusedOrHarmless) {
       const std::uint32_t at = rng.below(rng.below(2) ? size : std::min(size, 300u));
       record[at] = static_cast<char>(rng.below(256));
     }
-    seal(record);
-    const std::string error = error_of(join(edited));
+    seal_record(record);
+    const std::string error = error_of(join_records(edited));
     EXPECT_THAT(error, Not(HasSubstr("\n")));
     num_refused += error != "no error";
   }

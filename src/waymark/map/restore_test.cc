@@ -6,6 +6,7 @@
 #include <string>
 
 #include "waymark/map/map.h"
+#include "waymark/map/parts.h"
 #include "waymark/map/testing/random_map.h"
 
 namespace waymark {
@@ -14,7 +15,6 @@ namespace {
 using ::testing::Contains;
 using ::testing::HasSubstr;
 using testing::RandomMap;
-using testing::take_apart;
 
 TEST(MapRestore, GivesBackWhatWasTakenApart) {
   for (std::uint64_t seed = 0; seed < 10; ++seed) {

@@ -16,9 +16,8 @@ namespace waymark::testing {
 /// A map made by random edits of every kind: sound, but of nothing that could be seen.
 class RandomMap {
  public:
-  static constexpr std::uint32_t kNumPrimary = 30;
-
-  explicit RandomMap(std::uint64_t seed, int num_steps = 600) : rng_(seed, 0) {
+  explicit RandomMap(std::uint64_t seed, int num_steps = 600, std::uint32_t num_primary = 30)
+      : num_primary_(num_primary), rng_(seed, 0) {
     rigs_ = {
         make_rig_of(1, "pinhole"), make_rig_of(2, "pinhole"), make_rig_of(1, "equirectangular")};
     start_submap();
@@ -78,20 +77,20 @@ class RandomMap {
 
   std::shared_ptr<const Features> random_features(const Rig& rig) {
     auto features = std::make_shared<Features>();
-    features->num_primary = kNumPrimary;
-    for (std::uint32_t i = 0; i < kNumPrimary; ++i) {
+    features->num_primary = num_primary_;
+    for (std::uint32_t i = 0; i < num_primary_; ++i) {
       append_feature(*features, 0);
       features->descriptors.push_back(random_descriptor());
       features->range_m.push_back(rng_.below(2) ? real(1, 9) : 0.0f);
       const bool is_measured = features->range_m.back() > 0.0f && rng_.below(2);
       features->inverse_range_sigma.push_back(is_measured ? 0.01f : 0.0f);
     }
-    for (std::uint32_t i = 0; rig.cameras.size() > 1 && i < kNumPrimary; i += 3) {
+    for (std::uint32_t i = 0; rig.cameras.size() > 1 && i < num_primary_; i += 3) {
       append_feature(*features, 1);
       features->partner[i] = static_cast<std::uint32_t>(features->size() - 1);
       features->partner.back() = i;
     }
-    features->grid = FeatureGrid(320, 160, 0.0, kNumPrimary, [&](std::size_t i) {
+    features->grid = FeatureGrid(320, 160, 0.0, num_primary_, [&](std::size_t i) {
       return std::pair(features->keypoints[i].x_px, features->keypoints[i].y_px);
     });
     return features;
@@ -211,32 +210,10 @@ class RandomMap {
     }
   }
 
+  const std::uint32_t num_primary_;
   Map map_;
   Rng rng_;
   std::vector<std::shared_ptr<const Rig>> rigs_;
 };
-
-/// A map in plain lists, as MapParts says.
-inline MapParts take_apart(const Map& map) {
-  MapParts parts;
-  parts.submaps = map.submaps();
-  parts.loop_edges = map.measured_loop_edges();
-  parts.end_keyframe = map.keyframes().end_id();
-  parts.end_landmark = map.landmarks().end_id();
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    parts.keyframes.push_back({id, keyframe});
-  });
-  map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
-    parts.landmarks.push_back({id, landmark});
-    parts.landmarks.back().landmark.observations.clear();
-  });
-  map.keyframe_forwarding().for_each([&](KeyframeId id, const KeyframeForwarding& forwarding) {
-    if (forwarding.heir.is_valid()) parts.erased_keyframes.push_back({id, forwarding});
-  });
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (survivor.is_valid()) parts.merged_landmarks.push_back({id, survivor});
-  });
-  return parts;
-}
 
 }  // namespace waymark::testing

@@ -1,0 +1,104 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/map/parts.h"
+
+#include <algorithm>
+#include <utility>
+
+namespace waymark {
+namespace {
+
+/// What is added to the ids of a map that comes behind others.
+struct Shift {
+  std::uint32_t keyframe = 0;
+  std::uint32_t landmark = 0;
+  std::uint32_t submap = 0;
+  std::uint32_t frame = 0;
+
+  KeyframeId operator()(KeyframeId id) const { return shifted(id, keyframe); }
+  LandmarkId operator()(LandmarkId id) const { return shifted(id, landmark); }
+  SubmapId operator()(SubmapId id) const { return shifted(id, submap); }
+  FrameId operator()(FrameId id) const { return shifted(id, frame); }
+
+ private:
+  template <class IdType>
+  static IdType shifted(IdType id, std::uint32_t by) {
+    return id.is_valid() ? IdType{id.value + by} : id;
+  }
+};
+
+Shift shift_behind(const MapParts& parts) {
+  Shift shift;
+  shift.keyframe = parts.end_keyframe.is_valid() ? parts.end_keyframe.value : 0;
+  shift.landmark = parts.end_landmark.is_valid() ? parts.end_landmark.value : 0;
+  shift.submap = static_cast<std::uint32_t>(parts.submaps.size());
+  for (const MapParts::StoredKeyframe& stored : parts.keyframes) {
+    shift.frame = std::max(shift.frame, stored.keyframe.frame.value + 1);
+  }
+  return shift;
+}
+
+void append_submaps(const Map& map, const Shift& shift, MapParts& parts) {
+  for (Submap submap : map.submaps()) {
+    submap.root = shift(submap.root);
+    submap.joined_into = shift(submap.joined_into);
+    parts.submaps.push_back(submap);
+  }
+  for (LoopEdge edge : map.measured_loop_edges()) {
+    edge.from = shift(edge.from);
+    edge.to = shift(edge.to);
+    parts.loop_edges.push_back(edge);
+  }
+}
+
+void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
+  map.keyframes().for_each([&](KeyframeId id, Keyframe keyframe) {
+    keyframe.frame = shift(keyframe.frame);
+    keyframe.submap = shift(keyframe.submap);
+    keyframe.parent = shift(keyframe.parent);
+    for (LandmarkId& landmark : keyframe.landmarks) landmark = shift(landmark);
+    parts.keyframes.push_back({shift(id), std::move(keyframe)});
+  });
+  map.keyframe_forwarding().for_each([&](KeyframeId id, KeyframeForwarding forwarding) {
+    if (!forwarding.heir.is_valid()) return;
+    forwarding.heir = shift(forwarding.heir);
+    parts.erased_keyframes.push_back({shift(id), forwarding});
+  });
+}
+
+void append_landmarks(const Map& map, const Shift& shift, MapParts& parts) {
+  map.landmarks().for_each([&](LandmarkId id, Landmark landmark) {
+    landmark.submap = shift(landmark.submap);
+    landmark.reference = shift(landmark.reference);
+    landmark.observations.clear();
+    parts.landmarks.push_back({shift(id), std::move(landmark)});
+  });
+  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
+    if (survivor.is_valid()) parts.merged_landmarks.push_back({shift(id), shift(survivor)});
+  });
+}
+
+}  // namespace
+
+void append_parts(const Map& map, MapParts& parts) {
+  const Shift shift = shift_behind(parts);
+  append_submaps(map, shift, parts);
+  append_keyframes(map, shift, parts);
+  append_landmarks(map, shift, parts);
+  parts.end_keyframe = shift(map.keyframes().end_id());
+  parts.end_landmark = shift(map.landmarks().end_id());
+}
+
+MapParts take_apart(const Map& map) {
+  MapParts parts;
+  append_parts(map, parts);
+  return parts;
+}
+
+Map unite(const Map& a, const Map& b) {
+  MapParts parts = take_apart(a);
+  append_parts(b, parts);
+  return Map::restore(std::move(parts));
+}
+
+}  // namespace waymark
