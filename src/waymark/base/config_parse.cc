@@ -114,6 +114,12 @@ class TreeBuilder final : public YAML::EventHandler {
     if (key.kind != ConfigNode::Kind::kScalar || key.scalar.empty()) {
       throw InputError(key.where(), "has a value without a key, expected KEY: VALUE");
     }
+    const bool has_control = std::any_of(key.scalar.begin(), key.scalar.end(), [](unsigned char c) {
+      return c < 0x20 || c == 0x7F;
+    });
+    if (has_control) {
+      throw InputError(key.where(), "has a key of several lines, expected KEY: VALUE");
+    }
     if (parent.node.find(key.scalar) != nullptr) {
       throw InputError(key.where(),
                        fmt::format("key '{}' appears twice in its section", key.scalar));

@@ -117,6 +117,8 @@ TEST(Config, HostileTextsAreRefused) {
                           "a\n"),
               HasSubstr("has the byte 0xff"));
   EXPECT_THAT(parse_error("\x89PNG\r\n\x1a\n"), HasSubstr("has the byte 0x1a"));
+  EXPECT_THAT(parse_error("\"a\\nb\": 1\n"),
+              "a.yaml:1: has a key of several lines, expected KEY: VALUE");
 }
 
 // Openings that never close, of every kind, in the size that is allowed at most.

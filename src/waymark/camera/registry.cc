@@ -18,6 +18,7 @@ namespace {
 
 constexpr int kMinSizePx = 16;
 constexpr int kMaxSizePx = 20000;
+constexpr std::size_t kLongestMessage = 1000;
 
 void expect_finite(const CameraDescription& description,
                    std::string_view name,
@@ -38,7 +39,13 @@ bool CameraDescription::is_same(const CameraDescription& other) const {
          height_px == other.height_px;
 }
 
-void CameraDescription::fail(const std::string& what) const { throw InputError(where, what); }
+void CameraDescription::fail(const std::string& what) const {
+  // Names of models are what a file says: of whatever length, and maybe of several lines.
+  std::string line = what.substr(0, kLongestMessage);
+  std::replace_if(
+      line.begin(), line.end(), [](unsigned char c) { return c < 0x20 || c == 0x7F; }, '?');
+  throw InputError(where, line + (what.size() > kLongestMessage ? "..." : ""));
+}
 
 CameraRegistry CameraRegistry::with_builtin_models() {
   CameraRegistry registry;

@@ -207,6 +207,12 @@ struct EqualAngleModel {
   }
 };
 
+TEST(CameraRegistry, NamesOfManyLinesMakeOneLine) {
+  const std::string error = error_after([](auto& d) { d.camera_model = "fish\neye"; });
+  EXPECT_THAT(error, HasSubstr("camera_model is fish?eye, expected one of"));
+  EXPECT_LT(error_after([](auto& d) { d.camera_model.assign(100000, 'x'); }).size(), 1100u);
+}
+
 TEST(CameraRegistry, UsersAddModels) {
   CameraRegistry registry = CameraRegistry::with_builtin_models();
   registry.add("equal_angle", [](const CameraDescription& description) {

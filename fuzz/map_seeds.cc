@@ -1,0 +1,33 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// Writes small sound maps for the fuzzer of map files to start from: waymark_map_seeds FOLDER.
+#include <cstdio>
+#include <exception>
+#include <filesystem>
+#include <string>
+
+#include "waymark/io/atomic_file.h"
+#include "waymark/io/map_file.h"
+#include "waymark/map/testing/random_map.h"
+
+int main(int argc, char** argv) {
+  using namespace waymark;
+  if (argc != 2) {
+    std::fprintf(stderr, "usage: %s FOLDER\n", argv[0]);
+    return 2;
+  }
+  try {
+    const std::filesystem::path folder = argv[1];
+    make_output_folder(folder);
+    for (std::uint64_t seed = 0; seed < 4; ++seed) {
+      StoredMap stored;
+      stored.map = testing::RandomMap(seed, 40, 4).map().freeze();
+      stored.images[stored.map->submaps()[0].root] = "jpeg";
+      save_map(folder / (std::to_string(seed) + ".wmap"), stored);
+    }
+  } catch (const std::exception& error) {
+    std::fprintf(stderr, "error: %s\n", error.what());
+    return 1;
+  }
+}
