@@ -11,12 +11,14 @@ def pack(value):
     if isinstance(value, bool) or value is None:
         return {None: b"\xc0", False: b"\xc2", True: b"\xc3"}[value]
     if isinstance(value, int):
-        return b"\xd3" + struct.pack(">q", value)
+        return b"\xcf" + struct.pack(">Q", value) if value >= 2**63 else b"\xd3" + struct.pack(">q", value)
     if isinstance(value, float):
         return b"\xcb" + struct.pack(">d", value)
     if isinstance(value, str):
         data = value.encode()
         return b"\xdb" + struct.pack(">I", len(data)) + data
+    if isinstance(value, bytes):
+        return b"\xc6" + struct.pack(">I", len(value)) + value
     if isinstance(value, (list, tuple)):
         return b"\xdd" + struct.pack(">I", len(value)) + b"".join(map(pack, value))
     return b"\xdf" + struct.pack(">I", len(value)) + b"".join(
