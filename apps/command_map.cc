@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "map_tasks.h"
 #include "waymark/base/check.h"
 #include "waymark/io/map_file.h"
 
@@ -106,10 +107,13 @@ void add_task(CLI::App& maps,
 }  // namespace
 
 void add_map_command(CLI::App& program, Command& command) {
-  CLI::App& maps = *program.add_subcommand("map", "Look at or verify saved maps");
+  CLI::App& maps =
+      *program.add_subcommand("map", "Look at, verify, join, or scale and level saved maps");
   maps.require_subcommand(1);
   add_task(maps, "info", "Print what a map holds", print_info, command);
   add_task(maps, "check", "Name everything that is wrong with a map", check_map, command);
+  add_merge_task(maps, command);
+  add_align_task(maps, command);
 }
 
 }  // namespace waymark

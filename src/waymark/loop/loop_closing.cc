@@ -4,6 +4,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/loop/spread_drift.h"
+#include "waymark/map/align.h"
 #include "waymark/map/correction.h"
 #include "waymark/mapping/fuse.h"
 
@@ -45,18 +46,6 @@ void fuse_sides(Map& map,
   for (KeyframeId id : sides.of_match) fuse_into(map, sides.of_query, id, matcher, dirty);
 }
 
-/// Moves what hangs below the root of a sub-map, that is all of it.
-MapCorrection move_root(const Map& map, SubmapId submap, const Sim3& new_from_old) {
-  const KeyframeId root = map.submaps()[submap.value].root;
-  const Sim3 root_from_new = Sim3(map.keyframes().at(root).rig_from_world) * new_from_old.inverse();
-  MapCorrection correction;
-  correction.keyframes.push_back(
-      {root,
-       {root_from_new.rotation, new_from_old.scale * root_from_new.translation},
-       new_from_old.scale});
-  return correction;
-}
-
 }  // namespace
 
 void close_loop(Map& map,
@@ -87,10 +76,9 @@ void join_submaps(Map& map,
   const bool moves_query = of_match < of_query;
   const SubmapId younger = moves_query ? of_query : of_match;
   const SubmapId older = moves_query ? of_match : of_query;
-  const MapCorrection correction = move_root(
-      map, younger, moves_query ? of_query_from_of_match.inverse() : of_query_from_of_match);
   map.add_loop_edge(edge_of(revisit));
-  apply_correction(map, correction);
+  transform_submap(
+      map, younger, moves_query ? of_query_from_of_match.inverse() : of_query_from_of_match);
   map.join_submaps(moves_query ? revisit.query : revisit.match,
                    moves_query ? revisit.match : revisit.query);
   places.join(younger, older);

@@ -1,0 +1,189 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <CLI/CLI.hpp>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <tuple>
+#include <vector>
+
+#include "map_tasks.h"
+#include "waymark/base/check.h"
+#include "waymark/io/export_scene.h"
+#include "waymark/io/map_file.h"
+#include "waymark/io/trajectory.h"
+#include "waymark/map/align.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::int64_t kMaxDifferenceNs = 20'000'000;
+
+struct AlignOptions {
+  std::filesystem::path map;
+  std::filesystem::path out;
+  std::vector<std::tuple<std::uint32_t, std::uint32_t, double>> distances;
+  std::filesystem::path trajectory;
+  std::vector<double> up;
+};
+
+/// Moves a sub-map; it is in metres from then on if it was or gets its scale now.
+Map moved(Map map, SubmapId submap, const Sim3& new_from_old, bool gives_scale) {
+  transform_submap(map, submap, new_from_old);
+  if (!gives_scale || map.submaps()[submap.value].is_metric) return map;
+  return declare_metric(map, submap);
+}
+
+SubmapId submap_of(const Map& map, std::uint32_t id) {
+  const Keyframe* keyframe = map.keyframes().find(KeyframeId{id});
+  if (!keyframe) {
+    throw InputError("--distance",
+                     fmt::format("names keyframe {}, which is not there, expected the id of one "
+                                 "of the map's {}",
+                                 id,
+                                 map.keyframes().size()));
+  }
+  return keyframe->submap;
+}
+
+Map scale(Map map, const AlignOptions& options) {
+  std::optional<SubmapId> submap;
+  std::vector<KnownDistance> known;
+  for (const auto& [a, b, metres] : options.distances) {
+    for (const std::uint32_t id : {a, b}) {
+      if (submap.value_or(submap_of(map, id)) != submap_of(map, id)) {
+        throw InputError("--distance", "names keyframes of several sub-maps, expected one sub-map");
+      }
+      submap = submap_of(map, id);
+    }
+    if (!(metres > 0.0) || !std::isfinite(metres)) {
+      throw InputError("--distance", fmt::format("is {} m, expected more than 0", metres));
+    }
+    known.push_back({KeyframeId{a}, KeyframeId{b}, metres});
+  }
+  if (has_measured_ranges(map, *submap)) {
+    throw InputError("--distance",
+                     fmt::format("is for sub-map {}, in which stereo or depth measured lengths, "
+                                 "expected one whose scale is free",
+                                 submap->value));
+  }
+  const std::optional<double> factor = scale_by_distances(map, known);
+  if (!factor)
+    throw InputError("--distance", "is between keyframes at the same place, expected two");
+  fmt::print("sub-map {}: scaled by {:.6g}, now in metres\n", submap->value, *factor);
+  return moved(std::move(map),
+               *submap,
+               {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor},
+               true);
+}
+
+/// What was read, in the form that the fit takes.
+struct Trajectory {
+  std::vector<std::int64_t> timestamps_ns;
+  std::vector<Rigid3> poses;
+};
+
+Trajectory read(const std::filesystem::path& path) {
+  Trajectory trajectory;
+  for (const StampedPose& pose : read_trajectory(path)) {
+    trajectory.timestamps_ns.push_back(pose.timestamp_ns);
+    trajectory.poses.push_back(pose.world_from_camera);
+  }
+  return trajectory;
+}
+
+Map fit(Map map, const AlignOptions& options) {
+  const Trajectory trajectory = read(options.trajectory);
+  std::string report;
+  int num_aligned = 0;
+  for (const SubmapId submap : submaps_by_size(map)) {
+    const auto found = fit_trajectory(map,
+                                      submap,
+                                      {trajectory.timestamps_ns, trajectory.poses},
+                                      kMaxDifferenceNs,
+                                      !has_measured_ranges(map, submap));
+    if (!found) {
+      report += fmt::format(
+          "sub-map {}: stays as it is, no three of its keyframes off a line have a pose\n",
+          submap.value);
+      continue;
+    }
+    report +=
+        fmt::format("sub-map {}: {} keyframes with a pose, {:.3g} m rms off, scaled by {:.6g}\n",
+                    submap.value,
+                    found->num_keyframes,
+                    found->rms_m,
+                    found->trajectory_from_map.scale);
+    map = moved(std::move(map), submap, found->trajectory_from_map, true);
+    ++num_aligned;
+  }
+  if (num_aligned == 0) {
+    throw InputError(options.trajectory.string(),
+                     "has no poses at the times of keyframes, expected three or more, not all on a "
+                     "line, within 0.02 s");
+  }
+  fmt::print("{}", report);
+  return map;
+}
+
+Map level(Map map, const AlignOptions& options) {
+  const Eigen::Vector3d up(options.up[0], options.up[1], options.up[2]);
+  if (!up.allFinite() || !(up.norm() > 0.0)) {
+    throw InputError("--up", "is no direction, expected three numbers, not all 0");
+  }
+  const std::vector<SubmapId> submaps = submaps_by_size(map);
+  if (submaps.empty()) throw InputError(options.map.string(), "has no keyframes, expected some");
+  fmt::print("sub-map {}: {} {} {} is +z now\n", submaps[0].value, up.x(), up.y(), up.z());
+  for (std::size_t i = 1; i < submaps.size(); ++i) {
+    fmt::print("sub-map {}: stays as it is, having a frame of its own\n", submaps[i].value);
+  }
+  return moved(std::move(map), submaps[0], {turn_upright(up), Eigen::Vector3d::Zero(), 1.0}, false);
+}
+
+int align(const AlignOptions& options) {
+  const int num_ways =
+      !options.distances.empty() + !options.trajectory.empty() + !options.up.empty();
+  if (num_ways != 1) {
+    throw InputError("map align",
+                     "expected one of --distance ID_A ID_B METRES, --trajectory FILE, --up X,Y,Z");
+  }
+  StoredMap stored = load_map(options.map);
+  Map map = Map::thaw(*stored.map);
+  if (!options.distances.empty()) {
+    map = scale(std::move(map), options);
+  } else if (!options.trajectory.empty()) {
+    map = fit(std::move(map), options);
+  } else {
+    map = level(std::move(map), options);
+  }
+  stored.map = map.freeze();
+  save_map(options.out, stored);
+  return kDone;
+}
+
+}  // namespace
+
+void add_align_task(CLI::App& maps, Command& command) {
+  const auto options = std::make_shared<AlignOptions>();
+  CLI::App& added =
+      *maps.add_subcommand("align", "Scale a map, level it, or put it where a trajectory is");
+  added.add_option("MAP", options->map, "Map file (.wmap)")->required();
+  added.add_option("-o,--out", options->out, "Map file to write")->required();
+  added
+      .add_option("--distance",
+                  options->distances,
+                  "ID_A ID_B METRES: how far apart two keyframes are; may be repeated")
+      ->type_size(3);
+  added.add_option(
+      "--trajectory", options->trajectory, "Poses of camera 0 (TUM, EuRoC csv, KITTI)");
+  added.add_option("--up", options->up, "X,Y,Z: what is up in the largest sub-map; becomes +z")
+      ->delimiter(',')
+      ->expected(3);
+  added.callback([options, &command] { command = [options] { return align(*options); }; });
+}
+
+}  // namespace waymark

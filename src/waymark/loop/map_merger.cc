@@ -1,0 +1,102 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/map_merger.h"
+
+#include <optional>
+#include <set>
+#include <utility>
+#include <vector>
+
+#include "waymark/loop/loop_closing.h"
+#include "waymark/loop/loop_finder.h"
+#include "waymark/map/parts.h"
+#include "waymark/mapping/global_adjustment.h"
+#include "waymark/mapping/mapper.h"
+
+namespace waymark {
+namespace {
+
+/// A join makes loops of what was seen before it, which may let others be joined in turn.
+constexpr int kMaxPasses = 4;
+
+class MapMerger {
+ public:
+  /// Keyframes from `first` on look for places of those before.
+  MapMerger(const Map& both, KeyframeId first, std::uint64_t seed)
+      : first_(first),
+        rig_(both.keyframes().at(first).rig),
+        mapper_(rig_, {}),
+        finder_(rig_, seed),
+        projection_(rig_) {
+    mapper_.take_over(both);
+    both.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      if (id < first_) places_.add(id, keyframe.submap, keyframe.features->descriptors);
+    });
+  }
+
+  MergedMaps merge() {
+    std::vector<KeyframeId> queries;
+    mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe&) {
+      if (id >= first_) queries.push_back(id);
+    });
+    for (int pass = 0; pass < kMaxPasses; ++pass) {
+      const int num_joins_before = merged_.num_joins;
+      for (const KeyframeId query : queries) look_for_place_of(query);
+      if (merged_.num_joins == num_joins_before) break;
+    }
+    adjust();
+    merged_.map = mapper_.freeze();
+    return std::move(merged_);
+  }
+
+ private:
+  void look_for_place_of(KeyframeId query) {
+    const std::optional<Revisit> revisit = finder_.find(mapper_.map(), places_, query);
+    if (!revisit) return;
+    const auto& keyframes = mapper_.map().keyframes();
+    const bool is_join = keyframes.at(revisit->query).submap != keyframes.at(revisit->match).submap;
+    mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+      if (is_join) {
+        join_submaps(map, places_, *revisit, projection_, dirty);
+      } else {
+        close_loop(map, *revisit, projection_, dirty);
+      }
+    });
+    ++(is_join ? merged_.num_joins : merged_.num_loops);
+    touched_.insert(mapper_.map().keyframes().at(query).submap);
+  }
+
+  void adjust() {
+    std::set<SubmapId> submaps;
+    for (const SubmapId id : touched_) submaps.insert(mapper_.map().resolve(id));
+    for (const SubmapId submap : submaps) {
+      mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+        apply_adjustment(map, adjust_globally(map, submap), dirty);
+      });
+    }
+  }
+
+  const KeyframeId first_;
+  const std::shared_ptr<const Rig> rig_;
+  Mapper mapper_;
+  PlaceIndex places_;
+  LoopFinder finder_;
+  ProjectionMatcher projection_;
+  std::set<SubmapId> touched_;
+  MergedMaps merged_;
+};
+
+}  // namespace
+
+MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
+  Map both = unite(a, b);
+  KeyframeId first;  // Of b.
+  both.keyframes().for_each([&](KeyframeId id, const Keyframe&) {
+    if (!first.is_valid() && id >= a.keyframes().end_id()) first = id;
+  });
+  const std::shared_ptr<const Map> frozen = both.freeze();
+  if (!first.is_valid()) return {frozen};
+  return MapMerger(*frozen, first, seed).merge();
+}
+
+}  // namespace waymark

@@ -1,0 +1,25 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+/// Two maps in one.
+struct MergedMaps {
+  std::shared_ptr<const Map> map;
+  int num_joins = 0;  ///< Sub-maps that became part of another; 0: the maps do not overlap.
+  int num_loops = 0;  ///< Further places of one map that the other shows.
+};
+
+/// Puts b behind a (see unite()), and where keyframes of b show places of a, joins their sub-maps
+/// and closes the loops that this makes, then adjusts what was joined as a whole. Frame and units
+/// are those of the older sub-map, of which a has all. Sub-maps in metres are not compared with
+/// those whose scale is free. The same maps and seed give the same bits.
+MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed);
+
+}  // namespace waymark
