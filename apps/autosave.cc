@@ -5,25 +5,18 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/io/map_file.h"
 
 namespace waymark {
-namespace {
 
-StoredMap stored(const std::shared_ptr<const Map>& map, const std::string& settings) {
-  StoredMap result;
-  result.map = map;
-  result.settings = settings;
-  return result;
-}
-
-}  // namespace
-
-Autosave::Autosave(std::filesystem::path path, double interval_s, std::string settings)
+Autosave::Autosave(std::filesystem::path path,
+                   double interval_s,
+                   std::string settings,
+                   const ImageKeeper& images)
     : path_(std::move(path)),
       interval_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_s))),
-      settings_(std::move(settings)) {}
+      settings_(std::move(settings)),
+      images_(images) {}
 
 std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& map) {
   using namespace std::chrono_literals;
@@ -41,13 +34,21 @@ std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& ma
   last_start_ = now;
   // The map never changes, the rest is fixed: nothing is shared that anyone writes.
   under_way_ =
-      std::async(std::launch::async, [this, map] { save_map(path_, stored(map, settings_)); });
+      std::async(std::launch::async, [this, stored = prepare(map)] { save_map(path_, stored); });
   return std::nullopt;
 }
 
 void Autosave::save(const std::shared_ptr<const Map>& map) {
   if (under_way_.valid()) under_way_.wait();
-  save_map(path_, stored(map, settings_));
+  save_map(path_, prepare(map));
+}
+
+StoredMap Autosave::prepare(const std::shared_ptr<const Map>& map) const {
+  StoredMap stored;
+  stored.map = map;
+  stored.settings = settings_;
+  stored.images = images_.images_of(*map);
+  return stored;
 }
 
 }  // namespace waymark

@@ -9,6 +9,8 @@
 #include <optional>
 #include <string>
 
+#include "image_keeper.h"
+#include "waymark/io/map_file.h"
 #include "waymark/map/map.h"
 
 namespace waymark {
@@ -18,8 +20,12 @@ namespace waymark {
 /// saved as a whole.
 class Autosave {
  public:
-  /// Never saves if interval_s is 0. `settings` are those of the session, as YAML.
-  Autosave(std::filesystem::path path, double interval_s, std::string settings);
+  /// update() never saves if interval_s is 0. `settings` are those of the session, as YAML; the
+  /// images, which are saved with the map, are borrowed.
+  Autosave(std::filesystem::path path,
+           double interval_s,
+           std::string settings,
+           const ImageKeeper& images);
   /// Waits for the save under way.
   ~Autosave() = default;
 
@@ -32,9 +38,12 @@ class Autosave {
  private:
   using Clock = std::chrono::steady_clock;
 
+  StoredMap prepare(const std::shared_ptr<const Map>& map) const;
+
   const std::filesystem::path path_;
   const Clock::duration interval_;
   const std::string settings_;
+  const ImageKeeper& images_;
   Clock::time_point last_start_ = Clock::now();
   std::future<void> under_way_;
 };

@@ -9,6 +9,7 @@
 #include "autosave.h"
 #include "choice_option.h"
 #include "commands.h"
+#include "image_keeper.h"
 #include "input_command.h"
 #include "interrupt.h"
 #include "paced_input.h"
@@ -64,6 +65,7 @@ void report_focal_check(Reporter& reporter, const FocalCheck& check) {
 
 SessionResults map_input(Session& session,
                          const RunOptions& options,
+                         Input& input,
                          Autosave& autosave,
                          Reporter& reporter) {
   catch_interrupts();
@@ -80,10 +82,10 @@ SessionResults map_input(Session& session,
     report_focal_check(reporter, *check);
   };
   if (options.pace > 0.0) {
-    PacedInput paced(*session.input, options.pace, is_interrupted);
+    PacedInput paced(input, options.pace, is_interrupted);
     return run_session(paced, *session.system, is_interrupted, observer);
   }
-  return run_session(*session.input, *session.system, is_interrupted, observer);
+  return run_session(input, *session.system, is_interrupted, observer);
 }
 
 void save_final_map(const System& system,
@@ -105,10 +107,14 @@ int run(const RunOptions& options, Reporter& reporter) {
   make_output_folder(options.report.out);
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) AtomicFile{options.map_out};  // Fails now rather than in the end.
-  Autosave autosave(
-      options.map_out, has_map_out ? options.autosave_s : 0.0, settings_as_yaml(session.settings));
+  ImageKeeper images(
+      *session.input, [&] { return session.system->map(); }, std::move(session.images));
+  Autosave autosave(options.map_out,
+                    has_map_out ? options.autosave_s : 0.0,
+                    settings_as_yaml(session.settings),
+                    images);
 
-  SessionResults results = map_input(session, options, autosave, reporter);
+  SessionResults results = map_input(session, options, images, autosave, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(session.input->info().setup);
@@ -144,6 +150,11 @@ void add_map_options(CLI::App& command, RunOptions& options) {
                   "Save it every so many seconds while running, too; 0: at the end only [60]")
       ->needs(&map_out)
       ->check(CLI::Range(0.0, 1e6));
+  command
+      .add_flag("--keep-images",
+                options.session.reading.has_jpeg,
+                "Keep the images of keyframes in the map, for export [off]")
+      ->needs(&map_out);
 }
 
 }  // namespace

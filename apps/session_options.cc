@@ -83,7 +83,9 @@ Session open_session(const SessionOptions& options) {
   session.description = std::move(prepared.description);
   std::shared_ptr<const Map> map;
   if (!options.map_in.empty()) {
-    map = load_map(options.map_in).map;
+    StoredMap stored = load_map(options.map_in);
+    map = std::move(stored.map);
+    session.images = std::move(stored.images);
     if (session.input->info().setup != Setup::kMono && !is_metric(*map)) {
       throw InputError(
           options.map_in.string(),

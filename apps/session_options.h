@@ -10,6 +10,7 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/io/input.h"
+#include "waymark/io/keyframe_images.h"
 #include "waymark/system/settings.h"
 #include "waymark/system/system.h"
 
@@ -37,6 +38,7 @@ struct PreparedInput {
 /// An input and the system to feed it to.
 struct Session {
   std::unique_ptr<Input> input;
+  KeyframeImages images;  ///< Of the map to go on in.
   Settings settings;
   std::unique_ptr<System> system;
   std::vector<std::string> description;  ///< What was understood, in words.

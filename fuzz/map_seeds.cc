@@ -5,6 +5,7 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <string>
 
 #include "waymark/io/atomic_file.h"
@@ -23,7 +24,7 @@ int main(int argc, char** argv) {
     for (std::uint64_t seed = 0; seed < 4; ++seed) {
       StoredMap stored;
       stored.map = testing::RandomMap(seed, 40, 4).map().freeze();
-      stored.images[stored.map->submaps()[0].root] = "jpeg";
+      stored.images[stored.map->submaps()[0].root] = std::make_shared<const std::string>("jpeg");
       save_map(folder / (std::to_string(seed) + ".wmap"), stored);
     }
   } catch (const std::exception& error) {

@@ -53,7 +53,8 @@ class Usage(CliTest):
         text = waymark("run", "--help").stdout
         for option in ("--config", "--set", "--setup", "--out", "--timing", "--first", "--frames",
                        "--every", "--mask", "--pace", "--seed", "--quiet", "--verbose", "--log",
-                       "--format", "--map-in", "--map-out", "--autosave"):
+                       "--format", "--map-in", "--map-out", "--autosave",
+                       "--keep-images"):
             self.assertIn(option, text)
         text = waymark("localize", "--help").stdout
         for option in ("MAP", "INPUT", "--config", "--unordered", "--out", "--first", "--verbose"):

@@ -49,6 +49,23 @@ class MapFile(CliTest):
         self.assertEqual(self.run_on(source, "--map-out", again).returncode, 0)
         self.assertEqual(self.map.read_bytes(), again.read_bytes())
 
+    def keep_images(self, source, saved, *arguments):
+        done = self.run_on(source, "--keep-images", "--map-out", saved, *arguments)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        info = waymark("map", "info", saved).stdout
+        numbers = re.search(r"(\d+) keyframes, .* (\d+) images", info)
+        self.assertEqual(numbers[1], numbers[2], info)
+
+    def test_keeps_images_of_keyframes(self):
+        """Also those of the session before, when another one goes on in its map."""
+        source, again = self.sequence("mono"), self.folder / "again.wmap"
+        self.keep_images(source, self.map, "--frames", 30)
+        self.keep_images(source, again, "--map-in", self.map, "--first", 20)
+        done = waymark("export", again, "--format", "nerfstudio", "-o", self.folder / "scene")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for image in (self.folder / "scene" / "images").iterdir():
+            self.assertEqual(image.read_bytes()[:2], b"\xff\xd8")
+
     def test_damaged_maps_are_named(self):
         self.saved("mono")
         whole = self.map.read_bytes()

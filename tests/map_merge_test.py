@@ -61,11 +61,13 @@ class Merge(MapTask):
 
     def test_halves_that_overlap_are_joined(self):
         source = self.sequence("stereo")
-        self.make_map("a", source, "--frames", 26)
+        self.make_map("a", source, "--frames", 26, "--keep-images")
         first_pose = self.poses("a")[0]
-        self.make_map("b", source, "--first", 14)
+        self.make_map("b", source, "--first", 14, "--keep-images")
         self.assertIn("joined: 2 sub-maps are 1 now", self.merge("a", "b", "both"))
         self.assertEqual(self.poses("both")[0], first_pose)
+        num_images = len(self.poses("both"))  # One per keyframe.
+        self.assertIn(f", {num_images} images", self.task("info", self.path("both")))
         self.assertLess(self.error_m("both", source / "groundtruth.txt", "se3"), 0.01)
         # The same again, and the result is a map like any other.
         self.merge("a", "b", "again")

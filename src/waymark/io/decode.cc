@@ -18,6 +18,7 @@
 namespace waymark {
 namespace {
 
+constexpr std::string_view kJpegStart = "\xFF\xD8\xFF";
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;
 
 std::optional<std::string> read_bytes(const std::filesystem::path& path) {
@@ -49,7 +50,6 @@ bool is_complete_png(std::string_view bytes) {
 /// with grey and report success, and complain on standard error about truncated PNG.
 bool is_complete(std::string_view bytes) {
   constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1A\n";
-  constexpr std::string_view kJpegStart = "\xFF\xD8\xFF";
   constexpr std::string_view kJpegEnd = "\xFF\xD9";
   if (bytes.starts_with(kPngSignature)) return is_complete_png(bytes);
   if (bytes.starts_with(kJpegStart)) return bytes.rfind(kJpegEnd) != std::string_view::npos;
@@ -123,6 +123,16 @@ std::optional<ColorImage> decode_color_image(std::string_view bytes) {
     }
   }
   return image;
+}
+
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path) {
+  std::optional<std::string> bytes = read_bytes(path);
+  if (!bytes) return std::nullopt;
+  if (bytes->starts_with(kJpegStart) && is_complete(*bytes)) return bytes;
+  const std::optional<cv::Mat> mat =
+      decode_bytes(*bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!mat) return std::nullopt;
+  return encode(*mat, ".jpg");
 }
 
 std::string encode_jpeg(const ColorImage& image) {

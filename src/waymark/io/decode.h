@@ -26,6 +26,9 @@ std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
 /// when they are truncated or no image.
 std::optional<ColorImage> decode_color_image(std::string_view bytes);
 
+/// The image of a file as a JPEG: the file itself if it is one. Nothing when it is no image.
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path);
+
 /// The bytes of an image file.
 std::string encode_jpeg(const ColorImage& image);
 std::string encode_png(const Image& image);

@@ -117,7 +117,7 @@ void color_points(const KeyframeImages& images, ExportScene& scene) {
     const auto found = images.find(view.keyframe);
     if (found == images.end()) continue;
     const CameraDescription& camera = scene.cameras[view.camera];
-    const std::optional<ColorImage> image = decode_color_image(found->second);
+    const std::optional<ColorImage> image = decode_color_image(*found->second);
     if (!image || image->width_px != camera.width_px || image->height_px != camera.height_px) {
       continue;
     }

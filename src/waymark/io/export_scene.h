@@ -10,13 +10,11 @@
 #include <vector>
 
 #include "waymark/camera/description.h"
+#include "waymark/io/keyframe_images.h"
 #include "waymark/io/trajectory.h"
 #include "waymark/map/map.h"
 
 namespace waymark {
-
-/// JPEG files of camera 0 of keyframes, as map files hold them.
-using KeyframeImages = std::map<KeyframeId, std::string>;
 
 /// The sub-maps that have keyframes, that with most of them first, of equal ones the older.
 std::vector<SubmapId> submaps_by_size(const Map& map);

@@ -300,7 +300,7 @@ void write_split_images(const std::filesystem::path& images_folder,
     const auto found = images.find(view.keyframe);
     if (found == images.end()) continue;
     if (!split.parts[v]) {
-      write_file_atomically(images_folder / view.name, found->second);
+      write_file_atomically(images_folder / view.name, *found->second);
       continue;
     }
     auto writer = std::find_if(writers.begin(), writers.end(), [&](const PartWriter& other) {
@@ -310,7 +310,7 @@ void write_split_images(const std::filesystem::path& images_folder,
       writers.emplace_back(images_folder, masks_folder, *split.parts[v]);
       writer = writers.end() - 1;
     }
-    writer->write(view, found->second);
+    writer->write(view, *found->second);
   }
 }
 

@@ -89,6 +89,8 @@ TEST(ExportSplit, CubeCoversTheSphere) {
   }
 }
 
+SharedJpeg shared(const std::string& jpeg) { return std::make_shared<const std::string>(jpeg); }
+
 TEST(ExportSplit, LeavesPerspectiveCamerasAlone) {
   const ExportScene whole = make_export_scene(testing::small_map("distorted"), SubmapId{0});
   const SplitScene same = split_scene(whole, 6, kRegistry);
@@ -97,7 +99,7 @@ TEST(ExportSplit, LeavesPerspectiveCamerasAlone) {
             format_colmap(whole, ColmapForm::kText).images);
   const testing::TemporaryFolder folder;
   const std::string jpeg = encode_jpeg(ColorImage(640, 480));
-  write_split_images(folder / "images", folder / "masks", same, {{KeyframeId{1}, jpeg}});
+  write_split_images(folder / "images", folder / "masks", same, {{KeyframeId{1}, shared(jpeg)}});
   EXPECT_EQ(content_of(folder / "images" / whole.views[1].name), jpeg);
 }
 
@@ -126,7 +128,7 @@ TEST(ExportSplit, ImagesShowTheirDirections) {
   const SplitScene around = split(map, 6);
   const testing::TemporaryFolder folder;
   write_split_images(
-      folder / "images", folder / "masks", around, {{KeyframeId{0}, encode_jpeg(wide)}});
+      folder / "images", folder / "masks", around, {{KeyframeId{0}, shared(encode_jpeg(wide))}});
   EXPECT_FALSE(exists(folder / "masks"));  // Everything is seen.
   for (std::size_t part = 0; part < 6; ++part) {
     const SplitPart& split_part = *around.parts[part];
@@ -151,8 +153,8 @@ TEST(ExportSplit, ImagesShowTheirDirections) {
 TEST(ExportSplit, MasksShowWhatIsNotSeen) {
   const SplitScene fisheye = split(testing::small_map("fisheye"), 5);
   const testing::TemporaryFolder folder;
-  const KeyframeImages images = {{KeyframeId{1}, encode_jpeg(ColorImage(640, 480))},
-                                 {KeyframeId{2}, "no image"}};
+  const KeyframeImages images = {{KeyframeId{1}, shared(encode_jpeg(ColorImage(640, 480)))},
+                                 {KeyframeId{2}, shared("no image")}};
   write_split_images(folder / "images", folder / "masks", fisheye, images);
   const ExportView& view = fisheye.scene.views[6];  // Of keyframe 1, looking off the axis.
   EXPECT_TRUE(exists(folder / "images" / view.name));

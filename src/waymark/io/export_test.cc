@@ -44,9 +44,13 @@ TEST(ExportScene, TakesColoursFromImages) {
   cv::imencode(".jpg", blue, jpeg);
   std::vector<std::uint8_t> small;
   cv::imencode(".jpg", cv::Mat(8, 8, CV_8UC3, cv::Scalar(0, 0, 0)), small);
-  const KeyframeImages images = {{KeyframeId{0}, {jpeg.begin(), jpeg.end()}},
-                                 {KeyframeId{1}, "no image"},
-                                 {KeyframeId{2}, {small.begin(), small.end()}}};
+  const auto shared = [](auto begin, auto end) {
+    return std::make_shared<const std::string>(begin, end);
+  };
+  const std::string none = "no image";
+  const KeyframeImages images = {{KeyframeId{0}, shared(jpeg.begin(), jpeg.end())},
+                                 {KeyframeId{1}, shared(none.begin(), none.end())},
+                                 {KeyframeId{2}, shared(small.begin(), small.end())}};
   const ExportScene scene = make_export_scene(small_map("plain"), SubmapId{0}, images);
   EXPECT_NEAR(scene.points[3].color[0], 20, 3);
   EXPECT_NEAR(scene.points[3].color[1], 60, 3);

@@ -32,6 +32,7 @@ struct InputFrame {
   std::vector<Image> images;        ///< Grey, one per camera of the setup.
   std::optional<DepthImage> depth;  ///< Of camera 0; nothing where the moment has no depth image.
   std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
+  std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
   FrameFault fault = FrameFault::kNone;
 };
 
@@ -42,6 +43,7 @@ struct InputOptions {
   std::optional<std::size_t> frames;  ///< At most so many frames.
   std::size_t every = 1;              ///< Of the frames from first on, each n-th one.
   std::filesystem::path mask;  ///< One image, or a folder with one per frame by name; empty: none.
+  bool has_jpeg = false;       ///< Frames come with a JPEG file, too.
   /// Calibration from settings; takes the place of the one the data set carries.
   std::optional<CameraChain> calibration;
 };

@@ -12,6 +12,7 @@
 #include "waymark/io/testing/errors.h"
 #include "waymark/io/testing/images.h"
 #include "waymark/io/testing/temporary_folder.h"
+#include "waymark/io/text.h"
 
 namespace waymark {
 namespace {
@@ -120,6 +121,20 @@ TEST(ImageFolder, SkipsBadImages) {
   EXPECT_THAT(values_of(*input), ElementsAre(-1, 2, -1, -1, 5));
 }
 
+TEST(ImageFolder, GivesColourImagesAsJpegWhereAsked) {
+  const TemporaryFolder folder;
+  write_image(folder / "0.png", 64, 48, 90, CV_8UC3);
+  cv::imwrite((folder / "1.jpg").string(), cv::Mat(48, 64, CV_8UC3, cv::Scalar(10, 60, 200)));
+  InputOptions options;
+  EXPECT_EQ(open_input(folder.path(), options)->next()->jpeg, "");
+  options.has_jpeg = true;
+  const std::unique_ptr<Input> input = open_input(folder.path(), options);
+  const std::string first = input->next()->jpeg;
+  EXPECT_EQ(first.substr(0, 2), "\xFF\xD8");
+  EXPECT_NEAR(decode_color_image(first)->row(3)[5][1], 90, 2);
+  EXPECT_EQ(input->next()->jpeg, read_text_file(folder / "1.jpg", "a JPEG file"));
+}
+
 TEST(ReadGreyImage, ConvertsWhatCamerasGive) {
   const TemporaryFolder folder;
   write_image(folder / "deep.png", 16, 12, 257 * 100, CV_16UC1);
@@ -211,6 +226,21 @@ TEST(Video, GivesFramesWithTheTimesOfTheContainer) {
     EXPECT_NEAR(frame->images.at(0).view().at(8, 6), 20 * (i + 1), 3);
   }
   EXPECT_FALSE(input->next());
+}
+
+TEST(Video, GivesFramesAsJpegWhereAsked) {
+  const TemporaryFolder folder;
+  make_video(folder / "v.avi", 3);
+  InputOptions options;
+  options.has_jpeg = true;
+  const std::unique_ptr<Input> input = open_input(folder / "v.avi", options);
+  for (int i = 1; i <= 3; ++i) {
+    const std::optional<InputFrame> frame = input->next();
+    ASSERT_TRUE(frame);
+    const std::optional<ColorImage> image = decode_color_image(frame->jpeg);
+    ASSERT_TRUE(image);
+    EXPECT_NEAR(image->row(3)[5][2], 20 * i, 3);
+  }
 }
 
 TEST(Video, TakesTimesBesideItAndTheFramesAskedFor) {

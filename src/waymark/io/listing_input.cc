@@ -25,7 +25,8 @@ ListingInput::ListingInput(const std::filesystem::path& path,
                            const InputOptions& options)
     : listing_(std::move(listing)),
       selection_(select_frames(path, options, listing_.frames.size())),
-      masks_(options.mask) {
+      masks_(options.mask),
+      has_jpeg_(options.has_jpeg) {
   info_.format = listing_.format;
   info_.setup = listing_.setup;
   info_.num_frames = selection_.count(listing_.frames.size());
@@ -56,6 +57,7 @@ InputFrame ListingInput::read(std::size_t index) const {
   }
   read_depth(listed, frame);
   masks_.attach(stem_of(listed), frame);
+  if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front()).value_or("");
   return frame;
 }
 

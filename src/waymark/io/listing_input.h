@@ -36,6 +36,7 @@ class ListingInput : public Input {
   Listing listing_;
   FrameSelection selection_;
   MaskSource masks_;
+  bool has_jpeg_;
   InputInfo info_;
   std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
   std::size_t num_read_ = 0;

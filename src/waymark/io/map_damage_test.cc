@@ -80,7 +80,7 @@ class MapDamage : public ::testing::Test {
     StoredMap stored;
     stored.map = std::move(map);
     stored.settings = "seed: 1\n";
-    stored.images[stored.map->submaps()[0].root] = "jpeg";
+    stored.images[stored.map->submaps()[0].root] = std::make_shared<const std::string>("jpeg");
     const TemporaryFolder folder;
     save_map(folder / "a.wmap", stored);
     return read_text_file(folder / "a.wmap", "a map");

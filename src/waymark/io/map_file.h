@@ -4,12 +4,12 @@
 
 #include <filesystem>
 #include <iosfwd>
-#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "waymark/camera/registry.h"
+#include "waymark/io/keyframe_images.h"
 #include "waymark/map/map.h"
 
 namespace waymark {
@@ -18,8 +18,8 @@ namespace waymark {
 struct StoredMap {
   std::shared_ptr<const Map> map;
   std::string settings;  ///< Those used, as YAML.
-  /// JPEG files of camera 0, of some keyframes or none; those of erased ones are not saved.
-  std::map<KeyframeId, std::string> images;
+  /// Of some keyframes or none; those of erased ones are not saved.
+  KeyframeImages images;
   std::string producer = {};  ///< The program that wrote the file; save_map() sets its own.
 };
 

@@ -209,7 +209,7 @@ void MapReader::read_loop_edge(MapRecord& record) {
 void MapReader::read_image(MapRecord& record) {
   const KeyframeId keyframe{static_cast<std::uint32_t>(id_)};
   if (!is_among(parts_.keyframes, keyframe)) record.fail("expected the id of a keyframe");
-  stored_.images.emplace(keyframe, record.bytes("jpeg"));
+  stored_.images.emplace(keyframe, std::make_shared<const std::string>(record.bytes("jpeg")));
 }
 
 /// What Map::restore() asks for.

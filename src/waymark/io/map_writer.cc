@@ -250,9 +250,9 @@ void write_loop_edges(MapRecordWriter& writer, const Map& map) {
 void write_images(MapRecordWriter& writer, const StoredMap& stored) {
   for (const auto& [id, jpeg] : stored.images) {
     if (!stored.map->keyframes().contains(id)) continue;  // Erased meanwhile.
-    WAYMARK_CHECK(jpeg.size() <= kMaxArrayBytes);
+    WAYMARK_CHECK(jpeg->size() <= kMaxArrayBytes);
     writer.begin("image", id.value);
-    writer.add_bytes("jpeg", jpeg);
+    writer.add_bytes("jpeg", *jpeg);
     writer.end();
   }
 }

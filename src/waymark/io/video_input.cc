@@ -7,6 +7,7 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <utility>
@@ -80,6 +81,13 @@ class VideoReader {
       return std::nullopt;
     }
   }
+  /// The same, as a JPEG file; for one that could be decoded.
+  std::string encode() {
+    cv::Mat mat;
+    std::vector<std::uint8_t> bytes;
+    WAYMARK_CHECK(capture_.retrieve(mat) && cv::imencode(".jpg", mat, bytes));
+    return {bytes.begin(), bytes.end()};
+  }
 
   std::size_t num_grabbed() const { return num_grabbed_; }
   std::int64_t timestamp_ns() const { return timestamp_ns_; }
@@ -101,7 +109,7 @@ class VideoReader {
 class VideoInput : public Input {
  public:
   VideoInput(const std::filesystem::path& path, const InputOptions& options)
-      : reader_(path), masks_(options.mask) {
+      : reader_(path), masks_(options.mask), has_jpeg_(options.has_jpeg) {
     info_.format = "video";
     info_.setup = choose_setup(path, {Setup::kMono}, options.setup);
     read_times_beside(path);
@@ -166,6 +174,7 @@ class VideoInput : public Input {
       return;
     }
     frame.images.push_back(std::move(*image));
+    if (has_jpeg_) frame.jpeg = reader_.encode();
     masks_.attach(mask_name(frame.index), frame);
   }
 
@@ -212,6 +221,7 @@ class VideoInput : public Input {
 
   VideoReader reader_;
   MaskSource masks_;
+  bool has_jpeg_;
   FrameSelection selection_;
   std::vector<std::int64_t> times_ns_;
   InputInfo info_;
