@@ -15,6 +15,7 @@
 #include <string>
 
 #include "waymark/io/map_file.h"
+#include "waymark/io/text.h"
 #include "waymark/map/parts.h"
 #include "waymark/place/place_index.h"
 
@@ -79,6 +80,9 @@ void measure(const std::filesystem::path& path, std::size_t num_keyframes) {
               memory_mb("VmHWM"));
   stored = {};
   const double load_ms = time_ms([&] { stored = waymark::load_map(file); });
+  const std::string bytes = waymark::read_text_file(file, "a map");
+  waymark::save_map(file, stored);
+  const bool is_same = waymark::read_text_file(file, "a map") == bytes;
   std::filesystem::remove(file);
   const double check_ms = time_ms([&] { stored.map->broken_invariants(); });
   waymark::PlaceIndex places;
@@ -87,6 +91,7 @@ void measure(const std::filesystem::path& path, std::size_t num_keyframes) {
       places.add(id, keyframe.submap, keyframe.features->descriptors);
     });
   });
+  std::printf("saved again: %s bytes\n", is_same ? "the same" : "other");
   std::printf("load %.0f ms, of which checking the map %.0f ms; place index %.0f ms\n",
               load_ms,
               check_ms,

@@ -8,6 +8,7 @@
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/loop/test_loop.h"
+#include "waymark/map/testing/random_map.h"
 
 namespace waymark {
 namespace {
@@ -90,6 +91,16 @@ TEST(MapMergerTest, IsRepeatable) {
   first.map->landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
     EXPECT_EQ(second.map->landmarks().at(id).position_in_world, landmark.position_in_world);
   });
+}
+
+/// What a file may hold, too: the same features everywhere in rooms that cannot be.
+TEST(MapMergerTest, TakesMapsOfNothingThatCouldBeSeen) {
+  for (std::uint64_t seed = 0; seed < 6; ++seed) {
+    testing::RandomMap a(seed), b(seed);
+    const MergedMaps merged = merge_maps(a.map(), b.map(), seed);
+    EXPECT_EQ(merged.map->broken_invariants(), "");
+    EXPECT_EQ(merged.map->keyframes().size(), 2 * a.map().keyframes().size());
+  }
 }
 
 TEST(MapMergerTest, TakesEmptyMaps) {

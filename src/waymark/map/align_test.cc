@@ -92,6 +92,27 @@ TEST_F(MapAlign, TransformMovesAllOfOneSubmap) {
   EXPECT_DOUBLE_EQ(map_.loop_edges()[0].to_from_from.translation.norm(), 5.0);
 }
 
+TEST_F(MapAlign, TransformIsUndoneByItsInverse) {
+  RandomMap random(3);
+  Map& map = random.map();
+  const std::shared_ptr<const Map> before = map.freeze();
+  for (std::uint32_t i = 0; i < map.submaps().size(); ++i) {
+    if (!map.submaps()[i].root.is_valid()) continue;
+    transform_submap(map, SubmapId{i}, motion_);
+    EXPECT_EQ(map.broken_invariants(), "");
+    transform_submap(map, SubmapId{i}, motion_.inverse());
+  }
+  for (KeyframeId id{0}; id < map.keyframes().end_id(); ++id.value) {
+    // Also of those that are gone.
+    const Rigid3 pose = map.rig_from_world(id, Rigid3(), 1.0);
+    EXPECT_TRUE(pose.matrix().isApprox(before->rig_from_world(id, Rigid3(), 1.0).matrix(), 1e-9));
+  }
+  for (std::size_t i = 0; i < map.loop_edges().size(); ++i) {
+    EXPECT_TRUE(map.loop_edges()[i].to_from_from.translation.isApprox(
+        before->loop_edges()[i].to_from_from.translation, 1e-9));
+  }
+}
+
 TEST_F(MapAlign, DistancesGiveTheScale) {
   const auto distance = [&](std::uint32_t a, std::uint32_t b) {
     return (camera_position(map_.keyframes().at(KeyframeId{a})) -
