@@ -45,7 +45,7 @@ void report(const MergeOptions& options,
   const std::size_t num_before = count_parts(*a.map) + count_parts(*b.map);
   const std::size_t num_after = count_parts(*merged.map);
   if (merged.num_joins == 0) {
-    fmt::print("{} and {} do not overlap: kept as {} separate sub-maps\n",
+    fmt::print("{} and {}: no overlap found, kept as {} separate sub-maps\n",
                options.a.string(),
                options.b.string(),
                num_after);

@@ -84,7 +84,7 @@ class Merge(MapTask):
         self.make_map("a", self.sequence("stereo"), "--frames", 20)
         self.make_map("b", other)
         text = self.merge("a", "b", "both")
-        self.assertIn("do not overlap: kept as 2 separate sub-maps", text)
+        self.assertIn("no overlap found, kept as 2 separate sub-maps", text)
         self.assertNotIn("map align", text)
         self.make_map("mono", self.sequence("mono"))
         self.assertIn("map align makes it metres", self.merge("a", "mono", "mixed"))

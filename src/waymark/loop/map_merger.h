@@ -12,7 +12,7 @@ namespace waymark {
 /// Two maps in one.
 struct MergedMaps {
   std::shared_ptr<const Map> map;
-  int num_joins = 0;  ///< Sub-maps that became part of another; 0: the maps do not overlap.
+  int num_joins = 0;  ///< Sub-maps that became part of another; 0: no overlap was found.
   int num_loops = 0;  ///< Further places of one map that the other shows.
 };
 
