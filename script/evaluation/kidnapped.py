@@ -68,6 +68,8 @@ CASES = (
     Case("between_house", "mono", ((HOUSE, 0, 250), (DESK, 0, 240), (HOUSE, 250, 503)), 2),
     Case("apart_road", "mono", ((ROAD, 0, 100), (ROAD, 300, 400)), 2, True),
     Case("apart_track", "stereo", ((TRACK, 0, 100), (TRACK, 420, 520)), 2),
+    Case("apart_warehouse", "stereo", ((WAREHOUSE, 0, 100), (WAREHOUSE, 430, 600)), 2),
+    Case("apart_warehouse", "mono", ((WAREHOUSE, 0, 100), (WAREHOUSE, 430, 600)), 2),
     Case("apart_shop", "mono", ((SHOP, 0, 160), (SHOP, 580, 760)), 2),
 )
 

@@ -10,12 +10,11 @@
 #include <vector>
 
 #include "waymark/base/median.h"
+#include "waymark/loop/near_in_graph.h"
 
 namespace waymark {
 namespace {
 
-/// Keyframes that share fewer landmarks are not linked.
-constexpr std::uint32_t kMinShared = 15;
 /// Drift that is possible, in parts of the way and, even where the camera only turned, of the
 /// distance of what is seen. True loops of hand-held and driven sequences had at most 0.002 of the
 /// way beyond what drift of direction and scale explain, rooms that are alike 0.05 and more.
@@ -88,7 +87,7 @@ std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId
     if (keyframe.parent.is_valid()) go(keyframe.parent);
     for (KeyframeId child : children[here.keyframe.value]) go(child);
     for (const CovisibilityEdge& edge : map.covisible(here.keyframe)) {
-      if (edge.num_shared >= kMinShared) go(edge.keyframe);
+      if (edge.num_shared >= kMinSharedOfLinked) go(edge.keyframe);
     }
   }
   return std::nullopt;

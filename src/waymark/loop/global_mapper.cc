@@ -7,12 +7,22 @@
 #include "waymark/loop/loop_closing.h"
 
 namespace waymark {
+namespace {
+
+/// So many keyframes of a map are compared with what lies beside them per new keyframe.
+constexpr std::size_t kNumLinksPerKeyframe = 2;
+
+}  // namespace
 
 GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            const MappingSettings& mapping,
                            const LoopSettings& loop,
                            std::uint64_t seed)
-    : settings_(loop), mapper_(rig, mapping), finder_(rig, seed), projection_(rig) {}
+    : settings_(loop),
+      mapper_(rig, mapping),
+      finder_(rig, seed),
+      link_finder_(rig, seed),
+      projection_(rig) {}
 
 void GlobalMapper::take_over(const MapSnapshot& before) {
   mapper_.take_over(*before.map);
@@ -24,7 +34,8 @@ void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(mes
 void GlobalMapper::add(const NewKeyframe& message) {
   const Mapper::Changes changes = mapper_.add(message);
   update_places(changes);
-  if (settings_.enabled) close_loop_at(changes.added.back());
+  if (!settings_.enabled || close_loop_at(changes.added.back())) return;
+  if (!unadjusted_.is_valid()) look_for_links(kNumLinksPerKeyframe);
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {
@@ -50,7 +61,27 @@ bool GlobalMapper::close_loop_at(KeyframeId query) {
   num_loops_ += !is_join;
   ++num_closures_;
   unadjusted_ = mapper_.map().keyframes().at(query).submap;
+  unlinked_.clear();
+  mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.submap == unadjusted_) unlinked_.push_back(id);
+  });
   return true;
+}
+
+/// A closure brings parts of the map together that may touch elsewhere, too.
+void GlobalMapper::look_for_links(std::size_t max_count) {
+  for (std::size_t i = 0; i < max_count && !unlinked_.empty(); ++i) {
+    const KeyframeId query = unlinked_.back();
+    unlinked_.pop_back();
+    if (!mapper_.map().keyframes().contains(query)) continue;
+    const std::optional<Revisit> link = link_finder_.find(mapper_.map(), query);
+    if (!link) continue;
+    mapper_.change(
+        [&](Map& map, DirtyLandmarks& dirty) { close_loop(map, *link, projection_, dirty); });
+    ++num_loops_;
+    ++num_closures_;
+    unadjusted_ = mapper_.map().keyframes().at(query).submap;
+  }
 }
 
 std::optional<AdjustmentTask> GlobalMapper::take_task() {
@@ -72,6 +103,9 @@ void GlobalMapper::finish() {
     if (mapper_.map().keyframes().contains(newest)) close_loop_at(newest);
   }
   mapper_.refine_globally();
+  const std::uint32_t num_closures = num_closures_;
+  look_for_links(unlinked_.size());
+  if (num_closures_ > num_closures) mapper_.refine_globally();
 }
 
 MapSnapshot GlobalMapper::snapshot() {

@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "waymark/loop/link_finder.h"
 #include "waymark/loop/loop_finder.h"
 #include "waymark/loop/settings.h"
 #include "waymark/mapping/global_adjustment.h"
@@ -49,13 +51,16 @@ class GlobalMapper {
  private:
   void update_places(const Mapper::Changes& changes);
   bool close_loop_at(KeyframeId query);
+  void look_for_links(std::size_t max_count);
 
   const LoopSettings settings_;
   Mapper mapper_;
   PlaceIndex places_;
   LoopFinder finder_;
+  LinkFinder link_finder_;
   ProjectionMatcher projection_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
+  std::vector<KeyframeId> unlinked_;  ///< Where to look for links yet, the last one first.
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
 };

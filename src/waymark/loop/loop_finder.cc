@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "waymark/loop/drift.h"
+#include "waymark/loop/near_in_graph.h"
 
 namespace waymark {
 namespace {
@@ -13,9 +14,8 @@ constexpr std::size_t kMaxCandidates = 4;
 /// Of keyframes that see the same, so many are candidates, so that others have their turn.
 constexpr int kMaxOfOnePlace = 2;
 constexpr std::size_t kNumRanked = 12;
-/// Keyframes so many steps away that each share so many landmarks are the query's surroundings.
+/// Keyframes so many steps away are the query's surroundings.
 constexpr int kNumNearSteps = 2;
-constexpr std::uint32_t kMinShared = 15;
 /// Of the best score within the surroundings.
 constexpr double kMinRelativeScore = 0.1;
 
@@ -28,38 +28,14 @@ struct Demand {
   std::size_t num_witnesses;
 };
 constexpr Demand kOfLoops{25, 40, 0.15, 1};
-constexpr Demand kOfJoins{50, 80, 0.25, 2};
+constexpr Demand kOfJoins{30, 60, 0.15, 1};
 /// Two revisits of one query agree within this, in radians and in parts of the depth of the scene.
 constexpr double kMaxDisagreement = 0.2;
-
-/// The query and its surroundings, ascending.
-std::vector<KeyframeId> surroundings(const Map& map, KeyframeId query) {
-  std::vector<KeyframeId> near = {query};
-  std::vector<KeyframeId> front = near;
-  for (int step = 0; step < kNumNearSteps; ++step) {
-    std::vector<KeyframeId> next;
-    for (KeyframeId id : front) {
-      const KeyframeId parent = map.keyframes().at(id).parent;
-      if (parent.is_valid()) next.push_back(parent);
-      for (const CovisibilityEdge& edge : map.covisible(id)) {
-        if (edge.num_shared >= kMinShared) next.push_back(edge.keyframe);
-      }
-    }
-    std::sort(next.begin(), next.end());
-    next.erase(std::unique(next.begin(), next.end()), next.end());
-    front.clear();
-    std::set_difference(
-        next.begin(), next.end(), near.begin(), near.end(), std::back_inserter(front));
-    near.insert(near.end(), front.begin(), front.end());
-    std::sort(near.begin(), near.end());
-  }
-  return near;
-}
 
 bool are_linked(const Map& map, KeyframeId a, KeyframeId b) {
   const auto& edges = map.covisible(a);
   return std::any_of(edges.begin(), edges.end(), [&](const CovisibilityEdge& edge) {
-    return edge.keyframe == b && edge.num_shared >= kMinShared;
+    return edge.keyframe == b && edge.num_shared >= kMinSharedOfLinked;
   });
 }
 
@@ -113,7 +89,7 @@ std::vector<KeyframeId> find_candidates(const Map& map,
                                         const PlaceIndex& places,
                                         KeyframeId query,
                                         std::size_t max_count) {
-  const std::vector<KeyframeId> near = surroundings(map, query);
+  const std::vector<KeyframeId> near = within_steps(map, query, kNumNearSteps);
   const auto is_near = [&](KeyframeId id) {
     return std::binary_search(near.begin(), near.end(), id);
   };

@@ -25,7 +25,7 @@ constexpr std::size_t kMinObservers = 3;
 /// A keyframe near the query is a witness if it finds so many landmarks, and such a share.
 constexpr std::size_t kMaxWitnesses = 5;
 constexpr std::size_t kMinFoundByWitness = 25;
-constexpr double kMinShareOfWitness = 0.12;
+constexpr double kMinShareOfWitness = 0.1;
 
 bool is_scale_free(const Map& map, KeyframeId a, KeyframeId b) {
   const auto is_metric = [&](KeyframeId id) {

@@ -3,6 +3,8 @@
 #include "waymark/track/place_locator.h"
 
 #include <algorithm>
+#include <array>
+#include <utility>
 
 #include "waymark/optimize/locate.h"
 #include "waymark/track/place_confidence.h"
@@ -20,6 +22,8 @@ constexpr double kMinInlierRatio = 0.2;
 /// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
 constexpr double kFirstRadiusPx = 12.0;
 constexpr double kSecondRadiusPx = 5.0;
+/// Where drift or a guess put a pose: five degrees of a lens of 460 px.
+constexpr double kGuessRadiusPx = 40.0;
 /// Laxer than in tracking: light and cameras may have changed, and a few wrong ones do no harm.
 constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio = 0.9};
 constexpr int kMinInliers = 30;
@@ -67,26 +71,56 @@ std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
   const std::size_t num_matches = match_by_appearance(features, map, landmarks);
   attempt_ = {FrameReason::kTooFewMatches, static_cast<int>(num_matches), 0};
   if (num_matches < kMinMatches) return std::nullopt;
+  std::optional<LocatedPlace> place = refine(features, map, candidate, stream, landmarks);
+  if (!place) return std::nullopt;
+  if (place->confidence < kMinConfidence) {
+    attempt_.failure = FrameReason::kNotVerified;
+    return std::nullopt;
+  }
+  return place;
+}
+
+std::optional<LocatedPlace> PlaceLocator::locate_near(const Features& features,
+                                                      const Map& map,
+                                                      KeyframeId candidate,
+                                                      const Rigid3& guess,
+                                                      std::vector<LandmarkId>& landmarks) {
+  gather_local_map(map, map.keyframes().at(candidate).landmarks, candidate, local_);
+  const ProjectionMatches& matches =
+      matcher_.match(local_.landmarks, features, {}, guess, {.radius_px = kGuessRadiusPx});
+  landmarks.assign(features.size(), LandmarkId{});
+  for (std::size_t i = 0; i < local_.landmarks.size(); ++i) {
+    if (matches.features[i] != kNoFeature) landmarks[matches.features[i]] = local_.landmarks.ids[i];
+  }
+  attempt_ = {FrameReason::kTooFewMatches, static_cast<int>(matches.num_matches), 0};
+  if (matches.num_matches < kMinMatches) return std::nullopt;
+  return refine(features, map, candidate, candidate.value, landmarks);
+}
+
+/// The pose that most matches agree on, and with it the landmarks around.
+std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
+                                                 const Map& map,
+                                                 KeyframeId candidate,
+                                                 std::uint64_t stream,
+                                                 std::vector<LandmarkId>& landmarks) {
   attempt_.failure = FrameReason::kTooFewInliers;
   const std::optional<Rigid3> consensus = find_consensus(features, map, stream, landmarks);
   if (!consensus) return std::nullopt;
-  collect_found(features, landmarks, found_);
-  gather_local_map(map, found_, candidate, local_);
   LocatedPlace place;
-  place.frame = match_around(features, map, *consensus, kFirstRadiusPx, landmarks);
-  attempt_.num_inliers = place.frame.num_inliers;
-  if (place.frame.num_inliers < kMinInliers / 2) return std::nullopt;
-  collect_found(features, landmarks, found_);
-  gather_local_map(map, found_, candidate, local_);
-  place.frame = match_around(features, map, place.frame.rig_from_world, kSecondRadiusPx, landmarks);
-  attempt_.num_inliers = place.frame.num_inliers;
-  if (place.frame.num_inliers < kMinInliers) return std::nullopt;
+  place.frame.rig_from_world = *consensus;
+  constexpr std::array<std::pair<double, int>, 2> kRounds = {
+      {{kFirstRadiusPx, kMinInliers / 2}, {kSecondRadiusPx, kMinInliers}}};
+  for (const auto& [radius_px, min_inliers] : kRounds) {
+    collect_found(features, landmarks, found_);
+    gather_local_map(map, found_, candidate, local_);
+    place.frame = match_around(features, map, place.frame.rig_from_world, radius_px, landmarks);
+    attempt_.num_inliers = place.frame.num_inliers;
+    if (place.frame.num_inliers < min_inliers) return std::nullopt;
+  }
+  attempt_.failure = FrameReason::kNone;
   place.reference = local_.reference;
   place.confidence = place_confidence(
       *rig_, features, landmarks, map, place.reference, place.frame.rig_from_world);
-  attempt_.failure =
-      place.confidence < kMinConfidence ? FrameReason::kNotVerified : FrameReason::kNone;
-  if (place.confidence < kMinConfidence) return std::nullopt;
   return place;
 }
 

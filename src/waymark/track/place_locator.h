@@ -54,7 +54,16 @@ class PlaceLocator {
                                      std::uint64_t stream,
                                      std::vector<LandmarkId>& landmarks);
 
-  /// What became of the last locate().
+  /// The same where a pose is known already, though too coarsely to look for landmarks one by one:
+  /// to within some 5 degrees or a tenth of the depth of the scene. Such a pose says more than
+  /// confidence: nothing is demanded of that.
+  std::optional<LocatedPlace> locate_near(const Features& features,
+                                          const Map& map,
+                                          KeyframeId candidate,
+                                          const Rigid3& guess,
+                                          std::vector<LandmarkId>& landmarks);
+
+  /// What became of the last call.
   const PlaceAttempt& attempt() const { return attempt_; }
 
   /// The keyframes whose landmarks the last locate() began with: the candidate and its strongest
@@ -71,6 +80,11 @@ class PlaceLocator {
   std::size_t match_by_appearance(const Features& features,
                                   const Map& map,
                                   std::vector<LandmarkId>& landmarks);
+  std::optional<LocatedPlace> refine(const Features& features,
+                                     const Map& map,
+                                     KeyframeId candidate,
+                                     std::uint64_t stream,
+                                     std::vector<LandmarkId>& landmarks);
   void match_keyframe(const Features& features, const Map& map, KeyframeId keyframe);
   std::optional<Rigid3> find_consensus(const Features& features,
                                        const Map& map,

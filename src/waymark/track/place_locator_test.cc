@@ -57,6 +57,26 @@ TEST_P(PlaceLocatorTest, FindsThePoseOfAFarView) {
   EXPECT_TRUE(place->reference.is_valid());
 }
 
+TEST_P(PlaceLocatorTest, FindsThePoseNearAGuess) {
+  const Rigid3 truth = make_test_pose({1.5, -0.4, 1.2}, {0.1, -0.2, 0.3});
+  const Rigid3 guess =
+      Rigid3::exp((Vector6d() << 0.1, -0.1, 0.1, 0.03, 0.03, 0.0).finished()) * truth.inverse();
+  const PointObservation view = scene_.look(truth, 100);
+  const auto place =
+      locator_.locate_near(*view.features, scene_.map, KeyframeId{0}, guess, landmarks_);
+  ASSERT_TRUE(place);
+  EXPECT_LT(error_m(place->frame.rig_from_world, truth), 0.02);
+  EXPECT_GT(place->frame.num_inliers, 200);
+  EXPECT_GT(share_of_true(view), 0.98);
+}
+
+TEST_P(PlaceLocatorTest, RefusesAnotherPlaceNearAGuess) {
+  scene_.cloud = scatter_in({-5.0, -3.0, 4.0}, {5.0, 3.0, 9.0}, 1500, 6.0, 99);
+  const Rigid3 pose = pose_at(0.3);
+  EXPECT_FALSE(locator_.locate_near(
+      *scene_.look(pose, 100).features, scene_.map, KeyframeId{0}, pose.inverse(), landmarks_));
+}
+
 TEST_P(PlaceLocatorTest, GivesTheSameBitsAgain) {
   const PointObservation view = scene_.look(pose_at(0.8, 0.3, 0.5, 0.1), 100);
   const auto first = locate(view);
