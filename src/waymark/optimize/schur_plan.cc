@@ -3,10 +3,51 @@
 #include "waymark/optimize/schur_plan.h"
 
 #include <algorithm>
+#include <tuple>
+#include <utility>
 
 namespace waymark {
 
 namespace {
+
+/// Slots that see a point in common.
+BlockPattern find_pattern(const BundleProblem& problem,
+                          std::span<const std::uint8_t> is_used,
+                          const SchurPlan& plan) {
+  const std::size_t size = plan.num_slots;
+  std::vector<bool> is_linked(size * size);
+  std::vector<std::uint32_t> slots;
+  for (std::size_t i = 0; i < problem.observations.size();) {
+    const std::uint32_t point = problem.observations[i].point;
+    slots.clear();
+    for (; i < problem.observations.size() && problem.observations[i].point == point; ++i) {
+      const std::uint32_t slot = plan.slot_of_pose[problem.observations[i].pose];
+      if (is_used[i] && slot != kNoSlot) slots.push_back(slot);
+    }
+    for (const std::uint32_t row : slots) {
+      for (const std::uint32_t column : slots) is_linked[row * size + column] = true;
+    }
+  }
+  BlockPattern pattern;
+  for (std::uint32_t row = 0; row < size; ++row) {
+    for (std::uint32_t column = 0; column < row; ++column) {
+      if (is_linked[row * size + column]) pattern.push_back({row, column});
+    }
+  }
+  return pattern;
+}
+
+/// Numbers the slots in an order of little fill-in.
+void order_slots(SchurPlan& plan) {
+  const std::vector<std::uint32_t> position = order_of_elimination(plan.num_slots, plan.pattern);
+  for (std::uint32_t& slot : plan.slot_of_pose) {
+    if (slot != kNoSlot) slot = position[slot];
+  }
+  for (auto& [row, column] : plan.pattern) {
+    std::tie(row, column) = std::pair(std::max(position[row], position[column]),
+                                      std::min(position[row], position[column]));
+  }
+}
 
 /// Appends the links of the point whose observations start at begin.
 void link_point(const BundleProblem& problem, std::size_t begin, SchurPlan& plan) {
@@ -36,6 +77,8 @@ SchurPlan make_schur_plan(const BundleProblem& problem, std::span<const std::uin
     plan.slot_of_pose.push_back(is_fixed ? kNoSlot : static_cast<std::uint32_t>(plan.num_slots));
     plan.num_slots += is_fixed ? 0 : 1;
   }
+  plan.pattern = find_pattern(problem, is_used, plan);
+  order_slots(plan);
   plan.observations.reserve(problem.observations.size());
   plan.link_of_observation.reserve(problem.observations.size());
   plan.slot_of_link.reserve(problem.observations.size());

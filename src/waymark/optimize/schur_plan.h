@@ -7,6 +7,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/optimize/block_cholesky.h"
 #include "waymark/optimize/bundle.h"
 
 namespace waymark {
@@ -18,6 +19,7 @@ inline constexpr std::uint32_t kNoSlot = UINT32_MAX;
 struct SchurPlan {
   std::vector<std::uint32_t> slot_of_pose;  // Position in the reduced system, or kNoSlot.
   std::size_t num_slots = 0;
+  BlockPattern pattern;  // Slots that see a point in common. In an order of little fill-in.
   std::vector<std::uint32_t> observations;         // The used ones.
   std::vector<std::uint32_t> link_of_observation;  // Parallel to it; kNoSlot if none.
   std::vector<std::uint32_t> points;               // Those with observations.

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/optimize/schur_solver.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 #include <utility>
 #include <vector>
 
+#include "waymark/optimize/block_cholesky.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
 #include "waymark/optimize/schur_plan.h"
@@ -87,7 +87,10 @@ class SchurSolver {
   SchurSolver(const BundleProblem& problem,
               std::span<const std::uint8_t> is_used,
               const BundleOptions& options)
-      : problem_(problem), options_(options), plan_(make_schur_plan(problem, is_used)) {
+      : problem_(problem),
+        options_(options),
+        plan_(make_schur_plan(problem, is_used)),
+        reduced_(plan_.num_slots, plan_.pattern) {
     state_.rig_from_world = problem.rig_from_world;
     state_.points = problem.points;
     for (const Rigid3& pose : state_.rig_from_world) state_.frames.push_back(frame_of(pose));
@@ -114,7 +117,7 @@ class SchurSolver {
                   const Eigen::Vector3d& point_in_rig);
   void linearize_observation(std::size_t entry, std::size_t k);
   void eliminate_points(double damping);
-  void eliminate_point(std::size_t entry, double damping);
+  void eliminate_point(std::size_t entry, double damping, std::size_t& first_pair);
   double substitute_back(double damping);
 
   const BundleProblem& problem_;
@@ -127,7 +130,8 @@ class SchurSolver {
   NormalBlocks blocks_;
   std::vector<Eigen::Matrix3d> half_inverses_;  // M with M^T * M = inverse of the damped block.
   std::vector<Matrix63d> eliminated_;           // Links of one point times M^T.
-  Eigen::MatrixXd reduced_;                     // Lower triangle.
+  BlockCholesky reduced_;
+  std::vector<std::uint32_t> block_of_links_;  // In reduced_, per pair of links of a point.
   Eigen::VectorXd reduced_gradient_;
 };
 
@@ -153,9 +157,14 @@ void SchurSolver::allocate() {
   blocks_.links.resize(plan_.slot_of_link.size());
   half_inverses_.resize(plan_.points.size());
   eliminated_.resize(plan_.num_slots);
-  const auto size = static_cast<Eigen::Index>(6 * plan_.num_slots);
-  reduced_.resize(size, size);
-  reduced_gradient_.resize(size);
+  reduced_gradient_.resize(static_cast<Eigen::Index>(6 * plan_.num_slots));
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
+    for (std::uint32_t a = plan_.first_link[entry]; a < plan_.first_link[entry + 1]; ++a) {
+      for (std::uint32_t b = plan_.first_link[entry]; b <= a; ++b) {
+        block_of_links_.push_back(reduced_.index_of(plan_.slot_of_link[a], plan_.slot_of_link[b]));
+      }
+    }
+  }
 }
 
 double SchurSolver::cost(const State& state) const {
@@ -244,7 +253,8 @@ void SchurSolver::linearize() {
   }
 }
 
-void SchurSolver::eliminate_point(std::size_t entry, double damping) {
+/// first_pair: of the point in block_of_links_; moved to that of the next point.
+void SchurSolver::eliminate_point(std::size_t entry, double damping, std::size_t& first_pair) {
   Eigen::Matrix3d block = blocks_.points[entry];
   for (int i = 0; i < 3; ++i) block(i, i) += damping * clamp_diagonal(block(i, i));
   half_inverses_[entry] = half_inverse(block);
@@ -258,8 +268,7 @@ void SchurSolver::eliminate_point(std::size_t entry, double damping) {
     const auto row = static_cast<Eigen::Index>(6 * plan_.slot_of_link[a]);
     reduced_gradient_.segment<6>(row).noalias() -= eliminated * gradient;
     for (std::uint32_t b = begin; b <= a; ++b) {
-      const auto column = static_cast<Eigen::Index>(6 * plan_.slot_of_link[b]);
-      reduced_.block<6, 6>(row, column).noalias() -=
+      reduced_.block(block_of_links_[first_pair++]).noalias() -=
           eliminated * eliminated_[b - begin].transpose();
     }
   }
@@ -267,16 +276,17 @@ void SchurSolver::eliminate_point(std::size_t entry, double damping) {
 
 /// Builds the reduced system of the damped equations.
 void SchurSolver::eliminate_points(double damping) {
-  reduced_.setZero();
-  for (std::size_t slot = 0; slot < plan_.num_slots; ++slot) {
+  reduced_.set_zero();
+  for (std::uint32_t slot = 0; slot < plan_.num_slots; ++slot) {
     const auto row = static_cast<Eigen::Index>(6 * slot);
-    auto block = reduced_.block<6, 6>(row, row);
+    Matrix6d& block = reduced_.diagonal(slot);
     block = blocks_.poses[slot];
     for (int i = 0; i < 6; ++i) block(i, i) += damping * clamp_diagonal(block(i, i));
     reduced_gradient_.segment<6>(row) = blocks_.pose_gradient[slot];
   }
+  std::size_t first_pair = 0;
   for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
-    eliminate_point(entry, damping);
+    eliminate_point(entry, damping, first_pair);
   }
 }
 
@@ -324,11 +334,10 @@ BundleRound SchurSolver::minimize() {
     is_linearized = true;
     ++round.num_iterations;
     eliminate_points(damping);
-    Eigen::LLT<Eigen::Ref<Eigen::MatrixXd>, Eigen::Lower> factor(reduced_);
     double gain = -1.0;
     double candidate_cost = round.final_cost;
-    if (factor.info() == Eigen::Success) {
-      factor.solveInPlace(reduced_gradient_);
+    if (reduced_.factorize()) {
+      reduced_.solve_in_place(reduced_gradient_);
       const double promised = substitute_back(damping);
       if (!(promised > 1e-3 * options_.relative_cost_tolerance * round.final_cost)) break;
       candidate_cost = cost(candidate_);
