@@ -1,0 +1,217 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+
+// A server of docs/viewer-protocol.md without the program behind it, for work on the page and its tests.
+//
+// usage: node dev/mock_server.mjs [--port N] [--world walk|sphere|large|map|empty|lost] [--skip FRAMES] [--token TOKEN]
+import { createServer } from "node:http";
+import { readFile } from "node:fs/promises";
+import { extname, normalize } from "node:path";
+import { fileURLToPath } from "node:url";
+import { parseArgs } from "node:util";
+import { WebSocketServer } from "ws";
+import * as encode from "./encode.mjs";
+import { largeMap, random, Walk } from "./world.mjs";
+
+const CHUNK = 65536;
+const STATES = ["initializing", "tracked", "filled", "lost", "unreadable", "dropped"];
+const REASONS = [
+  "none", "no_features", "too_little_parallax", "too_few_matches", "too_few_inliers", "no_candidate", "not_verified",
+  "unreadable_image", "wrong_size", "late",
+];
+const STAGES = ["features", "depth", "wait", "predict", "local_map", "initialize", "recover", "keyframe"];
+const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+const DIST = fileURLToPath(new URL("../dist/", import.meta.url));
+
+export class MockServer {
+  constructor({ world = "walk", skip = 0, token = "" } = {}) {
+    this.token = token;
+    this.kind = world;
+    this.generation = 0;
+    this.phase = world === "map" ? "map" : "running";
+    this.requests = [];
+    this.dots = random(11);
+    this.reset();
+    for (let i = 0; i < skip; ++i) this.world.step();
+    this.server = createServer((request, response) => void this.serve(request, response));
+    this.sockets = new WebSocketServer({ noServer: true });
+    this.server.on("upgrade", (request, socket, head) => this.upgrade(request, socket, head));
+  }
+
+  reset() {
+    ++this.generation;
+    this.world = this.kind === "large" ? largeMap() : new Walk({ isSphere: this.kind === "sphere" });
+  }
+
+  listen(port) {
+    return new Promise((resolve) => {
+      this.server.listen(port, "127.0.0.1", () => {
+        if (this.kind === "large") this.ready = [...this.snapshot()];
+        if (this.kind !== "empty") this.timer = setInterval(() => this.tick(), 100);
+        resolve(this.server.address().port);
+      });
+    });
+  }
+
+  close() {
+    clearInterval(this.timer);
+    for (const socket of this.sockets.clients) socket.terminate();
+    return new Promise((resolve) => this.server.close(resolve));
+  }
+
+  async serve(request, response) {
+    const url = new URL(request.url, "http://mock");
+    if (url.pathname === "/status") {
+      response.writeHead(this.isAllowed(url) ? 200 : 403, { "content-type": "application/json" });
+      return response.end(JSON.stringify(this.status()));
+    }
+    const path = normalize(url.pathname === "/" ? "/index.html" : url.pathname);
+    const body = await readFile(DIST + path).catch(() => null);
+    response.writeHead(body ? 200 : 404, { "content-type": TYPES[extname(path)] ?? "text/plain" });
+    response.end(body ?? "not found");
+  }
+
+  isAllowed(url) {
+    return this.token === "" || url.searchParams.get("token") === this.token;
+  }
+
+  upgrade(request, socket, head) {
+    const url = new URL(request.url, "http://mock");
+    if (url.pathname !== "/ws" || !this.isAllowed(url)) return socket.end("HTTP/1.1 403 Forbidden\r\n\r\n");
+    this.sockets.handleUpgrade(request, socket, head, (client) => {
+      client.on("message", (text) => this.answer(client, JSON.parse(text)));
+      client.send(JSON.stringify(this.hello()));
+      client.send(JSON.stringify(this.status()));
+      for (const bytes of this.ready ?? this.snapshot()) client.send(bytes);
+    });
+  }
+
+  hello() {
+    const isLive = this.kind !== "map";
+    return {
+      type: "hello", protocol: 1, program: "waymark mock", mode: isLive ? "live" : "map", input: isLive ? "courtyard" : "courtyard.wmap",
+      setup: "stereo", timing: "realtime", controls: isLive ? ["pause", "resume", "reset", "save", "mapping", "stop"] : [],
+      stages: STAGES, states: STATES, reasons: REASONS,
+    };
+  }
+
+  status() {
+    const { world } = this;
+    const last = world.frames.at(-1) ?? { frame: 0, time_s: 0, state: 0, reason: 0, tracking_ms: 0 };
+    const t = last.tracking_ms;
+    return {
+      type: "status", phase: this.kind === "empty" ? "starting" : this.phase, is_mapping: world.isMapping, frame: last.frame, time_s: last.time_s,
+      state: STATES[this.kind === "lost" ? 3 : last.state], reason: REASONS[this.kind === "lost" ? 3 : last.reason], submap: 0, matches: 412, inliers: 377,
+      stages_ms: [0.45 * t, 0.2 * t, 0, 0.08 * t, 0.25 * t, 0, 0, 0.02 * t], tracking_ms: t, tracking_ms_median: 12.4,
+      frames: world.frames.length, frames_total: 3682, tracked: world.frames.filter((each) => each.state === 1).length, unreadable: 0, dropped: 0,
+      lost_count: 1, keyframes: world.keyframes.length, landmarks: world.landmarks.size, submaps: world.submaps.length, loops: world.loops.length,
+      frames_per_s: 20, clients: this.sockets?.clients.size ?? 0,
+    };
+  }
+
+  *snapshot() {
+    const { world } = this;
+    const landmarks = [...world.landmarks.values()].sort((a, b) => a.id - b.id);
+    yield encode.begin(this.generation, [landmarks.length, world.keyframes.length, world.frames.length]);
+    yield encode.submaps(world.submaps);
+    yield encode.cameras(world.cameras);
+    yield encode.keyframes(world.keyframes);
+    yield encode.covisibility(world.covisibility);
+    yield encode.loops(world.loops);
+    for (let i = 0; i < world.frames.length; i += CHUNK) yield encode.trajectory(world.frames.slice(i, i + CHUNK));
+    for (let i = 0; i < landmarks.length; i += CHUNK) yield encode.landmarks(landmarks.slice(i, i + CHUNK));
+    yield encode.end(this.generation);
+  }
+
+  /** Two frames, ten times per second. */
+  tick() {
+    if (this.kind === "large") this.tickLarge();
+    else if (this.phase === "running" && this.kind !== "lost") for (let i = 0; i < 2; ++i) this.send(this.world.step());
+    this.broadcast(JSON.stringify(this.status()));
+    if (this.phase === "running") this.broadcast(this.frame());
+  }
+
+  /** As much as changes in a running session with a large map: local adjustment of some thousand landmarks. */
+  tickLarge() {
+    const { world } = this;
+    const from = 20000 * Math.floor(20 * this.dots());
+    const moved = Array.from({ length: 5000 }, (_, i) => world.landmarks.get(3 * (from + i)));
+    this.broadcast(encode.landmarkPositions(moved));
+    this.broadcast(encode.keyframePoses(world.keyframes.slice(-30)));
+    this.broadcast(encode.covisibility(world.covisibility.slice(-5)));
+    const { position, rotation } = world.keyframes.at(-1);
+    const frame = world.frames.at(-1).frame + 2;
+    const entry = { frame, time_s: frame / 20, position, rotation, tracking_ms: 12, submap: 0, state: 1, reason: 0 };
+    world.frames.push(entry);
+    this.broadcast(encode.trajectory([entry]));
+  }
+
+  frame() {
+    const last = this.world.frames.at(-1);
+    const pixels = Array.from({ length: 700 }, () => [752 * this.dots(), 480 * this.dots() ** 0.8]);
+    const states = pixels.map(() => (this.dots() < 0.55 ? 1 : 0));
+    return encode.frame({ frame: last?.frame ?? 0, time_s: last?.time_s ?? 0, width_px: 752, height_px: 480, pixels, states });
+  }
+
+  send({ frames, keyframes, landmarks, erased, covisibility, loops }) {
+    if (keyframes.length) this.broadcast(encode.keyframes(keyframes));
+    if (covisibility.length) this.broadcast(encode.covisibility(covisibility));
+    if (loops) this.broadcast(encode.loops(this.world.loops));
+    if (landmarks.length) this.broadcast(encode.landmarks([...new Set(landmarks)].sort((a, b) => a.id - b.id)));
+    if (erased.length) this.broadcast(encode.landmarksErased(erased));
+    this.broadcast(encode.trajectory(frames));
+  }
+
+  broadcast(data) {
+    for (const client of this.sockets.clients) client.send(data);
+  }
+
+  answer(client, request) {
+    this.requests.push(request);
+    const { world } = this;
+    const reply = (more) => client.send(JSON.stringify({ type: "reply", request: request.request, ok: true, ...more }));
+    const acts = {
+      pause: () => (this.phase = "paused"),
+      resume: () => (this.phase = "running"),
+      stop: () => (this.phase = "done"),
+      mapping: () => (world.isMapping = request.on),
+      reset: () => {
+        this.reset();
+        for (const bytes of this.snapshot()) this.broadcast(bytes);
+      },
+      save: () => ({ path: "courtyard.wmap" }),
+    };
+    if (acts[request.do]) {
+      const more = acts[request.do]();
+      return reply(typeof more === "object" ? more : {});
+    }
+    const element = request.do === "keyframe" ? this.keyframe(request.id) : request.do === "landmark" ? this.landmark(request.id) : null;
+    if (element) client.send(JSON.stringify({ type: request.do, request: request.request, ...element }));
+    else reply({ ok: false, error: `no such ${request.do}` });
+  }
+
+  keyframe(id) {
+    const keyframe = this.world.keyframes[id];
+    if (!keyframe) return null;
+    const landmarks = [...this.world.landmarks.values()].filter((each) => each.seen.includes(id)).map((each) => each.id);
+    return {
+      id, frame: keyframe.frame, timestamp_ns: "1403636579763555584", submap: 0, position: keyframe.position, rotation: keyframe.rotation,
+      parent: id > 0 ? id - 1 : null, features: 1000, camera: "pinhole, 752x480 px", covisible: this.world.covisibility[id].edges, landmarks,
+    };
+  }
+
+  landmark(id) {
+    const landmark = this.world.landmarks.get(id);
+    if (!landmark) return null;
+    const observations = landmark.seen.map((keyframe, i) => ({ keyframe, pixel: [100.5 + 31 * i, 50.25 + 4 * i], camera: 0, error_px: 0.4 + 0.1 * i }));
+    return { id, submap: 0, position: landmark.position, reference: landmark.seen[0], num_visible: 40, num_found: 37, observations };
+  }
+}
+
+if (process.argv[1] === fileURLToPath(import.meta.url)) {
+  const { values } = parseArgs({
+    options: { port: { type: "string", default: "8080" }, world: { type: "string" }, skip: { type: "string", default: "0" }, token: { type: "string" } },
+  });
+  const port = await new MockServer({ ...values, skip: Number(values.skip) }).listen(Number(values.port));
+  console.log(`http://127.0.0.1:${port}/${values.token ? `?token=${values.token}` : ""}`);
+}

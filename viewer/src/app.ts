@@ -1,0 +1,227 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+import { Connection, type ConnectionState, type Listener } from "./connection";
+import { decode, Kind } from "./protocol";
+import { publish } from "./report";
+import { Scene } from "./scene/scene";
+import type { ViewName } from "./scene/view";
+import { Store } from "./store/store";
+import type { Hello, Status } from "./text_messages";
+import { CameraPanel } from "./ui/camera_panel";
+import { Controls } from "./ui/controls";
+import { byId, Choice, setIcon, setText } from "./ui/dom";
+import { Inspector } from "./ui/inspector";
+import { Legend } from "./ui/legend";
+import { Notice } from "./ui/notice";
+import { SessionPanel } from "./ui/session_panel";
+import { Timeline } from "./ui/timeline";
+
+const PANELS_EVERY_MS = 200;
+
+/** The page: takes messages, keeps the store, and shows it. */
+export class App implements Listener {
+  readonly store = new Store();
+  readonly connection = new Connection(this);
+  readonly scene = new Scene(this.store, byId<HTMLCanvasElement>("scene"));
+  readonly inspector = new Inspector(this.scene, this.store, this.connection);
+  readonly timeline = new Timeline(this.store, () => (this.panelsAt_ms = 0));
+  readonly report = publish(this);
+  connectionState: ConnectionState = "connecting";
+  hello: Hello | null = null;
+  status: Status | null = null;
+  private readonly session = new SessionPanel();
+  private readonly controls = new Controls(this.connection);
+  private readonly camera = new CameraPanel();
+  private readonly legend = new Legend(this.scene);
+  private readonly notice = new Notice();
+  private readonly viewChoice: Choice<ViewName>;
+  private retryAt_ms = 0;
+  private lastFrame_ms = performance.now();
+  private panelsAt_ms = 0;
+  private beganAt_ms = 0;
+  private isFitted = false;
+  private isUserView = false;
+
+  constructor() {
+    const views = [["follow", "Follow"], ["orbit", "Orbit"], ["top", "Top"]] as const;
+    this.viewChoice = new Choice<ViewName>(byId("view-choice"), views, (name) => this.setView(name, true));
+    this.setUpButtons();
+    this.setUpPicking();
+    const stage = byId("stage");
+    new ResizeObserver(() => this.scene.resize(stage.clientWidth, stage.clientHeight)).observe(stage);
+  }
+
+  get colouring(): string {
+    return this.legend.colouring;
+  }
+
+  start(): void {
+    this.setTheme(localStorage.getItem("theme") ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light"));
+    this.viewChoice.set("orbit");
+    this.connection.connect();
+    requestAnimationFrame(this.tick);
+  }
+
+  onState(state: ConnectionState, retryAt_ms: number): void {
+    this.connectionState = state;
+    this.retryAt_ms = retryAt_ms;
+    byId("app").dataset["connection"] = state;
+    if (state === "waiting" || state === "refused") {
+      setText(byId("state-name"), "No connection");
+      setText(byId("state-detail"), this.store.landmarks.count > 0 ? "What is shown is the last that came" : "");
+      byId("app").style.setProperty("--state", "var(--muted)");
+    }
+    this.panelsAt_ms = 0;
+  }
+
+  onHello(hello: Hello): void {
+    this.hello = hello;
+    this.session.setHello(hello);
+    this.controls.setHello(hello);
+    this.timeline.setHello(hello);
+    this.camera.clear();
+  }
+
+  onStatus(status: Status): void {
+    this.status = status;
+    this.session.setStatus(status);
+    this.controls.setStatus(status);
+    this.report.statusTaken(status);
+  }
+
+  onBinary(data: ArrayBuffer): void {
+    const start = performance.now();
+    const message = decode(data);
+    if (message) {
+      this.store.apply(message);
+      if (message.kind === Kind.Begin) this.begin(start);
+      else if (message.kind === Kind.End) this.end();
+      else if (message.kind === Kind.Frame) void this.camera.show(message);
+    }
+    this.report.messageTaken(performance.now() - start);
+  }
+
+  private begin(now_ms: number): void {
+    this.beganAt_ms = now_ms;
+    this.isFitted = false;
+    void this.inspector.select(null);
+    this.timeline.moveTo(-1);
+    this.scene.parts.clear();
+  }
+
+  private end(): void {
+    this.report.snapshotTaken(performance.now() - this.beganAt_ms);
+    this.panelsAt_ms = 0;
+  }
+
+  private readonly tick = (now_ms: number): void => {
+    requestAnimationFrame(this.tick);
+    const start = performance.now();
+    const dt_s = Math.min(0.1, (now_ms - this.lastFrame_ms) / 1000);
+    this.lastFrame_ms = now_ms;
+    this.timeline.advance(dt_s);
+    const drew = !this.store.isLoading && this.draw(now_ms, dt_s);
+    if (now_ms - this.panelsAt_ms > PANELS_EVERY_MS) this.updatePanels(now_ms);
+    this.report.frameDone(performance.now() - start, drew);
+  };
+
+  private draw(now_ms: number, dt_s: number): boolean {
+    this.firstLook();
+    const isLost = this.timeline.cursor < 0 && this.status?.state === "lost" && this.status.phase === "running";
+    return this.scene.update(now_ms, dt_s, this.timeline.shown, isLost);
+  }
+
+  /** Chooses the view once there is something to see: a live camera is followed, a map shown as a whole. */
+  private firstLook(): void {
+    if (this.isFitted || this.store.keyframes.count === 0) return;
+    this.isFitted = true;
+    this.scene.measure();
+    if (this.isUserView) return;
+    const isMoving = this.status?.phase === "running" || this.status?.phase === "paused" || this.status?.phase === "starting";
+    this.scene.update(this.lastFrame_ms, 0, this.timeline.shown, false);
+    this.setView(this.hello?.mode === "live" && isMoving ? "follow" : "orbit", false);
+  }
+
+  private updatePanels(now_ms: number): void {
+    this.panelsAt_ms = now_ms;
+    this.notice.show(this.connectionState, (this.retryAt_ms - now_ms) / 1000, this.status, this.store);
+    this.legend.update();
+    this.timeline.draw();
+    const { view, ground } = this.scene;
+    const perPixel = this.scene.unitsPerPixel;
+    const unit = this.store.submaps?.is_metric[0] === 0 ? "units" : "m";
+    byId("scale").hidden = this.store.keyframes.count === 0;
+    const length = ground.spacing * (ground.spacing / perPixel < 24 ? 10 : 1);
+    byId("scale").style.setProperty("--length", `${Math.min(400, length / perPixel).toFixed(0)}px`);
+    setText(byId("scale"), `${length >= 1 ? length : length.toPrecision(1)} ${unit}`);
+    this.viewChoice.set(view.name);
+  }
+
+  private setView(name: ViewName, isUser: boolean): void {
+    this.isUserView ||= isUser;
+    this.scene.setView(name);
+    this.viewChoice.set(this.scene.view.name);
+    this.panelsAt_ms = 0;
+  }
+
+  private setTheme(theme: string): void {
+    document.documentElement.dataset["theme"] = theme;
+    this.scene.setPalette();
+    this.timeline.draw(true);
+  }
+
+  private setUpButtons(): void {
+    setIcon(byId("fit"), "fit");
+    setIcon(byId("screenshot"), "camera");
+    setIcon(byId("theme"), "theme");
+    byId("fit").addEventListener("click", () => this.setView(this.scene.view.name === "top" ? "top" : "orbit", true));
+    byId("screenshot").addEventListener("click", () => void this.saveScreenshot());
+    byId("theme").addEventListener("click", () => this.toggleTheme());
+    const sheet = byId("open-sheet");
+    const setSheet = (isOpen: boolean) => {
+      byId("app").toggleAttribute("data-sheet", isOpen);
+      sheet.setAttribute("aria-expanded", String(isOpen));
+      setText(sheet, isOpen ? "Close" : "Legend");
+    };
+    sheet.addEventListener("click", () => setSheet(!byId("app").hasAttribute("data-sheet")));
+    byId("stage").addEventListener("pointerdown", () => setSheet(false));
+    const keys: Record<string, () => void> = {
+      f: () => byId("fit").click(), s: () => void this.saveScreenshot(), d: () => this.toggleTheme(),
+      " ": () => this.timeline.togglePlay(), "1": () => this.setView("follow", true), "2": () => this.setView("orbit", true),
+      "3": () => this.setView("top", true), Escape: () => void this.inspector.select(null),
+    };
+    addEventListener("keydown", (event) => {
+      if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLButtonElement) return;
+      const act = keys[event.key];
+      if (!act) return;
+      event.preventDefault();
+      act();
+    });
+  }
+
+  private toggleTheme(): void {
+    const theme = document.documentElement.dataset["theme"] === "dark" ? "light" : "dark";
+    localStorage.setItem("theme", theme);
+    this.setTheme(theme);
+  }
+
+  private setUpPicking(): void {
+    const canvas = byId("scene");
+    let down = { x: 0, y: 0 };
+    canvas.addEventListener("pointerdown", (event) => (down = { x: event.offsetX, y: event.offsetY }));
+    canvas.addEventListener("pointerup", (event) => {
+      if (event.button !== 0 || Math.hypot(event.offsetX - down.x, event.offsetY - down.y) > 5) return;
+      void this.inspector.select(this.scene.pickAt(event.offsetX, event.offsetY));
+    });
+  }
+
+  private async saveScreenshot(): Promise<void> {
+    const blob = await this.scene.screenshot();
+    if (!blob) return;
+    const link = document.createElement("a");
+    link.href = URL.createObjectURL(blob);
+    link.download = `waymark-${new Date().toISOString().slice(0, 19).replaceAll(":", "-")}.png`;
+    link.click();
+    setTimeout(() => URL.revokeObjectURL(link.href), 10000);
+  }
+}

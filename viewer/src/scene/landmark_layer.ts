@@ -1,0 +1,100 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+import { BufferGeometry, Points, ShaderMaterial, Vector2, type Texture } from "three";
+import type { LandmarkTable } from "../store/landmark_table";
+import { NO_SUBMAP } from "../protocol";
+import type { Palette } from "./palette";
+import { pointFragment, pointVertex } from "./shaders";
+import { normalized, Uploads } from "./upload";
+
+export const COLOURINGS = ["image", "height", "age", "observations", "part"] as const;
+export type Colouring = (typeof COLOURINGS)[number];
+
+const NUM_SAMPLES = 4096;
+
+/** All landmarks: one buffer, one draw call. */
+export class LandmarkLayer {
+  readonly points: Points<BufferGeometry, ShaderMaterial>;
+  /** Between which values the ramp runs: height in map units, frame, or observations. */
+  readonly low_high = { height: new Vector2(0, 1), age: new Vector2(0, 1), observations: new Vector2(0, 1) };
+  private readonly positions: Uploads;
+  private readonly others: Uploads;
+  private readonly samples = new Float32Array(NUM_SAMPLES);
+
+  constructor(private readonly table: LandmarkTable, partPlaces: Texture) {
+    const geometry = new BufferGeometry();
+    this.positions = new Uploads([geometry]).bind("position", 3, () => table.position);
+    this.others = new Uploads([geometry])
+      .bind("frame", 1, () => table.frame)
+      .bind("facts", 2, () => table.facts)
+      .bind("colour", 4, () => table.colour, normalized);
+    const material = new ShaderMaterial({
+      vertexShader: pointVertex,
+      fragmentShader: pointFragment,
+      uniforms: {
+        partPlaces: { value: partPlaces }, mode: { value: 1 }, range: { value: this.low_high.height },
+        pointSize: { value: new Vector2(1.5, 6) }, worldSize: { value: 0.02 }, viewHeight: { value: 1 },
+        ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, dim: { value: 1 },
+      },
+    });
+    this.points = new Points(geometry, material);
+    this.points.frustumCulled = false;
+  }
+
+  setPalette(palette: Palette): void {
+    const { uniforms } = this.points.material;
+    uniforms["ramp"]!.value = palette.ramp;
+    uniforms["parts"]!.value = palette.parts;
+    uniforms["ink"]!.value = palette.ink;
+  }
+
+  setColouring(colouring: Colouring): void {
+    const { uniforms } = this.points.material;
+    uniforms["mode"]!.value = COLOURINGS.indexOf(colouring);
+    if (colouring === "height" || colouring === "age" || colouring === "observations") {
+      uniforms["range"]!.value = this.low_high[colouring];
+    }
+  }
+
+  /** Lets other things stand out. */
+  setDim(isDim: boolean): void {
+    const { material } = this.points;
+    material.uniforms["dim"]!.value = isDim ? 0.22 : 1;
+    material.transparent = isDim;
+    material.depthWrite = !isDim;
+  }
+
+  setView(pixelRatio: number, height_px: number, worldSize: number): void {
+    const { uniforms } = this.points.material;
+    (uniforms["pointSize"]!.value as Vector2).set(2 * pixelRatio, 6 * pixelRatio);
+    uniforms["viewHeight"]!.value = 0.5 * height_px;
+    uniforms["worldSize"]!.value = worldSize;
+  }
+
+  sync(): boolean {
+    const { table } = this;
+    this.points.geometry.setDrawRange(0, table.slots.end);
+    const moved = this.positions.sync(table.movedSlots, table.slots.end);
+    return this.others.sync(table.changedSlots, table.slots.end) || moved;
+  }
+
+  /** Measures again what the ramps run between, on a sample. */
+  measure(): void {
+    const { table, low_high } = this;
+    this.percentiles((slot) => -table.position[3 * slot + 1]!, 0.03, 0.97, low_high.height);
+    this.percentiles((slot) => table.frame[slot]!, 0, 1, low_high.age);
+    this.percentiles((slot) => Math.log2(table.facts[2 * slot]!), 0.02, 0.98, low_high.observations);
+  }
+
+  private percentiles(valueOf: (slot: number) => number, low: number, high: number, out: Vector2): void {
+    const { table, samples } = this;
+    const step = Math.max(1, Math.floor(table.slots.end / NUM_SAMPLES));
+    let count = 0;
+    for (let slot = 0; slot < table.slots.end && count < NUM_SAMPLES; slot += step) {
+      if (table.isAlive(slot) && table.facts[2 * slot + 1] !== NO_SUBMAP) samples[count++] = valueOf(slot);
+    }
+    if (count === 0) return;
+    const sorted = samples.subarray(0, count).sort();
+    out.set(sorted[Math.floor(low * (count - 1))]!, sorted[Math.floor(high * (count - 1))]!);
+  }
+}

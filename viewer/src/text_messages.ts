@@ -1,0 +1,88 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+
+/** Text messages of docs/viewer-protocol.md. */
+
+export type Control = "pause" | "resume" | "reset" | "save" | "mapping" | "stop";
+export type Phase = "starting" | "running" | "paused" | "finishing" | "done" | "map";
+
+export interface Hello {
+  type: "hello";
+  protocol: number;
+  program: string;
+  mode: "live" | "map";
+  input: string;
+  setup: string;
+  timing: string;
+  controls: Control[];
+  stages: string[];
+  states: string[];
+  reasons: string[];
+}
+
+export interface Status {
+  type: "status";
+  phase: Phase;
+  is_mapping: boolean;
+  frame: number;
+  time_s: number;
+  state: string;
+  reason: string;
+  submap: number;
+  matches: number;
+  inliers: number;
+  stages_ms: number[];
+  tracking_ms: number;
+  tracking_ms_median: number;
+  frames: number;
+  frames_total: number | null;
+  tracked: number;
+  unreadable: number;
+  dropped: number;
+  lost_count: number;
+  keyframes: number;
+  landmarks: number;
+  submaps: number;
+  loops: number;
+  frames_per_s: number;
+  clients: number;
+}
+
+export interface Reply {
+  type: "reply";
+  request: number | null;
+  ok: boolean;
+  error?: string;
+  path?: string;
+}
+
+export interface KeyframeData {
+  type: "keyframe";
+  request: number;
+  id: number;
+  frame: number;
+  timestamp_ns: string;
+  submap: number;
+  position: number[];
+  rotation: number[];
+  parent: number | null;
+  features: number;
+  camera: string;
+  covisible: [number, number][];
+  landmarks: number[];
+}
+
+export interface LandmarkData {
+  type: "landmark";
+  request: number;
+  id: number;
+  submap: number;
+  position: number[];
+  reference: number;
+  num_visible: number;
+  num_found: number;
+  observations: { keyframe: number; pixel: [number, number]; camera: number; error_px: number }[];
+}
+
+export type TextMessage = Hello | Status | Reply | KeyframeData | LandmarkData;
+export type Answer = Reply | KeyframeData | LandmarkData;
