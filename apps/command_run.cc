@@ -106,7 +106,10 @@ int run(const RunOptions& options, Reporter& reporter) {
   for (const std::string& line : session.description) reporter.info(line);
   make_output_folder(options.report.out);
   const bool has_map_out = !options.map_out.empty();
-  if (has_map_out) AtomicFile{options.map_out};  // Fails now rather than in the end.
+  if (has_map_out) {
+    AtomicFile{options.map_out};  // Fails now rather than in the end.
+    remove_abandoned_parts(options.map_out);
+  }
   ImageKeeper images(
       *session.input, [&] { return session.system->map(); }, std::move(session.images));
   Autosave autosave(options.map_out,

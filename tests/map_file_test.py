@@ -113,6 +113,9 @@ class Autosave(CliTest):
             done = waymark("map", "check", saved)
             self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
         self.assertEqual(num_saved, NUM_KILLS)
+        # What the killed ones left half-written goes when one comes to its end.
+        self.assertEqual(self.run_on(source, "--map-out", saved).returncode, 0)
+        self.assertEqual([path.name for path in self.folder.glob(".map.wmap*")], [])
 
     def test_does_not_change_the_results(self):
         source, saved = self.sequence("mono"), self.folder / "map.wmap"

@@ -8,8 +8,11 @@
 #include <unistd.h>
 
 #include <cerrno>
+#include <charconv>
 #include <ctime>
+#include <optional>
 #include <system_error>
+#include <vector>
 
 #include "waymark/base/check.h"
 
@@ -66,6 +69,22 @@ std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
 
+/// "." + name + "." + process + "-" + number + ".partial".
+std::string partial_prefix(const std::filesystem::path& path) {
+  return fmt::format(".{}.", path.filename().string());
+}
+constexpr std::string_view kPartialSuffix = ".partial";
+
+/// The process that made a partial file of this prefix; nothing for other names.
+std::optional<pid_t> maker_of(std::string_view name, std::string_view prefix) {
+  if (!name.starts_with(prefix) || !name.ends_with(kPartialSuffix)) return std::nullopt;
+  const std::string_view rest = name.substr(prefix.size());
+  pid_t process = 0;
+  const auto [end, error] = std::from_chars(rest.data(), rest.data() + rest.size(), process);
+  if (error != std::errc() || *end != '-' || process <= 0) return std::nullopt;
+  return process;
+}
+
 }  // namespace
 
 AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(path) {
@@ -81,7 +100,7 @@ AtomicFile::AtomicFile(const std::filesystem::path& path) : path_(path) {
   }
   for (int i = 0; i < kMaxNames && descriptor_ < 0; ++i) {
     temporary_ = folder_of(path_) /
-                 fmt::format(".{}.{}-{}.partial", path_.filename().string(), ::getpid(), i);
+                 fmt::format("{}{}-{}{}", partial_prefix(path_), ::getpid(), i, kPartialSuffix);
     descriptor_ = ::open(temporary_.c_str(), O_WRONLY | O_CREAT | O_EXCL | O_CLOEXEC, 0666);
     if (descriptor_ < 0 && errno != EEXIST) break;
   }
@@ -147,6 +166,19 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
   AtomicFile file(path);
   file.write(content);
   file.commit();
+}
+
+void remove_abandoned_parts(const std::filesystem::path& path) {
+  const std::string prefix = partial_prefix(path);
+  std::vector<std::filesystem::path> abandoned;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder_of(path), error), end;
+       !error && entry != end;
+       entry.increment(error)) {
+    const std::optional<pid_t> maker = maker_of(entry->path().filename().string(), prefix);
+    if (maker && ::kill(*maker, 0) != 0 && errno == ESRCH) abandoned.push_back(entry->path());
+  }
+  for (const std::filesystem::path& part : abandoned) std::filesystem::remove(part, error);
 }
 
 void make_output_folder(const std::filesystem::path& folder) {

@@ -38,6 +38,10 @@ class AtomicFile {
 /// Writes the whole content; throws OutputError like AtomicFile.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
 
+/// Removes what programs that were killed while they wrote this file left beside it. What a living
+/// program writes stays.
+void remove_abandoned_parts(const std::filesystem::path& path);
+
 /// Makes the folder and those above it; throws OutputError when that fails or a file is in the way.
 void make_output_folder(const std::filesystem::path& folder);
 

@@ -117,5 +117,27 @@ TEST(AtomicFile, LeavesNothingBehindWhenTheFileSizeLimitStrikes) {
   EXPECT_EQ(num_entries(folder), 1u);
 }
 
+TEST(AtomicFile, WhatTheKilledLeftIsRemoved) {
+  const TemporaryFolder folder;
+  const pid_t killed = fork();
+  if (killed == 0) {
+    AtomicFile file(folder / "a.txt");
+    AtomicFile second(folder / "a.txt");
+    AtomicFile other(folder / "b.txt");
+    raise(SIGKILL);
+  }
+  waitpid(killed, nullptr, 0);
+  EXPECT_EQ(num_entries(folder), 3u);
+  folder.write(".a.txt.partial", "of someone else");
+  folder.write(".a.txt.x-0.partial", "of someone else");
+  AtomicFile mine(folder / "a.txt");
+  remove_abandoned_parts(folder / "a.txt");
+  EXPECT_EQ(num_entries(folder), 4u);  // b's, those of someone else, mine.
+  mine.write("whole");
+  mine.commit();
+  EXPECT_EQ(read_text_file(folder / "a.txt", "text"), "whole");
+  remove_abandoned_parts(folder / "none" / "a.txt");
+}
+
 }  // namespace
 }  // namespace waymark
