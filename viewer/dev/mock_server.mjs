@@ -53,6 +53,11 @@ export class MockServer {
     });
   }
 
+  /** Nothing comes any more. */
+  hold() {
+    clearInterval(this.timer);
+  }
+
   close() {
     clearInterval(this.timer);
     for (const socket of this.sockets.clients) socket.terminate();

@@ -17,6 +17,8 @@ import { SessionPanel } from "./ui/session_panel";
 import { Timeline } from "./ui/timeline";
 
 const PANELS_EVERY_MS = 200;
+/** A frame that takes longer is slow. */
+const SLOW_MS = 70;
 
 /** The page: takes messages, keeps the store, and shows it. */
 export class App implements Listener {
@@ -36,7 +38,10 @@ export class App implements Listener {
   private readonly notice = new Notice();
   private readonly viewChoice: Choice<ViewName>;
   private retryAt_ms = 0;
-  private lastFrame_ms = performance.now();
+  private before_ms = performance.now();
+  private drawnAt_ms = performance.now();
+  private restUntil_ms = 0;
+  private hasDrawn = false;
   private panelsAt_ms = 0;
   private beganAt_ms = 0;
   private isFitted = false;
@@ -117,10 +122,12 @@ export class App implements Listener {
   private readonly tick = (now_ms: number): void => {
     requestAnimationFrame(this.tick);
     const start = performance.now();
-    const dt_s = Math.min(0.1, (now_ms - this.lastFrame_ms) / 1000);
-    this.lastFrame_ms = now_ms;
-    this.timeline.advance(dt_s);
-    const drew = !this.store.isLoading && this.draw(now_ms, dt_s);
+    this.timeline.advance(Math.min(0.5, (now_ms - this.before_ms) / 1000));
+    // Where drawing is slow every second moment is left to the rest of the machine.
+    if (this.hasDrawn && now_ms - this.before_ms > SLOW_MS) this.restUntil_ms = now_ms + Math.min(500, now_ms - this.before_ms);
+    this.before_ms = now_ms;
+    const drew = !this.store.isLoading && now_ms >= this.restUntil_ms && this.draw(now_ms, (now_ms - this.drawnAt_ms) / 1000);
+    this.hasDrawn = drew;
     if (now_ms - this.panelsAt_ms > PANELS_EVERY_MS) this.updatePanels(now_ms);
     this.report.frameDone(performance.now() - start, drew);
   };
@@ -128,7 +135,8 @@ export class App implements Listener {
   private draw(now_ms: number, dt_s: number): boolean {
     this.firstLook();
     const isLost = this.timeline.cursor < 0 && this.status?.state === "lost" && this.status.phase === "running";
-    return this.scene.update(now_ms, dt_s, this.timeline.shown, isLost);
+    this.drawnAt_ms = now_ms;
+    return this.scene.update(now_ms, Math.min(0.25, dt_s), this.timeline.shown, isLost);
   }
 
   /** Chooses the view once there is something to see: a live camera is followed, a map shown as a whole. */
@@ -138,7 +146,7 @@ export class App implements Listener {
     this.scene.measure();
     if (this.isUserView) return;
     const isMoving = this.status?.phase === "running" || this.status?.phase === "paused" || this.status?.phase === "starting";
-    this.scene.update(this.lastFrame_ms, 0, this.timeline.shown, false);
+    this.scene.update(this.before_ms, 0, this.timeline.shown, false);
     this.setView(this.hello?.mode === "live" && isMoving ? "follow" : "orbit", false);
   }
 

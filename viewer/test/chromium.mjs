@@ -14,7 +14,7 @@ export function launch() {
 
 /** A page on `url`, as large as a desktop's window or as a phone; complaints of the page are collected in `problems`. */
 export async function open(browser, url, { isPhone = false, isDark = false, size } = {}) {
-  const viewport = size ?? (isPhone ? { width: 390, height: 844 } : { width: 1440, height: 900 });
+  const viewport = size ?? (isPhone ? { width: 390, height: 844 } : { width: 960, height: 640 });
   const context = await browser.newContext({
     viewport, deviceScaleFactor: isPhone ? 2 : 1, isMobile: isPhone, hasTouch: isPhone, colorScheme: isDark ? "dark" : "light",
     acceptDownloads: true,
@@ -29,4 +29,42 @@ export async function open(browser, url, { isPhone = false, isDark = false, size
   await page.goto(url);
   await page.waitForFunction(() => "waymark" in window);
   return page;
+}
+
+/** What the page says of itself. */
+export const report = (page) =>
+  page.evaluate(() => {
+    const { connection, session, generation, isLoading, sequence, landmarks, keyframes, trajectory, frames } = window.waymark;
+    const { covisibilityEdges, loopEdges, view, colouring, selected, agreement, performance } = window.waymark;
+    return {
+      connection, session, generation, isLoading, sequence, landmarks, keyframes, trajectory, frames, covisibilityEdges, loopEdges,
+      view, colouring, selected, agreement, performance,
+    };
+  });
+
+/** Waits until the page says so; `condition` is evaluated in the page with its report. */
+export async function until(page, condition, argument, timeout = 30000) {
+  const check = new Function("argument", `return (${condition})(window.waymark, argument)`);
+  await page.waitForFunction(check, argument, { timeout, polling: 100 });
+}
+
+/** Presses a keyframe or landmark near the middle of the map: tries places until something is hit. */
+export async function pickSomething(page) {
+  const box = await page.locator("#scene").boundingBox();
+  for (let i = 0; i < 60; ++i) {
+    const angle = 2.4 * i;
+    const radius = 0.035 * Math.sqrt(i) * Math.min(box.width, box.height);
+    await page.mouse.click(box.x + box.width / 2 + radius * Math.cos(angle), box.y + box.height / 2 + radius * Math.sin(angle));
+    if (await page.evaluate(() => window.waymark.selected)) return;
+  }
+  throw new Error("nothing was hit");
+}
+
+/** A picture of the page when it has come to rest; desktops as large as people have them. */
+export async function picture(page, path) {
+  const before = page.viewportSize();
+  if (before.width > 800) await page.setViewportSize({ width: 1440, height: 900 });
+  await page.waitForTimeout(1500);
+  await page.screenshot({ path, timeout: 60000 });
+  await page.setViewportSize(before);
 }

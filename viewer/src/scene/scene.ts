@@ -53,7 +53,7 @@ export class Scene {
   private hasSubject = false;
 
   constructor(private readonly store: Store, private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: true, powerPreference: "high-performance" });
+    this.renderer = new WebGLRenderer({ canvas, antialias: window.devicePixelRatio < 2, powerPreference: "high-performance" });
     this.renderer.outputColorSpace = LinearSRGBColorSpace; // The colours of the style sheet, as they are.
     this.view = new View(canvas);
     this.landmarks = new LandmarkLayer(store.landmarks, this.parts.texture);

@@ -11,7 +11,7 @@ const LAYER_LOOKS: Record<LayerName, { word: string; key: string; weight: string
   landmarks: { word: "Landmarks", key: "--ramp-2", weight: "dot" },
   keyframes: { word: "Keyframes", key: "--keyframe", weight: "2px" },
   covisibility: { word: "Covisibility", key: "--covisibility", weight: "1px" },
-  tree: { word: "Spanning tree", key: "--covisibility", weight: "2px" },
+  tree: { word: "Tree", key: "--covisibility", weight: "2px" },
   loops: { word: "Loops", key: "--loop", weight: "2px" },
   trajectory: { word: "Trajectory", key: "--trail", weight: "4px" },
   grid: { word: "Grid", key: "--grid", weight: "1px" },

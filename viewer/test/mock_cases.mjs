@@ -1,0 +1,174 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+import assert from "node:assert/strict";
+import { MockServer } from "../dev/mock_server.mjs";
+import { open, pickSomething, picture, report, until } from "./chromium.mjs";
+
+const isOpen = (w) => w.connection === "open" && !w.isLoading && w.generation > 0;
+
+/** A mock server with a page on it; both are closed at the end of the case. */
+async function serve({ browser, cleanUp }, options, view, path = "/") {
+  const mock = new MockServer(options);
+  cleanUp.push(() => mock.close());
+  const port = await mock.listen(0);
+  const url = `http://127.0.0.1:${port}${path}`;
+  const openPage = (more = view) => open(browser, url, more);
+  return { mock, port, openPage, page: await openPage() };
+}
+
+async function growsAndAgrees(context) {
+  const { mock, page, openPage } = await serve(context, { world: "walk", skip: 200 }, { isDark: true });
+  await until(page, isOpen);
+  const before = await report(page);
+  assert.ok(before.landmarks > 0 && before.keyframes > 0 && before.trajectory > 0);
+  await until(page, (w, b) => w.landmarks > b.landmarks && w.keyframes > b.keyframes && w.trajectory > b.trajectory, before);
+  await until(page, (w) => w.agreement.equal >= 10);
+  assert.equal((await report(page)).agreement.different, 0);
+  const late = await openPage({ isPhone: true, isDark: true });
+  await until(late, isOpen);
+  assert.ok((await report(late)).landmarks >= before.landmarks, "a late browser sees the whole map");
+  await until(late, (w) => w.agreement.equal >= 3);
+  assert.equal(mock.sockets.clients.size, 2);
+  mock.hold();
+  await picture(page, `${context.pictures}/desktop_dark.png`);
+  await picture(late, `${context.pictures}/phone_dark.png`);
+  await late.tap("#open-sheet");
+  await late.waitForTimeout(400);
+  await picture(late, `${context.pictures}/phone_sheet.png`);
+  assert.deepEqual([...page.problems, ...late.problems], []);
+}
+
+async function controlsAct(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 100 });
+  await until(page, isOpen);
+  const press = (control) => page.click(`[data-control=${control}]`);
+  await press("pause");
+  await until(page, (w) => w.session.phase === "paused");
+  await page.waitForFunction(() => document.querySelector("[data-control=pause]").textContent === "Resume");
+  await press("pause");
+  await until(page, (w) => w.session.phase === "running");
+  await press("mapping");
+  await until(page, (w) => !w.session.is_mapping);
+  await page.waitForFunction(() => document.querySelector("[data-control=mapping]").textContent === "Go on mapping");
+  await press("mapping");
+  await until(page, (w) => w.session.is_mapping);
+  await press("save");
+  await page.waitForFunction(() => document.querySelector("#controls").textContent.includes("Saved to courtyard.wmap"));
+  const { generation } = await report(page);
+  await press("reset");
+  assert.ok(!mock.requests.some((request) => request.do === "reset"), "it asks first");
+  await press("reset");
+  await until(page, (w, g) => w.generation > g && !w.isLoading, generation);
+  await press("stop");
+  await press("stop");
+  await until(page, (w) => w.session.phase === "done");
+  assert.deepEqual(mock.requests.map((request) => request.do), ["pause", "resume", "mapping", "mapping", "save", "reset", "stop"]);
+  assert.deepEqual(page.problems, []);
+}
+
+async function looksFromEverywhere(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 900 });
+  await until(page, isOpen);
+  mock.hold();
+  await until(page, (w) => w.view === "follow");
+  for (const view of ["orbit", "top", "follow"]) {
+    await page.click(`#view-choice [data-value=${view}]`);
+    await until(page, (w, v) => w.view === v, view);
+  }
+  for (const colouring of ["image", "height", "age", "observations", "part"]) {
+    await page.click(`#colouring-choice [data-value=${colouring}]`);
+    await until(page, (w, c) => w.colouring === c, colouring);
+  }
+  await page.click("[data-layer=covisibility]");
+  assert.equal(await page.getAttribute("[data-layer=covisibility]", "aria-pressed"), "true");
+  await page.click("#view-choice [data-value=top]");
+  await page.click("#colouring-choice [data-value=height]");
+  await picture(page, `${context.pictures}/desktop_top_light.png`);
+  const download = page.waitForEvent("download");
+  await page.click("#screenshot");
+  assert.match((await download).suggestedFilename(), /^waymark-.*\.png$/);
+  const theme = () => page.evaluate(() => document.documentElement.dataset.theme);
+  assert.equal(await theme(), "light");
+  await page.click("#theme");
+  assert.equal(await theme(), "dark");
+  assert.deepEqual(page.problems, []);
+}
+
+async function showsWhatIsClicked(context) {
+  const { page } = await serve(context, { world: "map", skip: 700 });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  await page.waitForTimeout(1500);
+  await pickSomething(page);
+  await page.waitForSelector("#inspector .link");
+  const { selected } = await report(page);
+  assert.match(await page.innerText("#inspector h2"), new RegExp(`${selected.id}$`));
+  await page.click("#inspector .link");
+  await until(page, (w) => w.selected.kind === "keyframe");
+  await page.waitForFunction(() => document.querySelector("#inspector").textContent.includes("Shares landmarks with"));
+  await picture(page, `${context.pictures}/desktop_keyframe.png`);
+  await page.keyboard.press("Escape");
+  await until(page, (w) => w.selected === null);
+  assert.deepEqual(page.problems, []);
+}
+
+async function playsTheSession(context) {
+  const { page } = await serve(context, { world: "map", skip: 700 });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  const time = async () => Number(await page.getAttribute("#profile", "aria-valuenow"));
+  const box = await page.locator("#profile").boundingBox();
+  await page.mouse.click(box.x + box.width / 2, box.y + box.height / 2);
+  await page.waitForFunction(() => Math.abs(Number(document.querySelector("#profile").getAttribute("aria-valuenow")) - 17.5) < 1);
+  const before = await time();
+  await page.click("#play");
+  await page.waitForFunction((t) => Number(document.querySelector("#profile").getAttribute("aria-valuenow")) > t + 0.5, before);
+  await page.click("#play");
+  assert.deepEqual(page.problems, []);
+}
+
+async function connectsAgain(context) {
+  const { mock, port, page } = await serve(context, { world: "walk", skip: 300 });
+  await until(page, isOpen);
+  const before = await report(page);
+  await mock.close();
+  await until(page, (w) => w.connection === "waiting");
+  await page.waitForSelector("#banner:not([hidden])");
+  assert.ok((await report(page)).landmarks >= before.landmarks, "the last map stays");
+  await picture(page, `${context.pictures}/desktop_no_connection.png`);
+  const restarted = new MockServer({ world: "walk", skip: 100 });
+  context.cleanUp.push(() => restarted.close());
+  await restarted.listen(port);
+  await until(page, isOpen);
+  await until(page, (w, b) => w.landmarks > 0 && w.landmarks < b.landmarks && w.agreement.equal > b.agreement.equal, before);
+  await page.waitForSelector("#banner", { state: "hidden" });
+  assert.deepEqual(page.problems, []);
+}
+
+async function saysWhatIsMissing(context) {
+  const { page } = await serve(context, { world: "empty" }, { isPhone: true });
+  await page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Waiting for the first image");
+  await picture(page, `${context.pictures}/phone_empty.png`);
+  const refused = await serve(context, { world: "walk", skip: 100, token: "0123456789abcdef" });
+  await until(refused.page, (w) => w.connection === "refused");
+  await refused.page.waitForFunction(() => document.querySelector("#notice-title").textContent === "This address needs its token");
+  const right = await serve(context, { world: "walk", skip: 100, token: "0123456789abcdef" }, {}, "/?token=0123456789abcdef");
+  await until(right.page, isOpen);
+}
+
+/** Half a million landmarks and five thousand keyframes. Times are told, not judged: they depend on the machine. */
+async function drawsLargeMaps(context) {
+  const { page } = await serve(context, { world: "large" }, { isDark: true, size: { width: 800, height: 500 } });
+  await until(page, (w) => w.landmarks === 500000 && w.keyframes === 5000 && !w.isLoading, null, 60000);
+  await page.click("[data-layer=covisibility]");
+  await page.click("[data-layer=tree]");
+  await page.waitForTimeout(2000);
+  await page.evaluate(() => window.waymark.resetPerformance());
+  await until(page, (w) => w.performance.script_ms.count >= 5);
+  const { performance } = await report(page);
+  console.log(`        ${JSON.stringify(performance)}`);
+  assert.ok(performance.drawCalls > 5 && performance.drawCalls <= 50);
+  assert.deepEqual(page.problems, []);
+}
+
+export const mockCases = [
+  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, saysWhatIsMissing, drawsLargeMaps,
+];
