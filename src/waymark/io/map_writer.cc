@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
+#include "waymark/camera/same_rig.h"
 #include "waymark/io/map_file.h"
 #include "waymark/io/map_limits.h"
 #include "waymark/io/map_record_writer.h"
@@ -14,21 +15,6 @@ namespace {
 
 constexpr int kVersion = 1;
 constexpr std::string_view kProducer = "waymark " WAYMARK_VERSION;
-
-bool is_same(const Rigid3& a, const Rigid3& b) {
-  return a.rotation.coeffs() == b.rotation.coeffs() && a.translation == b.translation;
-}
-
-bool is_same(const Rig& a, const Rig& b) {
-  return std::equal(a.cameras.begin(),
-                    a.cameras.end(),
-                    b.cameras.begin(),
-                    b.cameras.end(),
-                    [](const RigCamera& camera, const RigCamera& other) {
-                      return is_same(camera.cam_from_rig, other.cam_from_rig) &&
-                             camera.description->is_same(*other.description);
-                    });
-}
 
 /// The distinct rigs of a map, in the order of the keyframes.
 class RigTable {
@@ -40,9 +26,8 @@ class RigTable {
   const std::vector<const Rig*>& rigs() const { return rigs_; }
 
   std::uint64_t index_of(const Rig& rig) const {
-    const auto at = std::find_if(rigs_.begin(), rigs_.end(), [&](const Rig* known) {
-      return known == &rig || is_same(*known, rig);
-    });
+    const auto at = std::find_if(
+        rigs_.begin(), rigs_.end(), [&](const Rig* known) { return is_same_rig(*known, rig); });
     WAYMARK_CHECK(at != rigs_.end());
     return static_cast<std::uint64_t>(at - rigs_.begin());
   }
@@ -58,7 +43,7 @@ class RigTable {
                                    camera.camera ? camera.camera->model() : "none"));
     }
     const bool is_known = std::any_of(
-        rigs_.begin(), rigs_.end(), [&](const Rig* known) { return is_same(*known, rig); });
+        rigs_.begin(), rigs_.end(), [&](const Rig* known) { return is_same_rig(*known, rig); });
     if (!is_known) rigs_.push_back(&rig);
   }
 

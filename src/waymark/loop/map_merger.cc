@@ -7,6 +7,7 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/loop/link_finder.h"
 #include "waymark/loop/loop_closing.h"
 #include "waymark/loop/loop_finder.h"
 #include "waymark/map/parts.h"
@@ -27,6 +28,7 @@ class MapMerger {
         rig_(both.keyframes().at(first).rig),
         mapper_(rig_, {}),
         finder_(rig_, seed),
+        link_finder_(rig_, seed),
         projection_(rig_) {
     mapper_.take_over(both);
     both.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
@@ -45,6 +47,7 @@ class MapMerger {
       if (merged_.num_joins == num_joins_before) break;
     }
     adjust();
+    if (look_for_links()) adjust();
     merged_.map = mapper_.freeze();
     return std::move(merged_);
   }
@@ -66,10 +69,32 @@ class MapMerger {
     touched_.insert(mapper_.map().keyframes().at(query).submap);
   }
 
-  void adjust() {
+  /// What was joined at one place may touch elsewhere, too. Whether anything was found.
+  bool look_for_links() {
+    std::vector<KeyframeId> queries;
+    const std::set<SubmapId> submaps = touched();
+    mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      if (submaps.contains(keyframe.submap)) queries.push_back(id);
+    });
+    const int num_before = merged_.num_loops;
+    for (const KeyframeId query : queries) {
+      const std::optional<Revisit> link = link_finder_.find(mapper_.map(), query);
+      if (!link) continue;
+      mapper_.change(
+          [&](Map& map, DirtyLandmarks& dirty) { close_loop(map, *link, projection_, dirty); });
+      ++merged_.num_loops;
+    }
+    return merged_.num_loops > num_before;
+  }
+
+  std::set<SubmapId> touched() const {
     std::set<SubmapId> submaps;
     for (const SubmapId id : touched_) submaps.insert(mapper_.map().resolve(id));
-    for (const SubmapId submap : submaps) {
+    return submaps;
+  }
+
+  void adjust() {
+    for (const SubmapId submap : touched()) {
       mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
         apply_adjustment(map, adjust_globally(map, submap), dirty);
       });
@@ -81,6 +106,7 @@ class MapMerger {
   Mapper mapper_;
   PlaceIndex places_;
   LoopFinder finder_;
+  LinkFinder link_finder_;
   ProjectionMatcher projection_;
   std::set<SubmapId> touched_;
   MergedMaps merged_;

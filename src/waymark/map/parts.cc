@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <utility>
+#include <vector>
+
+#include "waymark/camera/same_rig.h"
 
 namespace waymark {
 namespace {
@@ -38,6 +41,25 @@ Shift shift_behind(const MapParts& parts) {
   return shift;
 }
 
+/// Rigs by what they are: those of two files that are the same become one.
+class RigPool {
+ public:
+  explicit RigPool(const MapParts& parts) {
+    for (const MapParts::StoredKeyframe& stored : parts.keyframes) share(stored.keyframe.rig);
+  }
+
+  std::shared_ptr<const Rig> share(const std::shared_ptr<const Rig>& rig) {
+    for (const std::shared_ptr<const Rig>& known : rigs_) {
+      if (is_same_rig(*known, *rig)) return known;
+    }
+    rigs_.push_back(rig);
+    return rig;
+  }
+
+ private:
+  std::vector<std::shared_ptr<const Rig>> rigs_;
+};
+
 void append_submaps(const Map& map, const Shift& shift, MapParts& parts) {
   for (Submap submap : map.submaps()) {
     submap.root = shift(submap.root);
@@ -52,10 +74,12 @@ void append_submaps(const Map& map, const Shift& shift, MapParts& parts) {
 }
 
 void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
+  RigPool rigs(parts);
   map.keyframes().for_each([&](KeyframeId id, Keyframe keyframe) {
     keyframe.frame = shift(keyframe.frame);
     keyframe.submap = shift(keyframe.submap);
     keyframe.parent = shift(keyframe.parent);
+    keyframe.rig = rigs.share(keyframe.rig);
     for (LandmarkId& landmark : keyframe.landmarks) landmark = shift(landmark);
     parts.keyframes.push_back({shift(id), std::move(keyframe)});
   });

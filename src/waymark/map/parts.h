@@ -7,7 +7,8 @@
 namespace waymark {
 
 /// Puts all of a map behind what the parts hold: its sub-maps, keyframes and landmarks get ids that
-/// follow those there, and its frames indices. Nothing ties the two together.
+/// follow those there, and its frames indices. Rigs that are the same become one; nothing else ties
+/// the two together.
 void append_parts(const Map& map, MapParts& parts);
 
 /// A map in plain lists.

@@ -55,13 +55,16 @@ TEST(MapParts, UniteKeepsWhatIdsStandFor) {
   }
 }
 
-TEST(MapParts, UniteNumbersFramesOn) {
+TEST(MapParts, UniteNumbersFramesOnAndSharesRigs) {
   RandomMap first(5), second(5);
   std::set<std::uint32_t> frames;
+  std::set<const Rig*> rigs;
   const Map both = unite(first.map(), second.map());
   both.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     EXPECT_TRUE(frames.insert(keyframe.frame.value).second);
+    rigs.insert(keyframe.rig.get());
   });
+  EXPECT_EQ(rigs.size(), 3u) << "three kinds in either map";
 }
 
 }  // namespace
