@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "waymark/loop/loop_closing.h"
+#include "waymark/loop/overlaps.h"
 
 namespace waymark {
 namespace {
@@ -98,14 +99,19 @@ void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adj
 
 void GlobalMapper::finish() {
   const std::uint32_t end = mapper_.map().keyframes().end_id().value;
-  if (settings_.enabled && end > 0) {
-    const KeyframeId newest{end - 1};
-    if (mapper_.map().keyframes().contains(newest)) close_loop_at(newest);
+  if (!settings_.enabled || end == 0) {
+    mapper_.refine_globally();
+    return;
   }
+  if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_loop_at(KeyframeId{end - 1});
   mapper_.refine_globally();
-  const std::uint32_t num_closures = num_closures_;
+  if (num_closures_ == 0) {
+    mapper_.map().keyframes().for_each(
+        [&](KeyframeId id, const Keyframe&) { unlinked_.push_back(id); });
+  }
   look_for_links(unlinked_.size());
-  if (num_closures_ > num_closures) mapper_.refine_globally();
+  mapper_.change([&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
+  mapper_.refine_globally();
 }
 
 MapSnapshot GlobalMapper::snapshot() {
