@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -104,6 +105,25 @@ class CowTable {
       for (std::size_t i = 0; i < kPageSize; ++i) {
         if (const std::optional<T>& slot = pages_[page]->slots[i]) {
           visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, *slot);
+        }
+      }
+    }
+  }
+
+  /// Calls visit(id, before, now) in ascending order for the ids in all pages that this table does
+  /// not share with an earlier state of itself: whatever changed since is among them. Pointers are
+  /// null where there was or is no element.
+  template <class Visitor>
+  void for_each_difference(const CowTable& earlier, Visitor&& visit) const {
+    for (std::size_t page = 0; page < std::max(pages_.size(), earlier.pages_.size()); ++page) {
+      const Page* now = page < pages_.size() ? pages_[page].get() : nullptr;
+      const Page* before = page < earlier.pages_.size() ? earlier.pages_[page].get() : nullptr;
+      if (now == before) continue;
+      for (std::size_t i = 0; i < kPageSize; ++i) {
+        const T* old = before && before->slots[i] ? &*before->slots[i] : nullptr;
+        const T* current = now && now->slots[i] ? &*now->slots[i] : nullptr;
+        if (old || current) {
+          visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, old, current);
         }
       }
     }

@@ -155,5 +155,25 @@ TEST(CowTable, ReadersOfFrozenCopiesDoNotMeetTheWriter) {
   EXPECT_THAT(is_consistent, ::testing::Each(1));
 }
 
+TEST(CowTable, TellsWhatChangedSince) {
+  Table table;
+  for (int i = 0; i < 16; ++i) table.insert(std::to_string(i));
+  const Table before = table.freeze();
+  table.edit(LandmarkId{5}) = "changed";
+  table.erase(LandmarkId{6});
+  table.insert("new");
+  const Table now = table.freeze();
+  std::vector<std::uint32_t> visited;
+  Content changes;
+  now.for_each_difference(before, [&](LandmarkId id, const auto* old, const auto* current) {
+    visited.push_back(id.value);
+    EXPECT_EQ(old, before.find(id));
+    EXPECT_EQ(current, now.find(id));
+    if (!old || !current || *old != *current) changes[id.value] = current ? *current : "gone";
+  });
+  EXPECT_EQ(changes, (Content{{5, "changed"}, {6, "gone"}, {16, "new"}}));
+  EXPECT_THAT(visited, ::testing::ElementsAre(4, 5, 6, 7, 16));  // No page that is shared.
+}
+
 }  // namespace
 }  // namespace waymark

@@ -32,6 +32,29 @@ class Mailbox {
     return true;
   }
 
+  /// Never waits: false, and the message stays as it was, if there is no room or the mailbox is
+  /// closed.
+  bool try_push(T& message) {
+    {
+      std::lock_guard lock(mutex_);
+      if (is_closed_ || messages_.size() >= capacity_) return false;
+      messages_.push_back(std::move(message));
+    }
+    arrival_.notify_one();
+    return true;
+  }
+
+  /// Never waits: the oldest message, or nothing if none is there.
+  std::optional<T> try_pop() {
+    std::unique_lock lock(mutex_);
+    if (messages_.empty()) return std::nullopt;
+    std::optional<T> message(std::move(messages_.front()));
+    messages_.pop_front();
+    lock.unlock();
+    room_.notify_one();
+    return message;
+  }
+
   /// Waits for a message. Returns nothing once the mailbox is closed and empty.
   std::optional<T> pop() {
     std::unique_lock lock(mutex_);

@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <memory>
+#include <string>
 #include <thread>
 #include <vector>
 
@@ -69,6 +70,19 @@ TEST(Mailbox, NoMessageIsLostOrDoubledBetweenThreads) {
 }
 
 TEST(Mailbox, NeedsRoom) { EXPECT_THROW(Mailbox<int>(0), CheckError); }
+
+TEST(Mailbox, TriesWithoutWaiting) {
+  Mailbox<std::string> mailbox(1);
+  EXPECT_FALSE(mailbox.try_pop().has_value());
+  std::string first = "first";
+  std::string second = "second";
+  EXPECT_TRUE(mailbox.try_push(first));
+  EXPECT_FALSE(mailbox.try_push(second));
+  EXPECT_EQ(second, "second");
+  EXPECT_EQ(mailbox.try_pop(), "first");
+  mailbox.close();
+  EXPECT_FALSE(mailbox.try_push(second));
+}
 
 }  // namespace
 }  // namespace waymark
