@@ -76,6 +76,8 @@ class Map {
   const std::vector<CovisibilityEdge>& covisible(KeyframeId id) const {
     return covisibility_.at(id).edges;
   }
+  /// Covisible keyframes of every living keyframe.
+  const CowTable<KeyframeId, Covisibility>& covisibility() const { return covisibility_; }
   /// Where each keyframe that is gone went; for those that live the heir is invalid.
   const CowTable<KeyframeId, KeyframeForwarding>& keyframe_forwarding() const {
     return keyframe_forwarding_;

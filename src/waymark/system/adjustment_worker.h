@@ -29,6 +29,8 @@ class AdjustmentWorker {
   bool is_busy() const { return is_busy_; }
   /// Begins the task; must not be busy.
   void start(AdjustmentTask task);
+  /// Whether finish() would not wait; for any thread.
+  bool has_result() const { return outcomes_.size() > 0; }
   /// Waits for the result of the task that was started. Rethrows what failed.
   Result finish();
 

@@ -22,7 +22,7 @@ MapWorker::~MapWorker() { stop(); }
 void MapWorker::send(FrameId visible_from, MapTask task) {
   last_visible_from_ = std::max(last_visible_from_, visible_from);
   feed_.expect(last_visible_from_);
-  Delivery delivery{last_visible_from_, std::move(task)};
+  Delivery delivery{last_visible_from_, std::move(task), false};
   if (timing_ == Timing::kInline) {
     process(delivery);
   } else {
@@ -32,6 +32,11 @@ void MapWorker::send(FrameId visible_from, MapTask task) {
 
 std::shared_ptr<const PublishedMap> MapWorker::for_frame(FrameId frame) {
   return feed_.for_frame(frame);
+}
+
+void MapWorker::wait() {
+  if (timing_ == Timing::kInline) return;
+  if (inbox_.push({last_visible_from_, {}, true})) done_.pop();
 }
 
 void MapWorker::finish() {
@@ -45,11 +50,18 @@ void MapWorker::process(const Delivery& delivery) {
 
 void MapWorker::run() {
   try {
-    while (const auto delivery = inbox_.pop()) process(*delivery);
+    while (const auto delivery = inbox_.pop()) {
+      if (delivery->is_wait) {
+        done_.push(true);
+      } else {
+        process(*delivery);
+      }
+    }
   } catch (...) {
     inbox_.close();
     feed_.fail(std::current_exception());
   }
+  done_.close();
 }
 
 void MapWorker::stop() {

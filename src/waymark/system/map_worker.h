@@ -46,6 +46,8 @@ class MapWorker {
   void send(FrameId visible_from, MapTask task);
   /// The newest map that a frame may see, null before the first; frames ascend.
   std::shared_ptr<const PublishedMap> for_frame(FrameId frame);
+  /// Waits until all tasks sent so far are done. for_frame() tells of a failure.
+  void wait();
   /// Waits until all tasks are done and ends the thread. No send() afterwards.
   void finish();
 
@@ -53,6 +55,7 @@ class MapWorker {
   struct Delivery {
     FrameId visible_from;
     MapTask task;
+    bool is_wait = false;  ///< Without a task: to be answered.
   };
 
   void process(const Delivery& delivery);
@@ -64,6 +67,7 @@ class MapWorker {
   FrameId last_visible_from_{0};
   Feed<PublishedMap> feed_;
   Mailbox<Delivery> inbox_;
+  Mailbox<bool> done_{1};  ///< Answers wait().
   std::jthread thread_;
 };
 

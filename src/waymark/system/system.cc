@@ -16,13 +16,6 @@
 namespace waymark {
 namespace {
 
-Timing checked(Timing timing) {
-  if (timing == Timing::kRealtime) {
-    throw InputError("timing", "realtime is not supported yet, expected inline or lockstep");
-  }
-  return timing;
-}
-
 /// Whether a map comes late enough for the check of the focal length.
 bool has_focal_check(const Map& map, FrameId first) {
   constexpr std::uint32_t kFrame = 200;
@@ -63,7 +56,7 @@ class System::Impl {
   Impl(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
       : rig_(std::make_shared<const Rig>(std::move(rig))),
         settings_(settings),
-        timing_(checked(timing)),
+        timing_(timing),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         memory_(rig_, frame_after(map.get())),
         mapper_(rig_, settings.mapping, settings.loop, static_cast<std::uint64_t>(settings.seed)),
@@ -76,16 +69,21 @@ class System::Impl {
 
   TrackingResult feed(const FrameInput& input);
   void finish();
+  void set_mapping(bool is_on);
+  /// The same, from its beginning and with an empty map.
+  std::unique_ptr<Impl> begin_anew() const;
   std::vector<TrajectoryFrame> trajectory() const;
   std::vector<FrameState> frame_states() const;
   std::shared_ptr<const Map> map() const { return visible_.snapshot.map; }
   SystemStatistics statistics() const;
   const FocalCheck* focal_check() const;
+  const FrameDetails& details() const { return details_; }
 
  private:
   void make_tracker(bool has_range);
   void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
+  void keep_details(const Frame& frame, TrackOutcome outcome);
   std::shared_ptr<const PublishedMap> process(const MapTask& task);
   void add(const MapperMessage& message);
   void finish_adjustment();
@@ -101,6 +99,8 @@ class System::Impl {
   TrajectoryMemory memory_;
   PublishedMap visible_;
   FrameId last_due_;  ///< The global adjustment that was asked for last.
+  FrameDetails details_;
+  TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   int num_relocalizations_ = 0;
   bool is_finished_ = false;
 
@@ -151,22 +151,53 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   result.is_keyframe = outcome.message.has_value();
   result.submap = outcome.submap;
   if (outcome.message) {
-    StageTimer timer(result.stages, timing_ == Timing::kInline ? Stage::kWait : Stage::kKeyframe);
+    // The mapper works in send() in kInline, and what kRealtime has to wait for is a sub-map.
+    const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);
+    const bool waits = timing_ == Timing::kInline || (timing_ == Timing::kRealtime && is_submap);
+    StageTimer timer(result.stages, waits ? Stage::kWait : Stage::kKeyframe);
     send(id, std::move(*outcome.message));
   }
+  keep_details(frame, std::move(outcome));
   return result;
+}
+
+void System::Impl::keep_details(const Frame& frame, TrackOutcome outcome) {
+  details_.frame = frame.id;
+  details_.features = frame.features;
+  details_.landmarks = std::move(outcome.landmarks);
+  details_.pose = outcome.pose.value_or(RelativePose{});
+  // A keyframe is its own reference, so that it moves as the map moves it.
+  if (outcome.keyframe) {
+    details_.pose = {*outcome.keyframe, Rigid3{}, details_.pose.reference_scale};
+  }
+  details_.filled = std::move(outcome.filled);
 }
 
 void System::Impl::make_tracker(bool has_range) {
   if (has_range) check_has_scale(*map());
   tracker_.emplace(rig_, has_range, settings_.tracking, static_cast<std::uint64_t>(settings_.seed));
-  if (!map()->submaps().empty()) tracker_->begin_in(*map(), TrackingPurpose::kMapping);
+  if (!map()->submaps().empty()) tracker_->begin_in(*map(), purpose_);
+  tracker_->set_purpose(purpose_);
+}
+
+void System::Impl::set_mapping(bool is_on) {
+  purpose_ = is_on ? TrackingPurpose::kMapping : TrackingPurpose::kLocalizing;
+  if (tracker_) tracker_->set_purpose(purpose_);
+}
+
+std::unique_ptr<System::Impl> System::Impl::begin_anew() const {
+  WAYMARK_CHECK(!is_finished_);
+  auto anew = std::make_unique<Impl>(*rig_, settings_, timing_, nullptr);
+  anew->purpose_ = purpose_;
+  return anew;
 }
 
 void System::Impl::look_at_map(FrameId frame) {
   if (const auto published = worker_.for_frame(frame)) visible_ = *published;
   const FrameId due = visible_.adjustment_due;
-  if (!due.is_valid() || due > frame || due == last_due_) return;
+  if (!due.is_valid() || due == last_due_) return;
+  // In real time it is due once it is there.
+  if (timing_ == Timing::kRealtime ? !adjuster_.has_result() : due > frame) return;
   last_due_ = due;
   worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt});
 }
@@ -176,6 +207,7 @@ void System::Impl::send(FrameId frame, MapperMessage message) {
   const bool is_submap = std::holds_alternative<NewSubmap>(message);
   const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
   worker_.send(FrameId{frame.value + latency}, {frame, std::move(message)});
+  if (is_submap && timing_ == Timing::kRealtime) worker_.wait();
 }
 
 std::shared_ptr<const PublishedMap> System::Impl::process(const MapTask& task) {
@@ -270,9 +302,12 @@ System::System(Rig rig, const Settings& settings, Timing timing, std::shared_ptr
 System::~System() = default;
 TrackingResult System::feed(const FrameInput& input) { return impl_->feed(input); }
 void System::finish() { impl_->finish(); }
+void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
+void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
 const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
+const FrameDetails& System::details() const { return impl_->details(); }
 std::shared_ptr<const Map> System::map() const { return impl_->map(); }
 SystemStatistics System::statistics() const { return impl_->statistics(); }
 

@@ -14,6 +14,8 @@
 #include "waymark/map/map.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/settings.h"
+#include "waymark/track/initializer.h"
+#include "waymark/track/messages.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
@@ -44,6 +46,16 @@ struct TrackingResult {
   StageTimes stages;
 };
 
+/// More of the newest frame, for those who show it. Poses are by reference: they move as the map is
+/// corrected, see Map::rig_from_world(); the reference may not be in the newest map yet.
+struct FrameDetails {
+  FrameId frame;  ///< As keyframes of the map have it: goes on from those of a map made before.
+  std::shared_ptr<const Features> features;
+  std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none; empty without a pose.
+  RelativePose pose;                  ///< Where the frame has one.
+  std::vector<FilledPose> filled;     ///< Earlier frames that have a pose now.
+};
+
 /// A frame in the final trajectory.
 struct TrajectoryFrame {
   FrameId frame;
@@ -64,11 +76,11 @@ struct SystemStatistics {
 };
 
 /// Visual SLAM on a stream of frames. One thread feeds; mapping runs beside it unless the timing is
-/// kInline. kInline and kLockstep give the same bits.
+/// kInline. kInline and kLockstep give the same bits; kRealtime never waits for the mapper, but for
+/// a new sub-map, without which there is nothing to track in.
 class System {
  public:
-  /// Throws InputError for a rig or settings that cannot work together, and for kRealtime, which is
-  /// not supported yet.
+  /// Throws InputError for a rig or settings that cannot work together.
   ///
   /// map: one made before, that is to be extended, by whatever cameras; a copy goes on. The camera
   /// is looked for in it; where it is not found, a new sub-map begins, which is joined once it is.
@@ -83,6 +95,15 @@ class System {
   /// Tracks one frame; timestamps must increase. A map without scale takes no images with range:
   /// then the first frame throws InputError. Rethrows what failed in the mapper's thread.
   TrackingResult feed(const FrameInput& input);
+
+  /// Of the frame fed last; empty before the first.
+  const FrameDetails& details() const;
+
+  /// Mapping off: the camera is followed in the map, which stays as it is. On at first.
+  void set_mapping(bool is_on);
+
+  /// Begins anew with an empty map; frames count from 0 again. Not after finish().
+  void reset();
 
   /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards;
   /// statistics() only afterwards.

@@ -116,8 +116,69 @@ TEST(System, InlineAndLockstepGiveTheSameBits) {
   EXPECT_EQ(alone.statistics.num_landmarks, threaded.statistics.num_landmarks);
 }
 
-TEST(System, RefusesRealtime) {
-  EXPECT_THROW(System(small_rig(), small_settings(), Timing::kRealtime), InputError);
+TEST(System, FollowsInRealTime) {
+  // Fed as fast as it goes: the map may come late, but nothing is lost.
+  const Played played = play(Timing::kRealtime);
+  ASSERT_EQ(played.trajectory.size(), static_cast<std::size_t>(kNumFrames));
+  EXPECT_GE(played.statistics.num_keyframes, 2);
+  EXPECT_EQ(played.map->broken_invariants(), "");
+  for (std::size_t i = 0; i < frames().size(); ++i) {
+    const Rigid3 truth = frames()[0].world_from_rig.inverse() * frames()[i].world_from_rig;
+    const Rigid3 error = truth.inverse() * played.trajectory[i].world_from_rig;
+    EXPECT_LT(error.translation.norm(), 0.05) << "frame " << i;
+  }
+}
+
+TEST(System, BeginsAnewAfterAReset) {
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  for (int i = 0; i < 10; ++i) system.feed(input_of(frames()[i]));
+  EXPECT_FALSE(system.map()->keyframes().is_empty());
+  system.reset();
+  EXPECT_TRUE(system.map()->keyframes().is_empty());
+  EXPECT_TRUE(system.trajectory().empty());
+  for (int i = 5; i < 15; ++i) {  // Time may go back, too.
+    EXPECT_EQ(system.feed(input_of(frames()[i])).frame, FrameId{static_cast<std::uint32_t>(i - 5)});
+  }
+  system.finish();
+  EXPECT_EQ(system.trajectory().size(), 10u);
+}
+
+TEST(System, MappingCanBeSwitchedOffAndOn) {
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  system.set_mapping(false);
+  EXPECT_EQ(system.feed(input_of(frames()[0])).state, FrameState::kInitializing);
+  system.set_mapping(true);
+  for (int i = 1; i < 8; ++i) system.feed(input_of(frames()[i]));
+  system.set_mapping(false);
+  for (int i = 8; i < 16; ++i) {
+    const TrackingResult result = system.feed(input_of(frames()[i]));
+    EXPECT_EQ(result.state, FrameState::kTracked) << "frame " << i;
+    EXPECT_FALSE(result.is_keyframe) << "frame " << i;
+  }
+  system.set_mapping(true);
+  int num_keyframes = 0;
+  for (int i = 16; i < kNumFrames; ++i) {
+    num_keyframes += system.feed(input_of(frames()[i])).is_keyframe;
+  }
+  EXPECT_GT(num_keyframes, 0);
+  system.finish();
+  EXPECT_EQ(system.map()->broken_invariants(), "");
+}
+
+TEST(System, TellsWhatTheNewestFrameSaw) {
+  System system(small_rig(), small_settings(), Timing::kInline);
+  for (int i = 0; i < 5; ++i) {
+    const TrackingResult result = system.feed(input_of(frames()[i]));
+    const FrameDetails& details = system.details();
+    EXPECT_EQ(details.frame, FrameId{static_cast<std::uint32_t>(i)});
+    ASSERT_NE(details.features, nullptr);
+    if (details.landmarks.empty()) continue;
+    EXPECT_EQ(details.landmarks.size(), details.features->size());
+    const auto num_seen = std::count_if(details.landmarks.begin(),
+                                        details.landmarks.end(),
+                                        [](LandmarkId id) { return id.is_valid(); });
+    EXPECT_GE(num_seen, result.num_inliers / 2);
+  }
 }
 
 TEST(System, TimeStampsMustIncrease) {

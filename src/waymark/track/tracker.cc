@@ -61,7 +61,8 @@ TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, Stag
 
 TrackOutcome Tracker::initialize(const Frame& frame, StageTimes& times) {
   StageTimer timer(times, Stage::kInitialize);
-  if (auto started = start_submap(frame)) return *std::move(started);
+  const bool may_start = purpose_ == TrackingPurpose::kMapping;
+  if (auto started = may_start ? start_submap(frame) : std::nullopt) return *std::move(started);
   TrackOutcome outcome;
   outcome.state = FrameState::kInitializing;
   outcome.reason = initializer_.reason();
@@ -272,6 +273,7 @@ TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
   outcome.num_matches = located.num_matches;
   outcome.num_inliers = located.num_inliers;
   outcome.seen = seen_landmarks(*frame.features, landmarks_);
+  outcome.landmarks = landmarks_;
   const Keyframe& reference = map_->keyframes().at(local_.reference);
   outcome.pose = RelativePose{local_.reference,
                               located.rig_from_world * reference.rig_from_world.inverse(),

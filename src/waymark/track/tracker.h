@@ -41,6 +41,7 @@ struct TrackOutcome {
   std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
   std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
   std::vector<SeenLandmark> seen;        ///< What the pose rests on.
+  std::vector<LandmarkId> landmarks;     ///< Per feature, invalid where none; empty without pose.
   SubmapId submap;                       ///< Where there is a pose.
   bool is_relocalized = false;           ///< Found again after a loss.
 };
@@ -60,6 +61,9 @@ class Tracker {
   /// Begins lost in a map made before, with or without the right to extend it; before the first
   /// frame. Ids go on from those of the map.
   void begin_in(const Map& map, TrackingPurpose purpose);
+
+  /// Whether the map goes on growing, or stays as it is while the camera is followed in it.
+  void set_purpose(TrackingPurpose purpose) { purpose_ = purpose; }
 
   /// visible: the newest map that this frame may see; empty before the first sub-map.
   TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
