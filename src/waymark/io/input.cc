@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "waymark/base/check.h"
+#include "waymark/io/camera_input.h"
 #include "waymark/io/decode.h"
 #include "waymark/io/euroc.h"
 #include "waymark/io/image_folder.h"
@@ -18,11 +19,6 @@ namespace waymark {
 namespace {
 
 constexpr const char* kKnownFormats = "euroc, kitti, tum, images or video";
-
-bool is_camera(const std::filesystem::path& path) {
-  const std::string text = path.string();
-  return text.starts_with("camera:") || text.starts_with("/dev/video");
-}
 
 std::string recognize_folder(const std::filesystem::path& folder) {
   if (is_euroc(folder)) return "euroc";
@@ -69,12 +65,14 @@ Listing list_files(const std::filesystem::path& path,
 
 }  // namespace
 
+bool is_camera(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  return text.starts_with("camera:") || text.starts_with("/dev/video");
+}
+
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
   silence_image_library();
-  if (is_camera(path) || options.format == "camera") {
-    throw InputError(path.string(),
-                     "cameras cannot be read yet, expected a recorded data set or a video");
-  }
+  if (is_camera(path)) return open_camera(path, options);
   if (!std::filesystem::exists(path)) {
     throw InputError(path.string(),
                      "does not exist, expected a data set, a folder of images or a video");

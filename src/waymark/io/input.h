@@ -23,7 +23,12 @@ enum class Setup { kMono, kStereo, kRgbd };
 std::string_view to_string(Setup setup);
 
 /// Why the images of a frame cannot be used.
-enum class FrameFault { kNone, kUnreadable, kWrongSize };
+enum class FrameFault {
+  kNone,
+  kUnreadable,
+  kWrongSize,
+  kLate,  ///< There was no time for it.
+};
 
 /// The images of one moment. With a fault there are none.
 struct InputFrame {
@@ -56,7 +61,8 @@ struct InputInfo {
   std::optional<std::size_t> num_frames;
   /// One camera per image of a frame: from the options, else from the data set, else nothing.
   std::optional<CameraChain> calibration;
-  int width_px = 0;  ///< Of the images of camera 0.
+  bool is_live = false;  ///< A camera: frames come when they come.
+  int width_px = 0;      ///< Of the images of camera 0.
   int height_px = 0;
   std::vector<std::string> lines;  ///< The same in words, for people.
 };
@@ -71,10 +77,14 @@ class Input {
   virtual std::optional<InputFrame> next() = 0;
 };
 
+/// Whether a path means a camera: camera:N, or a device such as /dev/video0.
+bool is_camera(const std::filesystem::path& path);
+
 /// Recognises what path holds and opens it: a folder in the layout of EuRoC / TUM-VI, KITTI
-/// odometry or TUM RGB-D, a folder of images, a video file, or a folder that holds one video or
-/// images/. Reads the first image. Throws InputError that names the file (and line) for what is
-/// missing or malformed, and for a first image that contradicts the calibration.
+/// odometry or TUM RGB-D, a folder of images, a video file, a folder that holds one video or
+/// images/, or a camera (its frames have no end; their times are those of their arrival). Reads the
+/// first image. Throws InputError that names the file (and line) for what is missing or malformed,
+/// and for a first image that contradicts the calibration.
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options);
 
 }  // namespace waymark

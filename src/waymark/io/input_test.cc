@@ -46,8 +46,9 @@ TEST(OpenInput, SaysWhatItWants) {
   EXPECT_THAT(error(folder / "none"), HasSubstr("none: does not exist, expected"));
   EXPECT_THAT(error(folder.path()), HasSubstr("holds no image, expected"));
   EXPECT_THAT(error(folder.write("a.txt", "x")), HasSubstr("a.txt: is neither folder nor video"));
-  EXPECT_THAT(error("camera:0"), HasSubstr("camera:0: cameras cannot be read yet"));
-  EXPECT_THAT(error("/dev/video0"), HasSubstr("cameras cannot be read yet"));
+  EXPECT_THAT(error("camera:97"), HasSubstr("camera:97: cannot be opened as a camera"));
+  EXPECT_THAT(error("/dev/video97"), HasSubstr("cannot be opened as a camera"));
+  EXPECT_THAT(error("camera:front"), HasSubstr("is no camera, expected camera:N"));
   InputOptions options;
   options.format = "eurok";
   EXPECT_EQ(error(folder.path(), options),

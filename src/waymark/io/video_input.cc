@@ -5,15 +5,14 @@
 #include <fmt/format.h>
 
 #include <cmath>
-#include <cstring>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
-#include <opencv2/imgproc.hpp>
 #include <opencv2/videoio.hpp>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/io/calibration.h"
+#include "waymark/io/color_frame.h"
 #include "waymark/io/decode.h"
 #include "waymark/io/listing.h"
 #include "waymark/io/mask.h"
@@ -25,19 +24,6 @@ namespace waymark {
 namespace {
 
 constexpr double kAssumedRateHz = 30.0;
-
-std::optional<Image> to_grey(const cv::Mat& mat) {
-  if (mat.empty() || mat.depth() != CV_8U) return std::nullopt;
-  cv::Mat grey = mat;
-  if (mat.channels() == 3) cv::cvtColor(mat, grey, cv::COLOR_BGR2GRAY);
-  if (mat.channels() == 4) cv::cvtColor(mat, grey, cv::COLOR_BGRA2GRAY);
-  if (grey.channels() != 1) return std::nullopt;
-  Image image(grey.cols, grey.rows);
-  for (int y = 0; y < grey.rows; ++y) {
-    std::memcpy(image.row(y), grey.ptr(y), static_cast<std::size_t>(grey.cols));
-  }
-  return image;
-}
 
 /// Frames of a video in order, each with the time of the container.
 class VideoReader {
@@ -76,7 +62,7 @@ class VideoReader {
     try {
       cv::Mat mat;
       if (!capture_.retrieve(mat)) return std::nullopt;
-      return to_grey(mat);
+      return grey_of(mat);
     } catch (const cv::Exception&) {
       return std::nullopt;
     }
