@@ -1,0 +1,132 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/view/http_connection.h"
+
+#include <chrono>
+#include <utility>
+
+#include "waymark/view/assets.h"
+#include "waymark/view/web_socket.h"
+
+namespace waymark {
+namespace {
+
+namespace beast = boost::beast;
+namespace http = boost::beast::http;
+using namespace std::chrono_literals;
+
+constexpr auto kTimeout = 10s;
+constexpr std::uint32_t kMaxHeader = 8192;
+constexpr std::size_t kMaxBuffer = 16384;
+
+std::string_view as_view(beast::string_view text) { return {text.data(), text.size()}; }
+
+std::string_view path_of(std::string_view target) { return target.substr(0, target.find('?')); }
+
+}  // namespace
+
+HttpConnection::HttpConnection(beast::tcp_stream stream, ServerState& state)
+    : stream_(std::move(stream)), state_(state), buffer_(kMaxBuffer) {
+  ++state_.num_connections;
+  count_ = std::shared_ptr<void>(nullptr, [&state](void*) { --state.num_connections; });
+}
+
+void HttpConnection::read() {
+  parser_.emplace();
+  parser_->header_limit(kMaxHeader);
+  parser_->body_limit(0);
+  stream_.expires_after(kTimeout);
+  http::async_read(stream_,
+                   buffer_,
+                   *parser_,
+                   [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+                     if (error) {
+                       self->end();
+                     } else {
+                       self->answer(self->parser_->release());
+                     }
+                   });
+}
+
+void HttpConnection::answer(const Request& request) {
+  const std::string_view target = as_view(request.target());
+  const bool is_allowed = is_session_allowed(state_.rules,
+                                             target,
+                                             as_view(request[http::field::host]),
+                                             as_view(request[http::field::origin]));
+  if (path_of(target) == "/ws" && is_allowed && beast::websocket::is_upgrade(request)) {
+    stream_.expires_never();
+    std::make_shared<WebSocketClient>(
+        std::move(stream_), state_.hub, [count = std::move(count_)]() mutable { count.reset(); })
+        ->accept(request);
+    return;
+  }
+  write(respond_to(request));
+}
+
+HttpConnection::Response HttpConnection::respond_to(const Request& request) const {
+  const std::string_view target = as_view(request.target());
+  const std::string_view host = as_view(request[http::field::host]);
+  const std::string_view path = path_of(target);
+  Response response{http::status::ok, request.version()};
+  response.keep_alive(request.keep_alive());
+  response.set(http::field::server, "waymark");
+  response.set(http::field::cache_control, "no-cache");
+  response.set("X-Content-Type-Options", "nosniff");
+  response.set(http::field::content_type, "text/plain; charset=utf-8");
+  const bool is_session = path == "/ws" || path == "/status";
+  if (request.method() != http::verb::get && request.method() != http::verb::head) {
+    response.result(http::status::method_not_allowed);
+    response.body() = "only GET and HEAD are known\n";
+  } else if (!is_host_allowed(state_.rules, host) ||
+             (is_session &&
+              !is_session_allowed(
+                  state_.rules, target, host, as_view(request[http::field::origin])))) {
+    response.result(http::status::forbidden);
+    response.body() = "not allowed: use the URL that waymark printed\n";
+  } else if (path == "/ws") {
+    response.result(http::status::upgrade_required);
+    response.body() = "expected a WebSocket\n";
+  } else if (path == "/status") {
+    response.set(http::field::content_type, "application/json");
+    response.body() = state_.hub.status();
+  } else if (const Asset* asset = find_asset(path == "/" ? "/index.html" : path)) {
+    response.set(http::field::content_type,
+                 beast::string_view(asset->content_type.data(), asset->content_type.size()));
+    response.body() = std::string(asset->bytes);
+  } else {
+    response.result(http::status::not_found);
+    response.body() = "no such page\n";
+  }
+  response.prepare_payload();
+  if (request.method() == http::verb::head) response.body().clear();
+  return response;
+}
+
+void HttpConnection::refuse() {
+  Response response{http::status::service_unavailable, 11};
+  response.keep_alive(false);
+  response.body() = "too many connections\n";
+  response.prepare_payload();
+  write(std::move(response));
+}
+
+void HttpConnection::write(Response response) {
+  response_ = std::move(response);
+  stream_.expires_after(kTimeout);
+  http::async_write(
+      stream_, response_, [self = shared_from_this()](const beast::error_code& error, std::size_t) {
+        if (error || self->response_.need_eof()) {
+          self->end();
+        } else {
+          self->read();
+        }
+      });
+}
+
+void HttpConnection::end() {
+  beast::error_code ignored;
+  stream_.socket().shutdown(boost::asio::ip::tcp::socket::shutdown_send, ignored);
+}
+
+}  // namespace waymark

@@ -1,0 +1,51 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <boost/beast/core.hpp>
+#include <boost/beast/http.hpp>
+#include <memory>
+#include <optional>
+#include <string>
+
+#include "waymark/view/access.h"
+#include "waymark/view/hub.h"
+
+namespace waymark {
+
+/// What connections share; lives in the viewer's thread.
+struct ServerState {
+  AccessRules rules;
+  ViewHub& hub;
+  int num_connections = 0;
+};
+
+/// Serves the page to one browser's connection, until that becomes a WebSocket. Lives as long as an
+/// operation on it is under way.
+class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
+ public:
+  /// Counts itself, and what it becomes, among the connections of the state.
+  HttpConnection(boost::beast::tcp_stream stream, ServerState& state);
+
+  void read();
+  /// Says that there are too many, and goes.
+  void refuse();
+
+ private:
+  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  using Response = boost::beast::http::response<boost::beast::http::string_body>;
+
+  void answer(const Request& request);
+  Response respond_to(const Request& request) const;
+  void write(Response response);
+  void end();
+
+  boost::beast::tcp_stream stream_;
+  ServerState& state_;
+  std::shared_ptr<void> count_;  ///< One of the connections, until it is gone.
+  boost::beast::flat_buffer buffer_;
+  std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
+  Response response_;
+};
+
+}  // namespace waymark

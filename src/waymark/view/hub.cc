@@ -1,0 +1,181 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/view/hub.h"
+
+#include <algorithm>
+#include <iterator>
+#include <utility>
+
+#include "waymark/view/frame_message.h"
+
+namespace waymark {
+namespace {
+
+using namespace std::chrono_literals;
+
+constexpr auto kStatusInterval = 1s;
+constexpr int kMaxRequestsPerSecond = 50;
+
+/// Makes one update of two.
+void merge(ViewUpdate later, ViewUpdate& update) {
+  if (later.is_reset) {
+    update = std::move(later);
+    return;
+  }
+  if (later.map) update.map = std::move(later.map);
+  std::move(later.frames.begin(), later.frames.end(), std::back_inserter(update.frames));
+  std::move(later.colors.begin(), later.colors.end(), std::back_inserter(update.colors));
+  if (later.image) update.image = std::move(later.image);
+  update.status = later.status;
+}
+
+}  // namespace
+
+void ViewHub::tick(Clock::time_point now) {
+  const bool is_news = take_updates();
+  take_replies();
+  send_snapshots();
+  if (is_news || now - last_status_ >= kStatusInterval) {
+    last_status_ = now;
+    if (!clients_.empty()) {
+      const Message message = text(status());
+      for (const auto& [number, client] : clients_) {
+        if (!client->outbox.is_behind()) client->outbox.set_status(message);
+      }
+    }
+  }
+  send_frames(now);
+  bool is_watched = false;
+  for (const auto& [number, client] : clients_) {
+    is_watched |= client->max_rate_hz > 0.0;
+    client->send();
+  }
+  if (is_watched && !frame_) channel_.wants_image.store(true, std::memory_order_relaxed);
+}
+
+bool ViewHub::take_updates() {
+  std::optional<ViewUpdate> update = channel_.updates.try_pop();
+  if (!update) return false;
+  while (std::optional<ViewUpdate> later = channel_.updates.try_pop()) {
+    merge(*std::move(later), *update);
+  }
+  status_ = update->status;
+  const std::vector<Message> messages = scene_.advance(*update, !clients_.empty());
+  snapshot_.clear();
+  for (const auto& [number, client] : clients_) {
+    if (update->is_reset) {
+      client->outbox.add_snapshot(messages);
+    } else {
+      for (const Message& message : messages) client->outbox.add(message);
+    }
+  }
+  if (update->image && !clients_.empty()) frame_ = encode_frame(*update->image, scene_.start_ns());
+  return true;
+}
+
+void ViewHub::take_replies() {
+  while (const std::optional<ViewReply> reply = channel_.replies.try_pop()) {
+    answer(reply->request.client, text(format_reply(*reply)));
+  }
+}
+
+void ViewHub::send_snapshots() {
+  for (const auto& [number, client] : clients_) {
+    if (!client->outbox.is_behind() || !client->outbox.is_empty()) continue;
+    if (snapshot_.empty()) snapshot_ = scene_.snapshot();
+    client->outbox.add_snapshot(snapshot_);
+    client->outbox.set_status(text(status()));
+  }
+}
+
+void ViewHub::send_frames(Clock::time_point now) {
+  if (!frame_) return;
+  for (const auto& [number, client] : clients_) {
+    // A little early is right: ticks do not fall on the beat of the client.
+    const std::chrono::duration<double> since = now - client->last_frame_;
+    if (since.count() * client->max_rate_hz < 0.9) continue;
+    client->last_frame_ = now;
+    client->outbox.set_frame(frame_);
+  }
+  frame_.reset();
+}
+
+std::uint64_t ViewHub::add(std::shared_ptr<ViewClient> client) {
+  client->outbox.add_answer(hello_);
+  client->outbox.add_answer(text(status()));
+  client->send();
+  clients_.emplace(next_client_, std::move(client));
+  return next_client_++;
+}
+
+void ViewHub::receive(std::uint64_t number, std::string_view message, Clock::time_point now) {
+  const auto found = clients_.find(number);
+  if (found == clients_.end()) return;
+  ViewClient& client = *found->second;
+  if (now - client.request_window_ >= 1s) {
+    client.request_window_ = now;
+    client.num_requests_ = 0;
+  }
+  if (++client.num_requests_ > kMaxRequestsPerSecond) {
+    client.close();
+    return;
+  }
+  const ClientRequest request = parse_request(message);
+  if (const auto* rate = std::get_if<SetRate>(&request.content)) client.max_rate_hz = rate->hz;
+  if (Message reply = answer_to(number, request)) answer(number, std::move(reply));
+}
+
+void ViewHub::answer(std::uint64_t number, Message message) {
+  const auto found = clients_.find(number);
+  if (found == clients_.end()) return;
+  const std::shared_ptr<ViewClient> client = found->second;
+  if (!client->outbox.add_answer(std::move(message))) {
+    client->close();
+    return;
+  }
+  client->send();
+}
+
+Message ViewHub::answer_to(std::uint64_t number, const ClientRequest& request) {
+  if (const auto* error = std::get_if<std::string>(&request.content)) {
+    return text(format_reply(request.number, *error));
+  }
+  if (const auto* show = std::get_if<ShowKeyframe>(&request.content)) {
+    return text(format_keyframe(scene_.map(), show->id, *request.number));
+  }
+  if (const auto* show = std::get_if<ShowLandmark>(&request.content)) {
+    return text(format_landmark(scene_.map(), show->id, *request.number));
+  }
+  if (const auto* kind = std::get_if<ViewRequest::Kind>(&request.content)) {
+    return pass_on(number, request, *kind);
+  }
+  return text(format_reply(request.number, ""));
+}
+
+Message ViewHub::pass_on(std::uint64_t number,
+                         const ClientRequest& request,
+                         ViewRequest::Kind kind) {
+  const bool is_save = kind == ViewRequest::Kind::kSave;
+  if (!info_.is_live) return text(format_reply(request.number, "this is a saved map"));
+  if (is_save && !info_.can_save) {
+    return text(format_reply(request.number, "no file was named, expected --map-out"));
+  }
+  ViewRequest passed{kind, number, *request.number};
+  if (!channel_.requests.try_push(passed)) {
+    return text(format_reply(request.number, "too many requests wait"));
+  }
+  return is_save ? nullptr : text(format_reply(request.number, ""));
+}
+
+bool ViewHub::is_idle() const {
+  return std::all_of(clients_.begin(), clients_.end(), [](const auto& entry) {
+    return entry.second->outbox.is_empty();
+  });
+}
+
+void ViewHub::close_clients() {
+  const auto clients = clients_;
+  for (const auto& [number, client] : clients) client->close();
+}
+
+}  // namespace waymark

@@ -1,0 +1,85 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "waymark/view/channel.h"
+#include "waymark/view/outbox.h"
+#include "waymark/view/scene.h"
+#include "waymark/view/text_message.h"
+
+namespace waymark {
+
+/// A client as the hub sees it: an outbox that somebody empties.
+class ViewClient {
+ public:
+  virtual ~ViewClient() = default;
+  /// Begins to send what waits in the outbox, unless that goes on already.
+  virtual void send() = 0;
+  virtual void close() = 0;
+
+  Outbox outbox;
+  double max_rate_hz = 10.0;  ///< Of frames.
+
+ private:
+  friend class ViewHub;
+  std::chrono::steady_clock::time_point last_frame_;
+  std::chrono::steady_clock::time_point request_window_;
+  int num_requests_ = 0;
+};
+
+/// Between the session and its viewers: takes in updates, tells all clients, takes their requests.
+/// Lives in the viewer's thread.
+class ViewHub {
+ public:
+  using Clock = std::chrono::steady_clock;
+
+  ViewHub(ViewChannel& channel, SessionInfo info)
+      : channel_(channel), info_(std::move(info)), hello_(text(format_hello(info_))) {}
+
+  /// Takes in and tells what is new; to be called some ten times per second.
+  void tick(Clock::time_point now);
+  /// Gives the client a number.
+  std::uint64_t add(std::shared_ptr<ViewClient> client);
+  void remove(std::uint64_t number) { clients_.erase(number); }
+  /// Answers what a client sent; closes it if it asks too much.
+  void receive(std::uint64_t number, std::string_view message, Clock::time_point now);
+
+  std::string status() const { return format_status(status_, scene_.map(), clients_.size()); }
+  /// Whether all has been sent to all clients.
+  bool is_idle() const;
+  void close_clients();
+  void forget_clients() { clients_.clear(); }
+
+ private:
+  static Message text(std::string content) {
+    return std::make_shared<const std::string>(std::move(content));
+  }
+  /// True if something came.
+  bool take_updates();
+  void take_replies();
+  void send_snapshots();
+  void send_frames(Clock::time_point now);
+  void answer(std::uint64_t number, Message message);
+  Message answer_to(std::uint64_t number, const ClientRequest& request);
+  Message pass_on(std::uint64_t number, const ClientRequest& request, ViewRequest::Kind kind);
+
+  ViewChannel& channel_;
+  const SessionInfo info_;
+  const Message hello_;
+  Scene scene_;
+  SessionStatus status_;
+  std::map<std::uint64_t, std::shared_ptr<ViewClient>> clients_;
+  std::uint64_t next_client_ = 1;
+  std::vector<Message> snapshot_;  ///< Of now, once somebody needed it.
+  Message frame_;                  ///< Not sent to everybody yet; null if none.
+  Clock::time_point last_status_;
+};
+
+}  // namespace waymark

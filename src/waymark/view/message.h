@@ -1,0 +1,85 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Geometry>
+#include <bit>
+#include <cstdint>
+#include <cstring>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// Binary messages of the viewer's protocol, see docs/viewer-protocol.md.
+enum class MessageKind : std::uint8_t {
+  kBegin = 1,
+  kEnd = 2,
+  kLandmarks = 3,
+  kLandmarkPositions = 4,
+  kLandmarksErased = 5,
+  kCameras = 6,
+  kKeyframes = 7,
+  kKeyframePoses = 8,
+  kKeyframesErased = 9,
+  kCovisibility = 10,
+  kLoops = 11,
+  kTrajectory = 12,
+  kFrame = 13,
+  kSubmaps = 14,
+};
+
+inline constexpr std::uint8_t kProtocolVersion = 1;
+/// Elements of a message at most.
+inline constexpr std::size_t kMaxChunk = 65536;
+
+/// A finished message, shared by all that it is sent to.
+using Message = std::shared_ptr<const std::string>;
+
+/// Arrays of a message, one behind the other, little-endian.
+class MessageWriter {
+ public:
+  MessageWriter(MessageKind kind, std::size_t num_elements);
+
+  void add(std::uint32_t value) { append(&value, sizeof(value)); }
+  void add(float value) { append(&value, sizeof(value)); }
+  void add(std::uint16_t value) { append(&value, sizeof(value)); }
+  void add(std::uint8_t value) { append(&value, sizeof(value)); }
+  /// Three float32.
+  void add(const Eigen::Vector3d& vector);
+  /// Four float32: x y z w.
+  void add(const Eigen::Quaterniond& rotation);
+  void add_bytes(std::string_view bytes) { append(bytes.data(), bytes.size()); }
+  /// Zeros up to a multiple of so many bytes.
+  void pad_to(std::size_t multiple);
+
+  Message finish() { return std::make_shared<const std::string>(std::move(bytes_)); }
+
+ private:
+  static_assert(std::endian::native == std::endian::little, "else swap the bytes here");
+
+  void append(const void* data, std::size_t num_bytes) {
+    bytes_.append(static_cast<const char*>(data), num_bytes);
+  }
+
+  std::string bytes_;
+};
+
+/// 65535 for everything above.
+std::uint16_t saturate16(std::size_t value);
+
+/// A message of ids alone.
+Message encode_ids(MessageKind kind, std::span<const std::uint32_t> ids);
+
+/// Calls encode(part) for consecutive parts of at most kMaxChunk elements.
+template <class T, class Encode>
+void for_each_chunk(std::span<const T> elements, Encode&& encode) {
+  for (std::size_t begin = 0; begin < elements.size(); begin += kMaxChunk) {
+    encode(elements.subspan(begin, std::min(kMaxChunk, elements.size() - begin)));
+  }
+}
+
+}  // namespace waymark

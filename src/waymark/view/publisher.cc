@@ -1,0 +1,183 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/view/publisher.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstring>
+#include <utility>
+#include <vector>
+
+namespace waymark {
+namespace {
+
+/// Frames that the median of the tracking time and the frame rate are taken of.
+constexpr std::size_t kRecent = 99;
+
+Image copy_of(const ImageView& view) {
+  Image image(view.width_px, view.height_px);
+  for (int y = 0; y < view.height_px; ++y) {
+    std::memcpy(image.row(y), view.row(y), static_cast<std::size_t>(view.width_px));
+  }
+  return image;
+}
+
+FeatureColors colors_of(const FrameDetails& details, const ImageView& image) {
+  FeatureColors colors;
+  colors.frame = details.frame;
+  colors.rgb.reserve(details.features->num_primary);
+  for (std::size_t i = 0; i < details.features->num_primary; ++i) {
+    const Keypoint& keypoint = details.features->keypoints[i];
+    const int x = std::clamp(static_cast<int>(keypoint.x_px + 0.5f), 0, image.width_px - 1);
+    const int y = std::clamp(static_cast<int>(keypoint.y_px + 0.5f), 0, image.height_px - 1);
+    const std::uint8_t grey = image.at(x, y);
+    colors.rgb.push_back({grey, grey, grey});
+  }
+  return colors;
+}
+
+}  // namespace
+
+ViewPublisher::ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total)
+    : viewer_(viewer) {
+  update_.status.num_frames_total = num_frames_total;
+  push();
+}
+
+void ViewPublisher::tell(const System& system,
+                         const FrameInput& input,
+                         const TrackingResult& result) {
+  const FrameDetails& details = system.details();
+  SessionStatus& status = update_.status;
+  if (status.phase == SessionPhase::kStarting) status.phase = SessionPhase::kRunning;
+  if (timestamps_ns_.empty()) first_frame_ = details.frame;
+  timestamps_ns_.push_back(input.timestamp_ns);
+  status.frame = details.frame;
+  status.time_s = 1e-9 * static_cast<double>(input.timestamp_ns - timestamps_ns_.front());
+  status.submap = result.submap;
+  status.num_matches = result.num_matches;
+  status.num_inliers = result.num_inliers;
+  measure(result);
+  count(result.state, result.reason);
+  update_.map = system.map();
+  note_frames(system, input, result);
+  update_.colors.push_back(colors_of(details, input.image0));
+  if (viewer_.take_image_wish()) {
+    update_.image = std::make_shared<const FrameImage>(FrameImage{details.frame,
+                                                                  input.timestamp_ns,
+                                                                  input.image0.width_px,
+                                                                  input.image0.height_px,
+                                                                  details.features,
+                                                                  details.landmarks,
+                                                                  copy_of(input.image0)});
+  }
+  push();
+}
+
+void ViewPublisher::note_frames(const System& system,
+                                const FrameInput& input,
+                                const TrackingResult& result) {
+  const FrameDetails& details = system.details();
+  FrameNote note;
+  note.frame = details.frame;
+  note.timestamp_ns = input.timestamp_ns;
+  note.state = result.state;
+  note.reason = result.reason;
+  note.tracking_ms = static_cast<float>(result.stages.tracking_ms());
+  if (result.world_from_rig) note.pose = details.pose;
+  update_.frames.push_back(note);
+  for (const FilledPose& filled : details.filled) {
+    FrameNote earlier;
+    earlier.frame = filled.frame;
+    earlier.timestamp_ns = timestamps_ns_.at(filled.frame.value - first_frame_.value);
+    earlier.state = FrameState::kFilled;
+    earlier.pose = filled.pose;
+    update_.frames.push_back(earlier);
+  }
+  update_.status.num_tracked += details.filled.size();
+}
+
+void ViewPublisher::count(FrameState state, FrameReason reason) {
+  SessionStatus& status = update_.status;
+  ++status.num_frames;
+  status.num_tracked += state == FrameState::kTracked;
+  status.num_unreadable += state == FrameState::kUnreadable;
+  status.num_dropped += state == FrameState::kDropped;
+  status.lost_count += state == FrameState::kLost && status.state != FrameState::kLost;
+  status.state = state;
+  status.reason = reason;
+}
+
+void ViewPublisher::measure(const TrackingResult& result) {
+  SessionStatus& status = update_.status;
+  status.stages = result.stages;
+  recent_tracking_ms_.push_back(static_cast<float>(result.stages.tracking_ms()));
+  recent_times_.push_back(Clock::now());
+  if (recent_times_.size() > kRecent) {
+    recent_tracking_ms_.pop_front();
+    recent_times_.pop_front();
+  }
+  std::vector<float> sorted(recent_tracking_ms_.begin(), recent_tracking_ms_.end());
+  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
+  std::nth_element(sorted.begin(), middle, sorted.end());
+  status.median_tracking_ms = static_cast<double>(*middle);
+  const std::chrono::duration<double> span = recent_times_.back() - recent_times_.front();
+  status.frames_per_s =
+      span.count() > 0.0 ? static_cast<double>(recent_times_.size() - 1) / span.count() : 0.0;
+}
+
+void ViewPublisher::skip(FrameState state, FrameReason reason) {
+  count(state, reason);
+  push();
+}
+
+void ViewPublisher::set_phase(SessionPhase phase) {
+  if (update_.status.phase == phase) return;
+  update_.status.phase = phase;
+  push();
+}
+
+void ViewPublisher::set_mapping(bool is_on) {
+  update_.status.is_mapping = is_on;
+  push();
+}
+
+void ViewPublisher::reset() {
+  const std::optional<std::size_t> total = update_.status.num_frames_total;
+  update_ = ViewUpdate();
+  update_.is_reset = true;
+  update_.map = std::make_shared<const Map>();
+  update_.status.num_frames_total = total;
+  timestamps_ns_.clear();
+  recent_tracking_ms_.clear();
+  recent_times_.clear();
+  push();
+}
+
+void ViewPublisher::finish(const System& system) {
+  SessionStatus& status = update_.status;
+  status.phase = SessionPhase::kDone;
+  status.num_tracked = 0;
+  update_.map = system.map();
+  for (const TrajectoryFrame& frame : system.trajectory()) {
+    FrameNote note;
+    note.frame = FrameId{first_frame_.value + frame.frame.value};
+    note.timestamp_ns = frame.timestamp_ns;
+    note.state = frame.state;
+    note.reason = FrameReason::kNone;
+    note.final_pose = frame.world_from_rig;
+    note.submap = frame.submap;
+    update_.frames.push_back(note);
+    ++status.num_tracked;
+  }
+  push();
+}
+
+void ViewPublisher::push() {
+  const SessionStatus status = update_.status;
+  if (!viewer_.try_push(update_)) return;  // It goes with the next one.
+  update_ = ViewUpdate();
+  update_.status = status;
+}
+
+}  // namespace waymark

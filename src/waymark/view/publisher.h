@@ -1,0 +1,49 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <chrono>
+#include <cstddef>
+#include <deque>
+#include <optional>
+
+#include "waymark/system/system.h"
+#include "waymark/view/viewer.h"
+
+namespace waymark {
+
+/// Tells a viewer of a session, frame by frame, from the session's thread. Costs that thread some
+/// pointers, the notes of the frame and, when somebody watches, a copy of the image.
+class ViewPublisher {
+ public:
+  /// num_frames_total: of the input, if it is known.
+  ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total);
+
+  /// A frame was fed; input is what was fed.
+  void tell(const System& system, const FrameInput& input, const TrackingResult& result);
+  /// A frame was not fed.
+  void skip(FrameState state, FrameReason reason);
+  void set_phase(SessionPhase phase);
+  void set_mapping(bool is_on);
+  /// The session began anew; whatever came before is void.
+  void reset();
+  /// The session is over: tells the final poses of all frames.
+  void finish(const System& system);
+
+ private:
+  using Clock = std::chrono::steady_clock;
+
+  void note_frames(const System& system, const FrameInput& input, const TrackingResult& result);
+  void count(FrameState state, FrameReason reason);
+  void measure(const TrackingResult& result);
+  void push();
+
+  Viewer& viewer_;
+  ViewUpdate update_;  ///< Not taken in by the viewer yet.
+  FrameId first_frame_;
+  std::deque<std::int64_t> timestamps_ns_;  ///< Of all frames fed.
+  std::deque<float> recent_tracking_ms_;
+  std::deque<Clock::time_point> recent_times_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,244 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/view/scene.h"
+
+#include <gmock/gmock.h>
+
+#include "waymark/base/rng.h"
+#include "waymark/map/testing/random_map.h"
+#include "waymark/view/test_messages.h"
+
+namespace waymark {
+namespace {
+
+template <class Id, class T>
+std::vector<Id> ids_of(const CowTable<Id, T>& table) {
+  std::vector<Id> ids;
+  table.for_each([&](Id id, const T&) { ids.push_back(id); });
+  return ids;
+}
+
+/// Keyframes without edges are told or not: it means the same.
+Page normalized(Page page) {
+  std::erase_if(page.edges, [](const auto& entry) { return entry.second.empty(); });
+  return page;
+}
+
+/// A session that changes in every way between two updates.
+class ChangingSession {
+ public:
+  explicit ChangingSession(std::uint64_t seed)
+      : start_(seed, 300), map_(start_.map()), rng_(seed, 1) {}
+
+  ViewUpdate next() {
+    for (int i = 0; i < 25; ++i) edit();
+    ViewUpdate update;
+    update.map = map_.freeze();
+    for (int i = 0; i < 4; ++i) update.frames.push_back(note_frame());
+    if (num_frames_ > 10) update.frames.push_back(fill_frame());
+    return update;
+  }
+
+  Map& map() { return map_; }
+
+ private:
+  template <class Id>
+  Id pick(const std::vector<Id>& ids) {
+    return ids[rng_.below(static_cast<std::uint32_t>(ids.size()))];
+  }
+
+  bool may_erase(KeyframeId id) const {
+    return map_.keyframes().at(id).parent.is_valid() && !map_.has_loop_edge(id);
+  }
+
+  void edit() {
+    const auto keyframes = ids_of(map_.keyframes());
+    const auto landmarks = ids_of(map_.landmarks());
+    const KeyframeId keyframe = pick(keyframes);
+    const Keyframe& chosen = map_.keyframes().at(keyframe);
+    const Eigen::Vector3d point(rng_.normal(), rng_.normal(), rng_.normal());
+    switch (rng_.below(8)) {
+      case 0:
+        map_.move_keyframe(keyframe, Rigid3(chosen.rig_from_world.rotation, point));
+        break;
+      case 1:
+        map_.move_landmark(pick(landmarks), point);
+        break;
+      case 2:
+        map_.erase_landmark(pick(landmarks));
+        break;
+      case 3:
+        if (may_erase(keyframe)) map_.erase_keyframe(keyframe);
+        break;
+      case 4:
+        map_.rescale_keyframe(keyframe, 1.1);
+        break;
+      case 5: {
+        Keyframe added = chosen;
+        added.parent = keyframe;
+        added.frame = FrameId{1000 + num_frames_};
+        added.landmarks.assign(added.landmarks.size(), LandmarkId{});
+        map_.add_keyframe(std::move(added));
+        break;
+      }
+      default:
+        observe(keyframe, point);
+    }
+  }
+
+  /// Many new landmarks that two keyframes share, so that they get an edge.
+  void observe(KeyframeId keyframe, const Eigen::Vector3d& point) {
+    const Keyframe& first = map_.keyframes().at(keyframe);
+    KeyframeId other = first.parent;
+    for (std::uint32_t feature = 0; feature < first.features->num_primary; ++feature) {
+      if (map_.keyframes().at(keyframe).landmarks[feature].is_valid()) continue;
+      const LandmarkId id = map_.add_landmark(first.submap, point, keyframe);
+      map_.observe(keyframe, feature, id);
+      if (!other.is_valid()) continue;
+      if (!map_.keyframes().at(other).landmarks[feature].is_valid()) {
+        map_.observe(other, feature, id);
+      }
+    }
+  }
+
+  FrameNote note_frame() {
+    FrameNote note;
+    note.frame = FrameId{num_frames_};
+    note.timestamp_ns = 1'000'000'000 + num_frames_ * std::int64_t{50'000'000};
+    note.tracking_ms = 12.5f;
+    ++num_frames_;
+    if (rng_.below(4) == 0) {
+      note.reason = FrameReason::kTooFewMatches;
+      return note;
+    }
+    note.state = FrameState::kTracked;
+    note.pose = some_pose();
+    return note;
+  }
+
+  FrameNote fill_frame() {
+    FrameNote note;
+    note.frame = FrameId{rng_.below(num_frames_)};
+    note.timestamp_ns = 1'000'000'000 + note.frame.value * std::int64_t{50'000'000};
+    note.state = FrameState::kFilled;
+    note.pose = some_pose();
+    return note;
+  }
+
+  /// By any keyframe that lives or lived.
+  RelativePose some_pose() {
+    const KeyframeId living = pick(ids_of(map_.keyframes()));
+    return {
+        living, Rigid3({1, 0, 0, 0}, {0.1, 0.2, 0.3}), map_.keyframes().at(living).applied_scale};
+  }
+
+  testing::RandomMap start_;
+  Map& map_;
+  Rng rng_;
+  std::uint32_t num_frames_ = 0;
+};
+
+void apply_all(const std::vector<Message>& messages, Page& page) {
+  for (const Message& message : messages) page.apply(message);
+}
+
+class SceneChanges : public ::testing::TestWithParam<std::uint64_t> {};
+
+TEST_P(SceneChanges, GiveWhatASnapshotGives) {
+  ChangingSession session(GetParam());
+  Scene scene;
+  ViewUpdate first = session.next();
+  scene.advance(first, false);
+  Page follower;
+  apply_all(scene.snapshot(), follower);
+  for (int round = 0; round < 25; ++round) {
+    ViewUpdate update = session.next();
+    apply_all(scene.advance(update, true), follower);
+    Page late;
+    apply_all(scene.snapshot(), late);
+    ASSERT_TRUE(late.is_complete);
+    ASSERT_EQ(late.landmarks.size(), session.map().landmarks().size());
+    ASSERT_EQ(late.keyframes.size(), session.map().keyframes().size());
+    ASSERT_EQ(normalized(follower), normalized(late)) << "round " << round;
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Seeds, SceneChanges, ::testing::Values(1, 2, 3, 4));
+
+TEST(Scene, TellsTheMapAsItIs) {
+  testing::RandomMap random(7);
+  Scene scene;
+  ViewUpdate update;
+  update.map = random.map().freeze();
+  scene.advance(update, false);
+  Page page;
+  apply_all(scene.snapshot(), page);
+  const Map& map = *update.map;
+  map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+    const Page::Values& values = page.landmarks.at(id.value);
+    for (int i = 0; i < 3; ++i) {
+      EXPECT_EQ(values[i], static_cast<float>(landmark.position_in_world[i]));
+    }
+    EXPECT_EQ(values[4], static_cast<double>(num_observers(landmark)));
+    EXPECT_EQ(values[5], landmark.submap.value);
+    EXPECT_EQ(values[9], 0);  // No colour is known.
+  });
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    const Page::Values& values = page.keyframes.at(id.value);
+    const Rigid3 world_from_rig = keyframe.rig_from_world.inverse();
+    for (int i = 0; i < 3; ++i) EXPECT_NEAR(values[i], world_from_rig.translation[i], 1e-5);
+    for (int i = 0; i < 4; ++i)
+      EXPECT_NEAR(values[3 + i], world_from_rig.rotation.coeffs()[i], 1e-6);
+    EXPECT_EQ(values[7], keyframe.frame.value);
+    EXPECT_EQ(values[9], keyframe.parent.value);
+    EXPECT_EQ(values[12], keyframe.submap.value);
+  });
+  EXPECT_EQ(page.loops.size(), 2 * map.measured_loop_edges().size());
+  EXPECT_EQ(page.submaps.size(), 2 * map.submaps().size());
+}
+
+TEST(Scene, GivesLandmarksTheColorOfTheirFeature) {
+  testing::RandomMap random(8);
+  Map& map = random.map();
+  const KeyframeId keyframe = ids_of(map.keyframes()).front();
+  std::uint32_t feature = 0;
+  while (map.keyframes().at(keyframe).landmarks[feature].is_valid()) ++feature;
+  Scene scene;
+  ViewUpdate before;
+  before.map = map.freeze();
+  scene.advance(before, false);
+
+  ViewUpdate after;
+  FeatureColors colors;
+  colors.frame = map.keyframes().at(keyframe).frame;
+  colors.rgb.assign(map.keyframes().at(keyframe).features->num_primary, {1, 2, 3});
+  colors.rgb[feature] = {10, 20, 30};
+  after.colors.push_back(colors);
+  const LandmarkId id = map.add_landmark(map.keyframes().at(keyframe).submap, {1, 2, 3}, keyframe);
+  map.observe(keyframe, feature, id);
+  after.map = map.freeze();
+  Page page;
+  apply_all(scene.advance(after, true), page);
+  const Page::Values& values = page.landmarks.at(id.value);
+  EXPECT_THAT(Page::Values(values.begin() + 6, values.end()),
+              ::testing::ElementsAre(10, 20, 30, 255));
+}
+
+TEST(Scene, AResetForgetsEverything) {
+  ChangingSession session(5);
+  Scene scene;
+  ViewUpdate update = session.next();
+  scene.advance(update, false);
+  Page page;
+  apply_all(scene.snapshot(), page);
+  EXPECT_FALSE(page.landmarks.empty());
+  ViewUpdate reset;
+  reset.is_reset = true;
+  reset.map = std::make_shared<const Map>();
+  apply_all(scene.advance(reset, true), page);
+  EXPECT_TRUE(page.is_complete);
+  EXPECT_TRUE(page.landmarks.empty() && page.keyframes.empty() && page.frames.empty());
+}
+
+}  // namespace
+}  // namespace waymark
