@@ -4,10 +4,12 @@
 
 #include <chrono>
 #include <filesystem>
+#include <functional>
 #include <future>
 #include <memory>
 #include <optional>
 #include <string>
+#include <vector>
 
 #include "image_keeper.h"
 #include "waymark/io/map_file.h"
@@ -32,6 +34,10 @@ class Autosave {
   /// To be called often: saves the map when it is time, unless it is empty or the last save is
   /// still under way. Gives what went wrong with an earlier one; the next one will be tried.
   std::optional<std::string> update(const std::shared_ptr<const Map>& map);
+  /// The next update() saves the map as soon as it can, in the same way; on_done hears, from a
+  /// later update() or the last save(), what went wrong, or nothing.
+  void save_soon(std::function<void(const std::string& error)> on_done);
+  const std::filesystem::path& path() const { return path_; }
   /// Waits for the save under way and saves the map. Throws OutputError.
   void save(const std::shared_ptr<const Map>& map);
 
@@ -39,6 +45,8 @@ class Autosave {
   using Clock = std::chrono::steady_clock;
 
   StoredMap prepare(const std::shared_ptr<const Map>& map) const;
+  /// Takes what became of the save under way; what went wrong, or an empty text.
+  std::string finish_save();
 
   const std::filesystem::path path_;
   const Clock::duration interval_;
@@ -46,6 +54,9 @@ class Autosave {
   const ImageKeeper& images_;
   Clock::time_point last_start_ = Clock::now();
   std::future<void> under_way_;
+  using Waiting = std::vector<std::function<void(const std::string& error)>>;
+  Waiting wanted_;  ///< For the next save.
+  Waiting served_;  ///< By the one under way.
 };
 
 }  // namespace waymark

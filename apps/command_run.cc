@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <atomic>
 #include <memory>
+#include <optional>
 #include <string>
 
 #include "autosave.h"
@@ -12,6 +14,8 @@
 #include "image_keeper.h"
 #include "input_command.h"
 #include "interrupt.h"
+#include "live_control.h"
+#include "live_input.h"
 #include "paced_input.h"
 #include "reporter.h"
 #include "session.h"
@@ -26,18 +30,21 @@ struct RunOptions {
   ReportOptions report;
   std::filesystem::path map_out;  ///< Empty: the map is not saved.
   double autosave_s = 60.0;
-  double pace = 0.0;  ///< Times the input's own rate; 0: as fast as possible.
+  double pace = 0.0;             ///< Times the input's own rate; 0: as fast as possible.
+  std::optional<Timing> timing;  ///< Nothing: what suits the input.
+  std::string viewer;            ///< [HOST:]PORT; empty: off.
 };
 
 void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
   const RunSummary& summary = results.summary;
   const FrameCounts& counts = summary.counts;
   reporter.info(
-      fmt::format("{} of {} frames have a pose ({} unreadable), lost {} times; {} keyframes, "
-                  "{} landmarks, {} sub-maps",
+      fmt::format("{} of {} frames have a pose ({} unreadable, {} dropped), lost {} times; {} "
+                  "keyframes, {} landmarks, {} sub-maps",
                   counts.tracked,
                   counts.frames,
                   counts.unreadable,
+                  counts.dropped,
                   counts.lost_count,
                   summary.keyframes,
                   summary.landmarks,
@@ -63,29 +70,60 @@ void report_focal_check(Reporter& reporter, const FocalCheck& check) {
   }
 }
 
-SessionResults map_input(Session& session,
-                         const RunOptions& options,
-                         Input& input,
-                         Autosave& autosave,
-                         Reporter& reporter) {
-  catch_interrupts();
-  const FrameObserver report = report_frames(reporter, session.input->info());
-  bool is_focal_checked = false;
-  const FrameObserver observer = [&](const FrameRecord& record) {
-    report(record);
-    if (const auto failure = autosave.update(session.system->map())) {
-      reporter.warning("autosave: " + *failure);
+/// An input at its own pace, if it has one or is given one.
+class TimedInput {
+ public:
+  TimedInput(Input& input, double pace, Timing timing, const std::atomic<bool>& is_paused)
+      : input_(&input) {
+    const auto is_halted = [&is_paused] { return is_paused.load(std::memory_order_relaxed); };
+    if (pace > 0.0) input_ = &paced_.emplace(*input_, pace, is_interrupted, is_halted);
+    const bool has_own_time = pace > 0.0 || input.info().is_live;
+    if (has_own_time && timing == Timing::kRealtime) {
+      input_ = &arriving_.emplace(*input_, is_interrupted, is_halted);
     }
-    const FocalCheck* check = is_focal_checked ? nullptr : session.system->focal_check();
-    if (check == nullptr) return;
-    is_focal_checked = true;
-    report_focal_check(reporter, *check);
-  };
-  if (options.pace > 0.0) {
-    PacedInput paced(input, options.pace, is_interrupted);
-    return run_session(paced, *session.system, is_interrupted, observer);
   }
-  return run_session(input, *session.system, is_interrupted, observer);
+
+  Input& get() { return *input_; }
+
+ private:
+  Input* input_;
+  std::optional<PacedInput> paced_;
+  std::optional<LiveInput> arriving_;
+};
+
+/// Tells the user, the autosave and the viewer (null: none) of each frame.
+FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
+  return
+      [&, live, report = report_frames(reporter, session.input->info()), is_focal_checked = false](
+          const FrameRecord& record) mutable {
+        report(record);
+        if (live) live->show(record);
+        if (const auto failure = autosave.update(session.system->map())) {
+          reporter.warning("autosave: " + *failure);
+        }
+        const FocalCheck* check = is_focal_checked ? nullptr : session.system->focal_check();
+        if (check == nullptr) return;
+        is_focal_checked = true;
+        report_focal_check(reporter, *check);
+      };
+}
+
+SessionResults map_input(
+    Session& session, Input& input, Autosave& autosave, LiveControl* live, Reporter& reporter) {
+  SessionHooks hooks;
+  hooks.should_stop = is_interrupted;
+  hooks.observer = observe(session, autosave, live, reporter);
+  if (live) {
+    hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
+    hooks.on_result = [live](const FrameInput& frame, const TrackingResult& result) {
+      live->show(frame, result);
+    };
+    hooks.on_input_end = [live] { live->finishing(); };
+  }
+  catch_interrupts();
+  SessionResults results = run_session(input, *session.system, hooks);
+  if (live) live->finish();
+  return results;
 }
 
 void save_final_map(const System& system,
@@ -101,7 +139,27 @@ void save_final_map(const System& system,
   reporter.info(fmt::format("map in {}", options.map_out.string()));
 }
 
-int run(const RunOptions& options, Reporter& reporter) {
+void start_viewer(const RunOptions& options,
+                  const Session& session,
+                  const ControlledParts& parts,
+                  std::optional<LiveControl>& live) {
+  const InputInfo& input = session.input->info();
+  SessionInfo info;
+  info.program = std::string("waymark ") + WAYMARK_VERSION;
+  info.input = options.session.input.filename().string();
+  info.setup = to_string(input.setup);
+  info.timing = to_string(options.session.timing);
+  info.can_save = !options.map_out.empty();
+  live.emplace(parse_viewer_address(options.viewer, "--viewer"),
+               std::move(info),
+               *session.system,
+               parts,
+               input.num_frames);
+}
+
+int run(RunOptions options, Reporter& reporter) {
+  const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
+  options.session.timing = options.timing.value_or(suitable);
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
   make_output_folder(options.report.out);
@@ -110,14 +168,20 @@ int run(const RunOptions& options, Reporter& reporter) {
     AtomicFile{options.map_out};  // Fails now rather than in the end.
     remove_abandoned_parts(options.map_out);
   }
+  std::atomic<bool> is_paused{false};
+  TimedInput input(*session.input, options.pace, options.session.timing, is_paused);
   ImageKeeper images(
-      *session.input, [&] { return session.system->map(); }, std::move(session.images));
+      input.get(), [&] { return session.system->map(); }, std::move(session.images));
   Autosave autosave(options.map_out,
                     has_map_out ? options.autosave_s : 0.0,
                     settings_as_yaml(session.settings),
                     images);
 
-  SessionResults results = map_input(session, options, images, autosave, reporter);
+  std::optional<LiveControl> live;
+  if (!options.viewer.empty()) start_viewer(options, session, {autosave, images, is_paused}, live);
+  if (live) reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
+
+  SessionResults results = map_input(session, images, autosave, live ? &*live : nullptr, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(session.input->info().setup);
@@ -168,11 +232,21 @@ void add_run_command(CLI::App& program, Command& command) {
   add_input_options(run_command, options->session);
   add_selection_options(run_command, options->session.reading);
   add_pace_option(run_command, *options);
-  add_choice<Timing>(run_command,
-                     "--timing",
-                     options->session.timing,
-                     {{"inline", Timing::kInline}, {"lockstep", Timing::kLockstep}},
-                     "inline (one thread) or lockstep (threads, same results) [lockstep]");
+  add_choice<std::optional<Timing>>(
+      run_command,
+      "--timing",
+      options->timing,
+      {{"inline", Timing::kInline},
+       {"lockstep", Timing::kLockstep},
+       {"realtime", Timing::kRealtime}},
+      "inline (one thread), lockstep (threads, same results) or realtime (never waits; with --pace "
+      "or a camera frames that come too early for it are dropped) [realtime for cameras, else "
+      "lockstep]");
+  run_command
+      .add_option("--viewer",
+                  options->viewer,
+                  "Show the session in the browser, at this port of this machine [off]")
+      ->type_name("[HOST:]PORT");
   add_map_options(run_command, *options);
   add_report_options(run_command, options->report, options->session.seed);
   run_command.callback([options, &command] {

@@ -22,6 +22,7 @@ void add_simulate_command(CLI::App& program, Command& command);
 void add_config_command(CLI::App& program, Command& command);
 void add_export_command(CLI::App& program, Command& command);
 void add_import_command(CLI::App& program, Command& command);
+void add_view_command(CLI::App& program, Command& command);
 
 /// Exit status of the program.
 inline constexpr int kDone = 0;

@@ -28,6 +28,11 @@ FrameRecord record_of_fault(const InputFrame& frame) {
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
+  if (frame.fault == FrameFault::kLate) {
+    record.state = FrameState::kDropped;
+    record.reason = FrameReason::kLate;
+    return record;
+  }
   record.state = FrameState::kUnreadable;
   record.reason = frame.fault == FrameFault::kWrongSize ? FrameReason::kWrongSize
                                                         : FrameReason::kUnreadableImage;
@@ -47,6 +52,12 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   if (result.submap.is_valid()) record.submap = result.submap.value;
   record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());
   return record;
+}
+
+/// After a reset: what was fed before belongs to no map.
+void forget_session(FedFrames& frames) {
+  for (const std::size_t row : frames.fed) frames.table.frames[row].submap.reset();
+  frames.fed.clear();
 }
 
 FrameInput borrow(const InputFrame& frame) {
@@ -74,6 +85,7 @@ FedFrames feed_all(Input& input,
       frames.table.frames.push_back(record_of_fault(*frame));
     } else {
       const TrackingResult result = feed(borrow(*frame));
+      if (result.frame == FrameId{0}) forget_session(frames);
       frames.fed.push_back(frames.table.frames.size());
       frames.tracking_ms.push_back(result.stages.tracking_ms());
       frames.table.frames.push_back(record_of_result(*frame, result));

@@ -31,6 +31,11 @@ std::optional<InputFrame> ImageKeeper::next() {
   return frame;
 }
 
+void ImageKeeper::begin_anew() {
+  earlier_.clear();
+  first_new_ = KeyframeId{0};
+}
+
 /// Only frames that are old enough can be told not to be keyframes.
 void ImageKeeper::forget_others() {
   std::set<std::int64_t> kept;

@@ -27,6 +27,9 @@ class ImageKeeper : public Input {
   const InputInfo& info() const override { return input_.info(); }
   std::optional<InputFrame> next() override;
 
+  /// From now on there are no earlier sessions: the map was emptied.
+  void begin_anew();
+
   /// Images of the keyframes of a map of this session.
   KeyframeImages images_of(const Map& map) const;
 
@@ -35,8 +38,8 @@ class ImageKeeper : public Input {
 
   Input& input_;
   const NewestMap newest_map_;
-  const KeyframeImages earlier_;
-  const KeyframeId first_new_;
+  KeyframeImages earlier_;
+  KeyframeId first_new_;
   std::map<std::int64_t, SharedJpeg> images_;  // By time.
   std::size_t num_at_last_check_ = 0;
 };

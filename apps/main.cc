@@ -49,6 +49,7 @@ int run_program(int argc, char** argv) {
   add_run_command(program, command);
   add_localize_command(program, command);
   add_map_command(program, command);
+  add_view_command(program, command);
   add_eval_command(program, command);
   add_simulate_command(program, command);
   add_export_command(program, command);

@@ -12,12 +12,19 @@
 namespace waymark {
 
 /// Another input at its own rate, as a camera would give it: each frame comes no earlier after the
-/// first than its time stamp says. Does not wait once should_stop() says so.
+/// first than its time stamp says. Does not wait once should_stop() says so; while is_paused() says
+/// so, its clock stands still.
 class PacedInput : public Input {
  public:
   /// speed: times the input's own rate.
-  PacedInput(Input& input, double speed, std::function<bool()> should_stop)
-      : input_(input), speed_(speed), should_stop_(std::move(should_stop)) {}
+  PacedInput(Input& input,
+             double speed,
+             std::function<bool()> should_stop,
+             std::function<bool()> is_paused)
+      : input_(input),
+        speed_(speed),
+        should_stop_(std::move(should_stop)),
+        is_paused_(std::move(is_paused)) {}
 
   const InputInfo& info() const override { return input_.info(); }
   std::optional<InputFrame> next() override;
@@ -33,6 +40,7 @@ class PacedInput : public Input {
   Input& input_;
   const double speed_;
   const std::function<bool()> should_stop_;
+  const std::function<bool()> is_paused_;
   std::optional<Start> start_;
 };
 

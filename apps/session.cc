@@ -52,9 +52,18 @@ SessionResults run_session(Input& input,
                            System& system,
                            const std::function<bool()>& should_stop,
                            const FrameObserver& observer) {
+  return run_session(input, system, {should_stop, observer, nullptr, nullptr});
+}
+
+SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
-  const auto feed = [&](const FrameInput& frame) { return system.feed(frame); };
-  FedFrames frames = feed_all(input, feed, should_stop, observer);
+  const auto feed = [&](const FrameInput& frame) {
+    TrackingResult result = system.feed(frame);
+    if (hooks.on_result) hooks.on_result(frame, result);
+    return result;
+  };
+  FedFrames frames = feed_all(input, feed, hooks.should_stop, hooks.observer);
+  if (hooks.on_input_end) hooks.on_input_end();
   system.finish();
   update_states(system, frames);
 

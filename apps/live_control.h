@@ -1,0 +1,55 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <atomic>
+#include <string>
+
+#include "autosave.h"
+#include "frame_feed.h"
+#include "image_keeper.h"
+#include "waymark/system/system.h"
+#include "waymark/view/publisher.h"
+#include "waymark/view/viewer.h"
+
+namespace waymark {
+
+/// What of a session, besides the system, follows what people ask for.
+struct ControlledParts {
+  Autosave& autosave;
+  ImageKeeper& images;
+  std::atomic<bool>& is_paused;  ///< Read by the thread that reads the input, too.
+};
+
+/// Shows a running session in the browser and does what people ask for there.
+class LiveControl {
+ public:
+  LiveControl(const ViewerOptions& options,
+              SessionInfo info,
+              System& system,
+              const ControlledParts& parts,
+              std::optional<std::size_t> num_frames);
+
+  std::string url() const { return viewer_.url(); }
+  /// A frame was fed.
+  void show(const FrameInput& input, const TrackingResult& result);
+  /// A frame is done; for those that were not fed.
+  void show(const FrameRecord& record);
+  /// Does what was asked for since; while paused it only returns to say that all is over.
+  bool should_stop(const std::function<bool()>& is_interrupted);
+  void finishing() { publisher_.set_phase(SessionPhase::kFinishing); }
+  void finish() { publisher_.finish(system_); }
+
+ private:
+  void take_requests();
+  void answer(const ViewRequest& request);
+  void save(const ViewRequest& request);
+
+  System& system_;
+  const ControlledParts parts_;
+  Viewer viewer_;
+  ViewPublisher publisher_;
+  bool is_stopped_ = false;
+};
+
+}  // namespace waymark
