@@ -204,7 +204,7 @@ class Hostile(ViewerTest):
         for connection in held:
             connection.close()
         attacked = (self.out / "trajectory.txt").read_bytes()
-        self.assertEqual(self.run_on(self.sequence("stereo")).returncode, 0)
+        self.assertEqual(self.run_on(self.folder / "input_stereo").returncode, 0)
         self.assertEqual((self.out / "trajectory.txt").read_bytes(), attacked)
 
     def test_another_address_needs_the_token(self):
