@@ -9,6 +9,7 @@
 #include "waymark/base/check.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
+#include "waymark/camera/same_rig.h"
 #include "waymark/camera/testing/camera_test.h"
 
 namespace waymark {
@@ -206,6 +207,34 @@ struct EqualAngleModel {
     return result;
   }
 };
+
+TEST(SameRig, IsSoByWhatItsCamerasAre) {
+  CameraDescription description;
+  description.camera_model = "pinhole";
+  description.intrinsics = {300.0, 300.0, 160.0, 120.0};
+  description.width_px = 320;
+  description.height_px = 240;
+  const auto rig_of = [](const CameraDescription& camera, double baseline, bool has_description) {
+    Rig rig;
+    for (const double x : {0.0, -baseline}) {
+      rig.cameras.push_back({CameraRegistry::with_builtin_models().make_camera(camera),
+                             Rigid3({1.0, 0.0, 0.0, 0.0}, {x, 0.0, 0.0})});
+      if (has_description) rig.cameras.back().description = camera;
+    }
+    return rig;
+  };
+  const Rig rig = rig_of(description, 0.1, true);
+  EXPECT_TRUE(is_same_rig(rig, rig_of(description, 0.1, true)));
+  EXPECT_FALSE(is_same_rig(rig, rig_of(description, 0.2, true)));
+  Rig mono = rig;
+  mono.cameras.pop_back();
+  EXPECT_FALSE(is_same_rig(rig, mono));
+  const Rig unknown = rig_of(description, 0.1, false);
+  EXPECT_TRUE(is_same_rig(unknown, Rig(unknown)));
+  EXPECT_FALSE(is_same_rig(unknown, rig_of(description, 0.1, false)));
+  description.intrinsics[0] = 301.0;
+  EXPECT_FALSE(is_same_rig(rig, rig_of(description, 0.1, true)));
+}
 
 TEST(CameraRegistry, NamesOfManyLinesMakeOneLine) {
   const std::string error = error_after([](auto& d) { d.camera_model = "fish\neye"; });

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/base/median.h"
+#include "waymark/camera/same_rig.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/near_in_graph.h"
 
@@ -30,7 +31,7 @@ KeyframeId nearest_unknown(const Map& map, KeyframeId query) {
   KeyframeId nearest;
   double least = kMaxDistance + kMaxAngleRad;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.submap != in_query.submap || keyframe.rig != in_query.rig) return;
+    if (keyframe.submap != in_query.submap || !is_same_rig(*keyframe.rig, *in_query.rig)) return;
     const Rigid3 query_from_id = in_query.rig_from_world * keyframe.rig_from_world.inverse();
     const double distance = query_from_id.translation.norm() / depth;
     const double angle = Eigen::AngleAxisd(query_from_id.rotation).angle();
@@ -84,7 +85,7 @@ LinkFinder::LinkFinder(std::shared_ptr<const Rig> rig, std::uint64_t seed)
     : rig_(rig), locator_(rig, seed) {}
 
 std::optional<Revisit> LinkFinder::find(const Map& map, KeyframeId query) {
-  if (map.keyframes().at(query).rig != rig_) return std::nullopt;
+  if (!is_same_rig(*map.keyframes().at(query).rig, *rig_)) return std::nullopt;
   const KeyframeId match = nearest_unknown(map, query);
   return match.is_valid() ? compare(map, query, match) : std::nullopt;
 }

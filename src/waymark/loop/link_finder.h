@@ -19,7 +19,7 @@ namespace waymark {
 /// less, than a LoopFinder dares to. Keeps its buffers.
 class LinkFinder {
  public:
-  /// rig: keyframes of other rigs are left out.
+  /// rig: keyframes of other rigs are left out, see is_same_rig().
   LinkFinder(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
   /// The nearest keyframe of the same sub-map beyond those around the query, if it shows the same.

@@ -67,6 +67,12 @@ TEST_P(LinkFinderTest, LeavesKeyframesOfOtherRigsAlone) {
   EXPECT_FALSE(finder.find(scene.map, KeyframeId{kRound}));
 }
 
+TEST_P(LinkFinderTest, KnowsTheSameRigOfAnotherSession) {
+  const LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
+  LinkFinder finder(std::make_shared<const Rig>(*scene.rig), 1);
+  EXPECT_TRUE(finder.find(scene.map, KeyframeId{kRound}));
+}
+
 INSTANTIATE_TEST_SUITE_P(Maps, LinkFinderTest, ::testing::Bool(), [](const auto& info) {
   return info.param ? "metric" : "mono";
 });
