@@ -64,14 +64,17 @@ FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
   if (rig_.cameras.size() == 2) stereo_.emplace(rig_, settings.stereo);
 }
 
-std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
-  check_size(images.image0, *rig_.cameras[0].camera, "image");
+void check_sizes(const FrameImages& images, const Rig& rig) {
+  check_size(images.image0, *rig.cameras[0].camera, "image");
   if (!images.image1.is_empty()) {
-    WAYMARK_CHECK(stereo_.has_value());
-    check_size(images.image1, *rig_.cameras[1].camera, "right image");
+    WAYMARK_CHECK(rig.cameras.size() == 2);
+    check_size(images.image1, *rig.cameras[1].camera, "right image");
   }
-  if (!images.depth.is_empty()) check_size(images.depth, *rig_.cameras[0].camera, "depth image");
+  if (!images.depth.is_empty()) check_size(images.depth, *rig.cameras[0].camera, "depth image");
+}
 
+std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
+  check_sizes(images, rig_);
   auto features = std::make_shared<Features>();
   const Stopwatch features_time;
   extract_primary(images, *features);

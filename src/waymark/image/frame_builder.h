@@ -35,6 +35,9 @@ struct FrameImages {
   ImageView mask = {};    ///< Of image0: features where it is not 0; may be empty.
 };
 
+/// Throws InputError where the size of an image is not that of its camera in the rig.
+void check_sizes(const FrameImages& images, const Rig& rig);
+
 /// What the stages of the last frame took.
 struct FrameTimes {
   double features_ms = 0.0;  ///< Extraction and bearings of camera 0.

@@ -2,11 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/system/localizer.h"
 
+#include <algorithm>
+#include <map>
 #include <utility>
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/median.h"
+#include "waymark/camera/pixel_angles.h"
+#include "waymark/camera/resized_camera.h"
 #include "waymark/image/frame_builder.h"
+#include "waymark/image/reduce.h"
 #include "waymark/track/keyframes_near.h"
 #include "waymark/track/relocalizer.h"
 #include "waymark/track/tracker.h"
@@ -15,6 +21,37 @@ namespace waymark {
 namespace {
 
 constexpr std::size_t kMaxNearHint = 5;
+
+/// Images that are finer than those of the map by less are taken as they are.
+constexpr double kMinReduction = 0.8;
+/// No side becomes shorter than this.
+constexpr double kMinSidePx = 120.0;
+
+/// What an image has to be reduced by so that its pixels cover the angle of those of the map's
+/// middling camera: finer details are not in the map, and would take up the features.
+double reduction_for(const Rig& rig, const Map& map) {
+  std::map<const Camera*, double> angle_of_camera;
+  std::vector<double> angles;
+  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+    const Camera* camera = keyframe.rig->cameras.at(0).camera.get();
+    const auto [at, is_new] = angle_of_camera.try_emplace(camera, 0.0);
+    if (is_new) at->second = central_pixel_angle(*camera);
+    angles.push_back(at->second);
+  });
+  if (angles.empty()) return 1.0;
+  const Camera& camera = *rig.cameras.at(0).camera;
+  const double smallest = kMinSidePx / std::min(camera.width_px(), camera.height_px());
+  const double reduction = std::max(central_pixel_angle(camera) / median(angles), smallest);
+  return reduction < kMinReduction ? reduction : 1.0;
+}
+
+Rig reduced(Rig rig, double factor) {
+  if (factor == 1.0) return rig;
+  for (RigCamera& camera : rig.cameras) {
+    camera.camera = std::make_shared<ResizedCamera>(camera.camera, factor);
+  }
+  return rig;
+}
 
 /// The sub-map of the landmarks that were recognised.
 SubmapId submap_of(const Map& map, const std::vector<LandmarkId>& landmarks) {
@@ -29,7 +66,9 @@ SubmapId submap_of(const Map& map, const std::vector<LandmarkId>& landmarks) {
 class Localizer::Impl {
  public:
   Impl(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
-      : rig_(std::make_shared<const Rig>(std::move(rig))),
+      : full_rig_(std::move(rig)),
+        reduction_(reduction_for(full_rig_, *map)),
+        rig_(std::make_shared<const Rig>(reduced(full_rig_, reduction_))),
         uses_range_(is_metric(*map)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         snapshot_(index_map(std::move(map))),
@@ -44,9 +83,12 @@ class Localizer::Impl {
 
  private:
   Frame build(const FrameInput& input, TrackingResult& result);
+  std::shared_ptr<const Features> find_features(const FrameImages& images);
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
 
-  const std::shared_ptr<const Rig> rig_;
+  const Rig full_rig_;
+  const double reduction_;
+  const std::shared_ptr<const Rig> rig_;  ///< Of the reduced images.
   const bool uses_range_;
   FrameBuilder builder_;
   const MapSnapshot snapshot_;
@@ -63,12 +105,24 @@ Frame Localizer::Impl::build(const FrameInput& input, TrackingResult& result) {
     images.image1 = input.image1;
     images.depth = input.depth;
   }
-  Frame frame{FrameId{num_frames_}, input.timestamp_ns, builder_.build(images)};
+  Frame frame{FrameId{num_frames_}, input.timestamp_ns, find_features(images)};
   ++num_frames_;
   result.frame = frame.id;
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
   return frame;
+}
+
+std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages& images) {
+  if (reduction_ == 1.0) return builder_.build(images);
+  check_sizes(images, full_rig_);
+  const Image image0 = reduce(images.image0, reduction_);
+  Image image1, mask;
+  DepthImage depth;
+  if (!images.image1.is_empty()) image1 = reduce(images.image1, reduction_);
+  if (!images.depth.is_empty()) depth = pick_reduced(images.depth, reduction_);
+  if (!images.mask.is_empty()) mask = pick_reduced(images.mask, reduction_);
+  return builder_.build({image0.view(), image1.view(), depth.view(), mask.view()});
 }
 
 TrackingResult Localizer::Impl::track(const FrameInput& input) {

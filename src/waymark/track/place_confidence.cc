@@ -15,6 +15,8 @@ constexpr double kMinDirectionCos = 0.5;
 /// The image is judged in so many columns and rows; regions with fewer landmarks say nothing.
 constexpr int kRegions = 4;
 constexpr int kMinExpected = 4;
+/// And so many smaller cells, to tell where the keyframe shows something.
+constexpr int kCells = 16;
 /// A region with a smaller part found is not explained.
 constexpr double kMinRegionRatio = 0.15;
 
@@ -56,12 +58,54 @@ std::vector<LandmarkId> ascending(std::span<const LandmarkId> landmarks) {
   return sorted;
 }
 
-std::size_t region_of(const Eigen::Vector2d& pixel, const Camera& camera) {
-  const auto part = [](double at, int size) {
-    return std::clamp(static_cast<int>(at * kRegions / size), 0, kRegions - 1);
+/// Which of parts x parts rectangles of the image a pixel lies in.
+std::size_t part_of(const Eigen::Vector2d& pixel, const Camera& camera, int parts) {
+  const auto index = [parts](double at, int size) {
+    return std::clamp(static_cast<int>(at * parts / size), 0, parts - 1);
   };
-  return static_cast<std::size_t>(part(pixel.x(), camera.width_px()) * kRegions +
-                                  part(pixel.y(), camera.height_px()));
+  return static_cast<std::size_t>(index(pixel.x(), camera.width_px()) * parts +
+                                  index(pixel.y(), camera.height_px()));
+}
+
+struct Region {
+  int num_expected = 0;
+  int num_features = 0;  ///< In cells where something is expected.
+  int num_found = 0;
+
+  /// No more can be found than there are features, of which a camera that sees far more than the
+  /// keyframe's has few there.
+  int num_possible() const { return std::min(num_expected, num_features); }
+};
+
+using Regions = std::array<Region, kRegions * kRegions>;
+
+void count_features(const Features& features,
+                    const std::vector<std::uint8_t>& is_cell_expected,
+                    const Camera& camera,
+                    Regions& regions) {
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    const Eigen::Vector2d pixel(features.keypoints[i].x_px, features.keypoints[i].y_px);
+    if (!is_cell_expected[part_of(pixel, camera, kCells)]) continue;
+    ++regions[part_of(pixel, camera, kRegions)].num_features;
+  }
+}
+
+/// The part found, times the part that lies in regions that are explained.
+double judge(const Regions& regions) {
+  int num_possible = 0;
+  int num_found = 0;
+  int num_explained = 0;
+  for (const Region& region : regions) {
+    if (region.num_expected < kMinExpected) continue;
+    num_possible += region.num_possible();
+    num_found += region.num_found;
+    if (region.num_found > kMinRegionRatio * region.num_possible()) {
+      num_explained += region.num_possible();
+    }
+  }
+  if (num_possible == 0) return 0.0;
+  const double found = std::min(1.0, static_cast<double>(num_found) / num_possible);
+  return found * (static_cast<double>(num_explained) / num_possible);
 }
 
 }  // namespace
@@ -72,10 +116,6 @@ double place_confidence(const Rig& rig,
                         const Map& map,
                         KeyframeId nearby,
                         const Rigid3& rig_from_world) {
-  struct Region {
-    int num_expected = 0;
-    int num_found = 0;
-  };
   const Camera& camera = *rig.cameras[0].camera;
   const Expected expected = facing_landmarks(
       map.keyframes().at(nearby), features, map, rig.cameras[0].cam_from_rig * rig_from_world);
@@ -83,27 +123,17 @@ double place_confidence(const Rig& rig,
   std::vector<std::uint8_t> is_visible(expected.ids.size());
   camera.project(expected.points_in_cam, pixels, is_visible);
   const std::vector<LandmarkId> found = ascending(landmarks);
-  std::array<Region, kRegions * kRegions> regions;
+  Regions regions;
+  std::vector<std::uint8_t> is_cell_expected(kCells * kCells);
   for (std::size_t i = 0; i < expected.ids.size(); ++i) {
     if (!is_visible[i]) continue;
-    Region& region = regions[region_of(pixels[i], camera)];
+    is_cell_expected[part_of(pixels[i], camera, kCells)] = 1;
+    Region& region = regions[part_of(pixels[i], camera, kRegions)];
     ++region.num_expected;
     region.num_found += std::binary_search(found.begin(), found.end(), expected.ids[i]);
   }
-  int num_expected = 0;
-  int num_found = 0;
-  int num_explained = 0;
-  for (const Region& region : regions) {
-    if (region.num_expected < kMinExpected) continue;
-    num_expected += region.num_expected;
-    num_found += region.num_found;
-    if (region.num_found > kMinRegionRatio * region.num_expected) {
-      num_explained += region.num_expected;
-    }
-  }
-  if (num_expected == 0) return 0.0;
-  return (static_cast<double>(num_found) / num_expected) *
-         (static_cast<double>(num_explained) / num_expected);
+  count_features(features, is_cell_expected, camera, regions);
+  return judge(regions);
 }
 
 }  // namespace waymark

@@ -14,7 +14,10 @@ namespace {
 
 /// The candidate and those that share most landmarks with it.
 constexpr std::size_t kNumMatchedKeyframes = 3;
-constexpr AppearanceOptions kAppearance = {.max_distance = 60, .max_ratio = 0.85};
+/// Of the many landmarks that look alike those remain that agree on how the camera turned, unless
+/// so few do that it may be chance: where the scene is near, the parallax differs.
+constexpr AppearanceOptions kAppearance = {.max_distance = 60, .max_ratio = 0.9};
+constexpr std::size_t kMinAgreeing = 8;
 /// Fewer matches, or fewer that agree on a pose, are chance more often than not.
 constexpr std::size_t kMinMatches = 20;
 constexpr std::size_t kMinConsensus = 15;
@@ -151,8 +154,10 @@ void PlaceLocator::match_keyframe(const Features& features, const Map& map, Keyf
   for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
     if (keyframe.landmarks[i].is_valid()) with_landmark_.push_back(i);
   }
-  for (const FeatureMatch& match :
-       appearance_.match_all(*keyframe.features, with_landmark_, features, kAppearance)) {
+  const auto alike =
+      appearance_.match_all(*keyframe.features, with_landmark_, features, kAppearance);
+  const auto agreeing = turn_vote_.agreeing(*keyframe.features, features, alike);
+  for (const FeatureMatch& match : agreeing.size() >= kMinAgreeing ? agreeing : alike) {
     matches_.push_back({match.b, keyframe.landmarks[match.a], match.distance});
   }
 }

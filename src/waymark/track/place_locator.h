@@ -12,6 +12,7 @@
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
+#include "waymark/match/turn_vote.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/local_map.h"
@@ -99,6 +100,7 @@ class PlaceLocator {
   const std::shared_ptr<const Rig> rig_;
   const std::uint64_t seed_;
   AppearanceMatcher appearance_;
+  TurnVote turn_vote_;
   ProjectionMatcher matcher_;
   FrameLocator locator_;
   PoseObservations observations_;
