@@ -1,1 +1,135 @@
-export const programCases = [];
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+import assert from "node:assert/strict";
+import { spawn } from "node:child_process";
+import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { createServer } from "node:net";
+import { tmpdir } from "node:os";
+import { join } from "node:path";
+import { open, picture, pickSomething, report, until } from "./chromium.mjs";
+
+const isOpen = (w) => w.connection === "open" && !w.isLoading && w.generation > 0;
+
+/** A port that nobody listens on. */
+function freePort() {
+  return new Promise((resolve) => {
+    const server = createServer();
+    server.listen(0, "127.0.0.1", () => {
+      const { port } = server.address();
+      server.close(() => resolve(port));
+    });
+  });
+}
+
+/** Starts the program and waits until it serves; it is ended with the case. */
+async function start({ waymark, cleanUp }, port, ...args) {
+  const child = spawn(waymark, args, { stdio: ["ignore", "pipe", "pipe"] });
+  let output = "";
+  child.stdout.on("data", (data) => (output += data));
+  child.stderr.on("data", (data) => (output += data));
+  const ended = new Promise((resolve) => child.on("exit", resolve));
+  const end = async () => {
+    child.kill("SIGINT");
+    const timer = setTimeout(() => child.kill("SIGKILL"), 20000);
+    const status = await ended;
+    clearTimeout(timer);
+    return status;
+  };
+  cleanUp.push(end);
+  for (let i = 0; i < 300 && child.exitCode === null; ++i) {
+    const answer = await fetch(`http://127.0.0.1:${port}/status`).catch(() => null);
+    if (answer?.ok) return { end, ended, output: () => output };
+    await new Promise((resolve) => setTimeout(resolve, 100));
+  }
+  throw new Error(`the program does not serve:\n${output}`);
+}
+
+function folder({ cleanUp }) {
+  const made = mkdtempSync(join(tmpdir(), "waymark-"));
+  cleanUp.push(() => rmSync(made, { recursive: true, force: true }));
+  return made;
+}
+
+const status = async (port) => (await fetch(`http://127.0.0.1:${port}/status`)).json();
+
+/** The page's counts are those of the engine once the session stands still. */
+async function agrees(page, port) {
+  await until(page, (w) => w.session.landmarks === w.landmarks && w.session.keyframes === w.keyframes);
+  const [engine, shown] = [await status(port), await report(page)];
+  assert.deepEqual([shown.landmarks, shown.keyframes], [engine.landmarks, engine.keyframes]);
+  return { engine, shown };
+}
+
+async function showsARun(context) {
+  const out = folder(context);
+  const port = await freePort();
+  const args = [context.input, "--viewer", String(port), "--pace", "0.5", "-o", out, "--map-out", join(out, "map.wmap")];
+  const program = await start(context, port, "run", ...args);
+  const page = await open(context.browser, `http://127.0.0.1:${port}/`, { isDark: true });
+  await until(page, (w) => w.connection === "open" && w.landmarks > 0 && w.keyframes > 0 && w.trajectory > 0);
+  const first = await report(page);
+  await until(page, (w, b) => w.keyframes > b.keyframes && w.landmarks !== b.landmarks && w.trajectory > b.trajectory, first);
+  const press = (control) => page.click(`[data-control=${control}]`);
+  await press("pause");
+  await until(page, (w) => w.session.phase === "paused");
+  const { shown } = await agrees(page, port);
+  assert.ok(shown.trajectory > 0.5 * shown.frames);
+
+  const late = await open(context.browser, `http://127.0.0.1:${port}/`, { isPhone: true });
+  await until(late, isOpen);
+  const other = (await agrees(late, port)).shown;
+  assert.deepEqual([other.landmarks, other.keyframes, other.frames], [shown.landmarks, shown.keyframes, shown.frames]);
+  await picture(late, `${context.pictures}/program_phone_light.png`);
+  assert.deepEqual(late.problems, []);
+  await late.context().close();
+
+  await press("save");
+  await page.waitForFunction(() => document.querySelector("#controls").textContent.includes("Saved to"));
+  assert.ok(existsSync(join(out, "map.wmap")));
+  await pickSomething(page);
+  await page.waitForSelector("#inspector .link");
+  await page.keyboard.press("Escape");
+  await press("mapping");
+  await until(page, (w) => !w.session.is_mapping);
+  await press("mapping");
+  await until(page, (w) => w.session.is_mapping);
+  await press("pause");
+  await until(page, (w) => w.session.phase === "running");
+  await until(page, (w, b) => w.frames > b.frames + 5, shown);
+  await picture(page, `${context.pictures}/program_desktop_dark.png`);
+
+  const { generation } = await report(page);
+  await press("reset");
+  await press("reset");
+  await until(page, (w, g) => w.generation > g && !w.isLoading, generation);
+  await press("stop");
+  await press("stop");
+  await until(page, (w) => w.connection === "waiting", null, 60000);
+  assert.equal(await program.ended, 0, program.output());
+  assert.deepEqual(page.problems, []);
+}
+
+async function outlivesARestart(context) {
+  const out = folder(context);
+  const port = await freePort();
+  const args = ["run", context.input, "--viewer", String(port), "--pace", "2", "-o", out, "--map-out", join(out, "map.wmap")];
+  const first = await start(context, port, ...args);
+  const page = await open(context.browser, `http://127.0.0.1:${port}/`);
+  await until(page, (w) => w.connection === "waiting" && w.landmarks > 0, null, 90000);
+  assert.equal(await first.ended, 0, first.output());
+  const shown = await report(page);
+  assert.deepEqual([shown.landmarks, shown.keyframes], [shown.session.landmarks, shown.session.keyframes], "the last map stays");
+  const [, keyframes, landmarks] = first.output().match(/(\d+) keyframes, (\d+) landmarks/).map(Number);
+  assert.deepEqual([shown.landmarks, shown.keyframes], [landmarks, keyframes], "it is what the program says at its end");
+
+  await start(context, port, "view", join(out, "map.wmap"), "--port", String(port));
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.session.phase === "map");
+  const saved = (await agrees(page, port)).shown;
+  assert.deepEqual([saved.landmarks, saved.keyframes], [shown.landmarks, shown.keyframes], "the saved map is that of the run");
+  assert.equal(saved.trajectory, saved.keyframes);
+  await picture(page, `${context.pictures}/program_map_light.png`);
+  assert.deepEqual(page.problems, []);
+}
+
+/** Need the program (`context.waymark`) and a sequence for it (`context.input`). */
+export const programCases = [showsARun, outlivesARestart];

@@ -15,7 +15,7 @@ export class SelectionLayer {
   private count = 0;
 
   constructor() {
-    this.lines = new LineSegments(geometryOf(this.rays), plainMaterial(0.3));
+    this.lines = new LineSegments(geometryOf(this.rays), plainMaterial(0.14));
     this.dots = new Points(geometryOf(this.ends), plainMaterial(1));
     this.lines.frustumCulled = this.dots.frustumCulled = false;
     this.finish();
@@ -27,7 +27,7 @@ export class SelectionLayer {
   }
 
   setPixelRatio(ratio: number): void {
-    this.dots.material.uniforms["dotSize"]!.value = 4 * ratio;
+    this.dots.material.uniforms["dotSize"]!.value = 3.5 * ratio;
   }
 
   clear(): void {

@@ -47,7 +47,7 @@ export class Inspector {
     const slot = this.store.keyframes.slots.find(data.id);
     const facts = rows([
       ["Time", slot >= 0 ? clock(this.store.keyframes.time_s[slot]!) : ""],
-      ["Timestamp", `${data.timestamp_ns} ns`],
+      ["Time stamp, ns", data.timestamp_ns],
       ["Frame", grouped(data.frame)],
       ["Part", String(data.submap)],
       ["Camera", data.camera],
@@ -87,7 +87,7 @@ export class Inspector {
 }
 
 function rows(items: [string, string][]): HTMLElement {
-  return make("dl", {}, ...items.flatMap(([name, value]) => [make("dt", {}, name), make("dd", {}, value)]));
+  return make("dl", {}, ...items.flatMap(([name, value]) => [make("dt", {}, name), make("dd", { "data-small": value.length > 16 }, value)]));
 }
 
 function position(p: number[]): string {
