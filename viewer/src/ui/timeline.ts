@@ -164,12 +164,16 @@ export class Timeline {
     const top = quantile(values, 0.99);
     const floor = this.isLive ? 0 : low - 0.15 * (top - low);
     const unit = (height - 18) / Math.max(1e-6, top - floor);
+    const mostBetween = this.isLive ? Math.max(2, (3 * values.length) / this.store.trajectory.count) : Infinity;
     let last = -1;
+    let next = 0;
     for (let column = 0; column < values.length; ++column) {
       if (worst[column] !== 255) last = column;
-      // Between frames the profile goes on, but not across gaps.
-      if (last < 0 || column - last > Math.max(2, values.length / 100)) continue;
-      const value = values[last]!;
+      // Between frames the profile goes on, but not across gaps; the way of a map, which has keyframes only, goes straight on.
+      if (last < 0 || column - last > mostBetween) continue;
+      while (next < values.length && (next <= last || worst[next] === 255)) ++next;
+      const share = this.isLive || next === values.length ? 0 : (column - last) / (next - last);
+      const value = values[last]! + (share > 0 ? share * (values[next]! - values[last]!) : 0);
       const tall = value > -Infinity ? Math.max(1, Math.min(height, (value - floor) * unit)) : 0;
       context.fillStyle = colours[worst[last]!] ?? "gray";
       context.globalAlpha = 0.3;
