@@ -3,15 +3,14 @@
 #include "waymark/loop/map_merger.h"
 
 #include <optional>
-#include <set>
 #include <utility>
 #include <vector>
 
 #include "waymark/loop/link_finder.h"
 #include "waymark/loop/loop_closing.h"
 #include "waymark/loop/loop_finder.h"
+#include "waymark/loop/overlaps.h"
 #include "waymark/map/parts.h"
-#include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
 
 namespace waymark {
@@ -46,8 +45,7 @@ class MapMerger {
       for (const KeyframeId query : queries) look_for_place_of(query);
       if (merged_.num_joins == num_joins_before) break;
     }
-    adjust();
-    if (look_for_links()) adjust();
+    if (merged_.num_joins > 0) finish();
     merged_.map = mapper_.freeze();
     return std::move(merged_);
   }
@@ -66,17 +64,14 @@ class MapMerger {
       }
     });
     ++(is_join ? merged_.num_joins : merged_.num_loops);
-    touched_.insert(mapper_.map().keyframes().at(query).submap);
   }
 
-  /// What was joined at one place may touch elsewhere, too. Whether anything was found.
-  bool look_for_links() {
+  /// What was joined at one place may touch elsewhere, too.
+  void finish() {
+    mapper_.refine_globally();
     std::vector<KeyframeId> queries;
-    const std::set<SubmapId> submaps = touched();
-    mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-      if (submaps.contains(keyframe.submap)) queries.push_back(id);
-    });
-    const int num_before = merged_.num_loops;
+    mapper_.map().keyframes().for_each(
+        [&](KeyframeId id, const Keyframe&) { queries.push_back(id); });
     for (const KeyframeId query : queries) {
       const std::optional<Revisit> link = link_finder_.find(mapper_.map(), query);
       if (!link) continue;
@@ -84,21 +79,9 @@ class MapMerger {
           [&](Map& map, DirtyLandmarks& dirty) { close_loop(map, *link, projection_, dirty); });
       ++merged_.num_loops;
     }
-    return merged_.num_loops > num_before;
-  }
-
-  std::set<SubmapId> touched() const {
-    std::set<SubmapId> submaps;
-    for (const SubmapId id : touched_) submaps.insert(mapper_.map().resolve(id));
-    return submaps;
-  }
-
-  void adjust() {
-    for (const SubmapId submap : touched()) {
-      mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
-        apply_adjustment(map, adjust_globally(map, submap), dirty);
-      });
-    }
+    mapper_.change(
+        [&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
+    mapper_.refine_globally();
   }
 
   const KeyframeId first_;
@@ -108,7 +91,6 @@ class MapMerger {
   LoopFinder finder_;
   LinkFinder link_finder_;
   ProjectionMatcher projection_;
-  std::set<SubmapId> touched_;
   MergedMaps merged_;
 };
 

@@ -17,7 +17,7 @@ struct MergedMaps {
 };
 
 /// Puts b behind a (see unite()), and where keyframes of b show places of a, joins their sub-maps
-/// and closes the loops that this makes, then adjusts what was joined as a whole. Frame and units
+/// and closes the loops that this makes, then links and adjusts all of it. Frame and units
 /// are those of the older sub-map, of which a has all. Sub-maps in metres are not compared with
 /// those whose scale is free. The same maps and seed give the same bits.
 MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed);
