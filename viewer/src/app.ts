@@ -199,7 +199,8 @@ export class App implements Listener {
       "3": () => this.setView("top", true), Escape: () => void this.inspector.select(null),
     };
     addEventListener("keydown", (event) => {
-      if (event.ctrlKey || event.metaKey || event.altKey || event.target instanceof HTMLButtonElement) return;
+      const isPress = event.key === " " && event.target instanceof HTMLButtonElement;
+      if (isPress || event.ctrlKey || event.metaKey || event.altKey) return;
       const act = keys[event.key];
       if (!act) return;
       event.preventDefault();
