@@ -43,7 +43,7 @@ export const report = (page) =>
   });
 
 /** Waits until the page says so; `condition` is evaluated in the page with its report. */
-export async function until(page, condition, argument, timeout = 30000) {
+export async function until(page, condition, argument, timeout = 60000) {
   const check = new Function("argument", `return (${condition})(window.waymark, argument)`);
   await page.waitForFunction(check, argument, { timeout, polling: 100 });
 }
