@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <map>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "waymark/base/check.h"
@@ -13,6 +14,7 @@
 #include "waymark/camera/resized_camera.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/image/reduce.h"
+#include "waymark/system/temporary_map.h"
 #include "waymark/track/keyframes_near.h"
 #include "waymark/track/relocalizer.h"
 #include "waymark/track/tracker.h"
@@ -21,6 +23,12 @@ namespace waymark {
 namespace {
 
 constexpr std::size_t kMaxNearHint = 5;
+/// A stream that sees fewer landmarks of the map needs others; when it sees enough again, not.
+constexpr int kFewLandmarks = 80;
+constexpr int kEnoughLandmarks = 100;
+/// One that has seen fewer than this for longer has left the map.
+constexpr int kMinLandmarks = 20;
+constexpr std::int64_t kMaxBridgeNs = 2'000'000'000;
 
 /// Images that are finer than those of the map by less are taken as they are.
 constexpr double kMinReduction = 0.8;
@@ -72,6 +80,7 @@ class Localizer::Impl {
         uses_range_(is_metric(*map)),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         snapshot_(index_map(std::move(map))),
+        temporary_(rig_, snapshot_),
         tracker_(rig_, uses_range_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
         relocalizer_(rig_, settings.tracking, static_cast<std::uint64_t>(settings.seed)) {
     tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
@@ -85,6 +94,8 @@ class Localizer::Impl {
   Frame build(const FrameInput& input, TrackingResult& result);
   std::shared_ptr<const Features> find_features(const FrameImages& images);
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
+  /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
+  void bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns);
 
   const Rig full_rig_;
   const double reduction_;
@@ -92,6 +103,9 @@ class Localizer::Impl {
   const bool uses_range_;
   FrameBuilder builder_;
   const MapSnapshot snapshot_;
+  TemporaryMap temporary_;  ///< For the stream.
+  bool is_on_temporary_ = false;
+  std::int64_t last_in_map_ns_ = 0;
   Tracker tracker_;
   Relocalizer relocalizer_;
   std::uint32_t num_frames_ = 0;
@@ -133,7 +147,8 @@ TrackingResult Localizer::Impl::track(const FrameInput& input) {
   TrackingResult result;
   const Frame frame = build(input, result);
   last_timestamp_ns_ = input.timestamp_ns;
-  const TrackOutcome outcome = tracker_.track(frame, snapshot_, result.stages);
+  const TrackOutcome outcome = tracker_.track(frame, temporary_.visible(), result.stages);
+  bridge_gaps(outcome, input.timestamp_ns);
   result.state = outcome.state;
   result.reason = outcome.reason;
   if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
@@ -143,6 +158,27 @@ TrackingResult Localizer::Impl::track(const FrameInput& input) {
   result.num_candidates = outcome.num_candidates;
   result.submap = outcome.submap;
   return result;
+}
+
+void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns) {
+  const LandmarkId end = snapshot_.map->landmarks().end_id();
+  const auto num_lasting =
+      std::count_if(outcome.seen.begin(), outcome.seen.end(), [&](const SeenLandmark& seen) {
+        return seen.landmark.value < end.value;
+      });
+  if (num_lasting >= kMinLandmarks) last_in_map_ns_ = timestamp_ns;
+  const bool has_left = timestamp_ns - last_in_map_ns_ > kMaxBridgeNs;
+  if (is_on_temporary_ && outcome.pose && num_lasting < kEnoughLandmarks && !has_left) {
+    if (!outcome.message) return;
+    temporary_.add(std::get<NewKeyframe>(*outcome.message));
+  } else if (is_on_temporary_) {
+    is_on_temporary_ = false;
+    temporary_.clear();
+    tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
+  } else if (outcome.pose && num_lasting < kFewLandmarks) {
+    is_on_temporary_ = true;
+    tracker_.continue_in(*snapshot_.map, TrackingPurpose::kMapping);
+  }
 }
 
 TrackingResult Localizer::Impl::locate(const FrameInput& input,

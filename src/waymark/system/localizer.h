@@ -36,6 +36,8 @@ class Localizer {
   const Map& map() const;
 
   /// The next image of a stream: looked for near the one before, and anywhere where it is not.
+  /// Where the map shows too little, for two seconds at most, landmarks that the stream itself saw
+  /// make up for it.
   TrackingResult track(const FrameInput& input);
 
   /// An image by itself: looked for near the hint, if there is one, and anywhere where it is not.

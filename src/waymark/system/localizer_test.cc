@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "waymark/base/check.h"
@@ -94,6 +95,52 @@ TEST(Localizer, FollowsAStreamOfAnotherCamera) {
   }
   EXPECT_EQ(scene().map->keyframes().size(), num_keyframes);
   EXPECT_THROW(localizer.track(input_of(scene().frames[0])), InputError);
+}
+
+/// A mask that leaves the columns from first to end.
+Image columns(int first, int end) {
+  Image mask(400, 260);
+  for (int v = 0; v < 260; ++v) std::fill(mask.row(v) + first, mask.row(v) + end, 255);
+  return mask;
+}
+
+/// How much of the left is covered: for a while nearly all that the map shows, and then all.
+int num_covered(std::size_t frame) {
+  if (frame < 4 || frame >= 14) return 0;
+  return frame < 10 ? 150 : 220;
+}
+
+TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
+  const Image left = columns(0, 200);
+  System system(scene().query.rig(), small_settings(), Timing::kInline);
+  for (const SimulatedFrame& frame : scene().frames) {
+    FrameInput input = input_of(frame);
+    input.mask = left.view();
+    system.feed(input);
+  }
+  system.finish();
+  const auto map = system.map();
+  const Rigid3 map_from_world = scene().query.world_from_rig(0).inverse();
+  for (const bool has_depth : {true, false}) {
+    Localizer localizer(scene().query.rig(), small_settings(), map);
+    for (std::size_t i = 0; i < scene().frames.size(); ++i) {
+      FrameInput input = input_of(scene().frames[i]);
+      if (!has_depth) input.depth = {};
+      const Image mask = columns(num_covered(i), 400);
+      input.mask = mask.view();
+      const bool is_found_alone = localizer.locate(input).world_from_rig.has_value();
+      EXPECT_TRUE(num_covered(i) < 200 || !is_found_alone) << "frame " << i;
+      const TrackingResult result = localizer.track(input);
+      ASSERT_TRUE(result.world_from_rig) << "frame " << i << ", depth " << has_depth;
+      const Rigid3 truth = map_from_world * scene().frames[i].world_from_rig;
+      const Rigid3 error = truth.inverse() * *result.world_from_rig;
+      // Without depth it drifts until the frame after the one that sees the map again.
+      const bool drifts = !has_depth && i >= 10 && i < 15;
+      EXPECT_LT(error.translation.norm(), drifts ? 0.2 : 0.03) << "frame " << i;
+      EXPECT_LT(error.log().tail<3>().norm(), drifts ? 0.05 : 0.01) << "frame " << i;
+    }
+    EXPECT_EQ(&localizer.map(), map.get());
+  }
 }
 
 TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {

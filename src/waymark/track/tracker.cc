@@ -46,6 +46,28 @@ void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
   num_submaps_ = static_cast<std::uint32_t>(map.submaps().size());
 }
 
+void Tracker::continue_in(const Map& map, TrackingPurpose purpose) {
+  purpose_ = purpose;
+  num_sent_ = map.keyframes().end_id().value;
+  sightings_.clear();
+  local_map_source_.reset();
+  std::erase_if(local_.keyframes, [&](KeyframeId id) { return !map.keyframes().contains(id); });
+  for (LandmarkId& id : last_landmarks_) {
+    if (!map.landmarks().contains(id)) id = LandmarkId{};
+  }
+  if (!last_pose_.reference.is_valid() || map.keyframes().contains(last_pose_.reference)) return;
+  const Rigid3 last = map_->rig_from_world(
+      last_pose_.reference, last_pose_.rig_from_reference, last_pose_.reference_scale);
+  last_pose_ = RelativePose{};
+  if (local_.keyframes.empty()) {
+    mode_ = Mode::kLost;
+    return;
+  }
+  const Keyframe& reference = map.keyframes().at(local_.keyframes.front());
+  last_pose_ = {
+      local_.keyframes.front(), last * reference.rig_from_world.inverse(), reference.applied_scale};
+}
+
 TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, StageTimes& times) {
   map_ = visible.map;
   places_ = visible.places;

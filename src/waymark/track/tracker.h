@@ -65,6 +65,10 @@ class Tracker {
   /// Whether the map goes on growing, or stays as it is while the camera is followed in it.
   void set_purpose(TrackingPurpose purpose) { purpose_ = purpose; }
 
+  /// Goes on between two frames with this purpose in a map that lacks what is newest of the one so
+  /// far, or nothing. What is not in it is forgotten.
+  void continue_in(const Map& map, TrackingPurpose purpose);
+
   /// visible: the newest map that this frame may see; empty before the first sub-map.
   TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
 

@@ -1,0 +1,44 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+
+#include "waymark/mapping/associate.h"
+#include "waymark/match/epipolar.h"
+#include "waymark/track/map_snapshot.h"
+#include "waymark/track/messages.h"
+
+namespace waymark {
+
+/// A map that stays as it is, and on top of it what a stream has seen lately: keyframes and
+/// landmarks to get along with where the map shows too little, to be thrown away afterwards. They
+/// are put where tracking and triangulation say; nothing is adjusted, so that the map's own part
+/// does not move.
+class TemporaryMap {
+ public:
+  /// rig: the one that sees the stream.
+  TemporaryMap(std::shared_ptr<const Rig> rig, const MapSnapshot& lasting);
+
+  /// Both parts together.
+  const MapSnapshot& visible() const { return visible_; }
+  const MapSnapshot& lasting() const { return lasting_; }
+
+  /// Adds a keyframe and makes landmarks of what it shows that no landmark explains yet.
+  void add(const NewKeyframe& message);
+
+  /// Only the map that stays remains.
+  void clear();
+
+ private:
+  KeyframeId insert(const NewKeyframe& message);
+
+  const std::shared_ptr<const Rig> rig_;
+  const MapSnapshot lasting_;
+  MapSnapshot visible_;
+  Map map_;
+  DirtyLandmarks dirty_;
+  EpipolarMatcher epipolar_;
+};
+
+}  // namespace waymark
