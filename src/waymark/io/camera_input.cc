@@ -20,6 +20,14 @@
 namespace waymark {
 namespace {
 
+/// Where there is Video for Linux, only that is asked: other backends look for devices of their
+/// own on every bus, and the library of one leaks what it finds.
+#ifdef __linux__
+constexpr int kDevices = cv::CAP_V4L2;
+#else
+constexpr int kDevices = cv::CAP_ANY;
+#endif
+
 /// The N of camera:N, nothing for a device.
 std::optional<int> number_of(const std::filesystem::path& path) {
   constexpr std::string_view kPrefix = "camera:";
@@ -68,7 +76,7 @@ class CameraInput : public Input {
     const std::optional<int> number = number_of(path);
     try {
       if (number) {
-        capture_.open(*number, cv::CAP_ANY);
+        capture_.open(*number, kDevices);
       } else {
         capture_.open(path.string(), cv::CAP_V4L2);
       }
