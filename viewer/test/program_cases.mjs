@@ -96,6 +96,8 @@ async function showsARun(context) {
   await press("pause");
   await until(page, (w) => w.session.phase === "running");
   await until(page, (w, b) => w.frames > b.frames + 5, shown);
+  await press("pause"); // Whatever the browser takes: the input does not end before the end is asked for.
+  await until(page, (w) => w.session.phase === "paused");
   await picture(page, `${context.pictures}/program_desktop_dark.png`);
 
   const { generation } = await report(page);
