@@ -7,11 +7,25 @@
 
 namespace waymark {
 
-ScaledCamera::ScaledCamera(std::shared_ptr<const Camera> camera, double factor)
-    : Camera(camera->width_px(), camera->height_px()),
+ScaledCamera::ScaledCamera(std::shared_ptr<const Camera> camera, double factor, const Image& image)
+    : Camera(image.width_px, image.height_px),
       camera_(std::move(camera)),
       factor_(factor),
-      center_px_(principal_point(*camera_)) {}
+      wrap_width_px_(image.wrap_width_px),
+      fixed_px_(image.fixed_px) {}
+
+ScaledCamera ScaledCamera::refocused(std::shared_ptr<const Camera> camera, double factor) {
+  const Image image{camera->width_px(), camera->height_px(), 0.0, principal_point(*camera)};
+  return {std::move(camera), factor, image};
+}
+
+ScaledCamera ScaledCamera::resized(std::shared_ptr<const Camera> camera, double factor) {
+  const Image image{static_cast<int>(factor * camera->width_px()),
+                    static_cast<int>(factor * camera->height_px()),
+                    factor * camera->wrap_width_px(),
+                    {-0.5, -0.5}};
+  return {std::move(camera), factor, image};
+}
 
 void ScaledCamera::project(std::span<const Eigen::Vector3d> points_in_cam,
                            std::span<Eigen::Vector2d> pixels,
@@ -41,7 +55,7 @@ void ScaledCamera::unproject(std::span<const Eigen::Vector2d> pixels,
                              std::span<Eigen::Vector3d> bearings,
                              std::span<std::uint8_t> is_valid) const {
   std::vector<Eigen::Vector2d> unscaled(pixels.begin(), pixels.end());
-  for (Eigen::Vector2d& pixel : unscaled) pixel = center_px_ + (pixel - center_px_) / factor_;
+  for (Eigen::Vector2d& pixel : unscaled) pixel = fixed_px_ + (pixel - fixed_px_) / factor_;
   camera_->unproject(unscaled, bearings, is_valid);
   // What the camera itself would not show has no projection either.
   for (std::size_t i = 0; i < unscaled.size(); ++i) is_valid[i] &= camera_->contains(unscaled[i]);

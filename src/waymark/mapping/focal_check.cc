@@ -103,7 +103,7 @@ Scene collect(const Map& map, KeyframeId newest) {
 /// none there have no weight.
 void measure_anew(const Rig& rig, double log_factor, Scene& scene) {
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
-    const ScaledCamera scaled(rig.cameras[camera].camera, std::exp(log_factor));
+    const auto scaled = ScaledCamera::refocused(rig.cameras[camera].camera, std::exp(log_factor));
     TangentComputer computer;
     const TangentArrays& tangents = computer.compute(scaled, scene.pixels, scene.level_scales);
     for (std::size_t i = 0; i < scene.pixels.size(); ++i) {

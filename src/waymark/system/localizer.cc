@@ -11,7 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
 #include "waymark/camera/pixel_angles.h"
-#include "waymark/camera/resized_camera.h"
+#include "waymark/camera/scaled_camera.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/image/reduce.h"
 #include "waymark/system/temporary_map.h"
@@ -56,7 +56,7 @@ double reduction_for(const Rig& rig, const Map& map) {
 Rig reduced(Rig rig, double factor) {
   if (factor == 1.0) return rig;
   for (RigCamera& camera : rig.cameras) {
-    camera.camera = std::make_shared<ResizedCamera>(camera.camera, factor);
+    camera.camera = std::make_shared<ScaledCamera>(ScaledCamera::resized(camera.camera, factor));
   }
   return rig;
 }
