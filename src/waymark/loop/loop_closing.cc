@@ -85,4 +85,19 @@ void join_submaps(Map& map,
   fuse_sides(map, revisit, sides, matcher, dirty);
 }
 
+bool close_revisit(Map& map,
+                   PlaceIndex& places,
+                   const Revisit& revisit,
+                   ProjectionMatcher& matcher,
+                   DirtyLandmarks& dirty) {
+  const auto& keyframes = map.keyframes();
+  const bool is_join = keyframes.at(revisit.query).submap != keyframes.at(revisit.match).submap;
+  if (is_join) {
+    join_submaps(map, places, revisit, matcher, dirty);
+  } else {
+    close_loop(map, revisit, matcher, dirty);
+  }
+  return is_join;
+}
+
 }  // namespace waymark

@@ -27,4 +27,11 @@ void join_submaps(Map& map,
                   ProjectionMatcher& matcher,
                   DirtyLandmarks& dirty);
 
+/// Closes the loop or joins the sub-maps, whichever the revisit is; true of a join.
+bool close_revisit(Map& map,
+                   PlaceIndex& places,
+                   const Revisit& revisit,
+                   ProjectionMatcher& matcher,
+                   DirtyLandmarks& dirty);
+
 }  // namespace waymark

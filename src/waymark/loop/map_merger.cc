@@ -54,14 +54,9 @@ class MapMerger {
   void look_for_place_of(KeyframeId query) {
     const std::optional<Revisit> revisit = finder_.find(mapper_.map(), places_, query);
     if (!revisit) return;
-    const auto& keyframes = mapper_.map().keyframes();
-    const bool is_join = keyframes.at(revisit->query).submap != keyframes.at(revisit->match).submap;
+    bool is_join = false;
     mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
-      if (is_join) {
-        join_submaps(map, places_, *revisit, projection_, dirty);
-      } else {
-        close_loop(map, *revisit, projection_, dirty);
-      }
+      is_join = close_revisit(map, places_, *revisit, projection_, dirty);
     });
     ++(is_join ? merged_.num_joins : merged_.num_loops);
   }
