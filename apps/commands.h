@@ -3,6 +3,8 @@
 #pragma once
 
 #include <functional>
+#include <string>
+#include <vector>
 
 namespace CLI {
 class App;
@@ -12,6 +14,10 @@ namespace waymark {
 
 /// What a parsed command line is to do; returns the exit status.
 using Command = std::function<int()>;
+
+/// The program itself: from arguments, the name of a command first, to the exit status. Throws
+/// InputError and OutputError.
+using Program = std::function<int(const std::vector<std::string>&)>;
 
 /// Each adds one subcommand with its options and, once parsed, leaves in command what to do.
 void add_run_command(CLI::App& program, Command& command);
@@ -23,6 +29,7 @@ void add_config_command(CLI::App& program, Command& command);
 void add_export_command(CLI::App& program, Command& command);
 void add_import_command(CLI::App& program, Command& command);
 void add_view_command(CLI::App& program, Command& command);
+void add_demo_command(CLI::App& program, Command& command, Program run_program);
 
 /// Exit status of the program.
 inline constexpr int kDone = 0;

@@ -11,6 +11,7 @@
 #include <cstdio>
 #include <exception>
 #include <string>
+#include <vector>
 
 #include "commands.h"
 #include "waymark/base/check.h"
@@ -26,8 +27,8 @@ int fail(int status, std::string message) {
 }
 
 /// The parser itself would say only that a command is missing.
-void check_command_name(const CLI::App& program, int argc, char** argv) {
-  const std::string name = argc > 1 ? argv[1] : "";
+void check_command_name(const CLI::App& program, const std::vector<std::string>& arguments) {
+  const std::string name = arguments.empty() ? "" : arguments.front();
   if (name.empty() || name.front() == '-') return;
   std::string known;
   for (const CLI::App* command : program.get_subcommands({})) {
@@ -37,7 +38,7 @@ void check_command_name(const CLI::App& program, int argc, char** argv) {
   throw InputError("command line", fmt::format("unknown command '{}', expected {}", name, known));
 }
 
-int run_program(int argc, char** argv) {
+int run_program(const std::vector<std::string>& arguments) {
   CLI::App program("Waymark: visual SLAM for any camera.", "waymark");
   program.require_subcommand(1);
   program.set_version_flag("--version", std::string("waymark ") + WAYMARK_VERSION);
@@ -46,6 +47,7 @@ int run_program(int argc, char** argv) {
       "Exit status: 0 done, 1 could not finish, 2 bad usage, settings or input, 3 no pose");
 
   Command command;
+  add_demo_command(program, command, run_program);
   add_run_command(program, command);
   add_localize_command(program, command);
   add_map_command(program, command);
@@ -56,9 +58,9 @@ int run_program(int argc, char** argv) {
   add_import_command(program, command);
   add_config_command(program, command);
 
-  check_command_name(program, argc, argv);
+  check_command_name(program, arguments);
   try {
-    program.parse(argc, argv);
+    program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::Success& help_or_version) {
     return program.exit(help_or_version);
   } catch (const CLI::ParseError& error) {
@@ -74,7 +76,7 @@ int main(int argc, char** argv) {
   // A file size limit would end the program; without the signal the write fails and is reported.
   signal(SIGXFSZ, SIG_IGN);
   try {
-    return waymark::run_program(argc, argv);
+    return waymark::run_program({argv + 1, argv + argc});
   } catch (const waymark::InputError& error) {
     return waymark::fail(waymark::kBadInput, error.what());
   } catch (const waymark::OutputError& error) {

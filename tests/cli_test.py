@@ -6,6 +6,7 @@ import array
 import fcntl
 import os
 import pathlib
+import pty
 import resource
 import shutil
 import signal
@@ -358,6 +359,30 @@ class BadInput(CliTest):
         self.assertEqual(self.summary()["tracked"], 0)
         self.assertIsNone(self.summary()["initialized_at"])
         self.assertEqual({f["reason"] for f in self.frames()}, {"no_features"})
+
+
+class Demo(CliTest):
+    def demo(self, *more):
+        return ["demo", "--world", "room", "--frames", "30", "--port", "0", "-o", self.out, *more]
+
+    def test_ends_with_a_map_and_its_accuracy(self):
+        done = waymark(*self.demo("--setup", "stereo"))
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("waymark run ", done.stdout)
+        self.assertRegex(done.stdout, r"coverage 100\.0 %")
+        self.assertRegex(done.stderr, "open http://")
+        self.assertEqual(waymark("map", "check", self.out / "map.wmap").returncode, 0)
+
+    def test_shows_the_map_until_interrupted_when_somebody_looks(self):
+        terminal, inner = pty.openpty()
+        process = subprocess.Popen([PROGRAM, *map(str, self.demo())], stdout=inner, stderr=subprocess.DEVNULL)
+        os.close(inner)
+        shown = ""
+        while "Ctrl-C ends" not in shown:
+            shown += os.read(terminal, 4096).decode()
+        process.send_signal(signal.SIGINT)
+        self.assertEqual(process.wait(timeout=60), 0)
+        os.close(terminal)
 
 
 class Example(CliTest):
