@@ -14,17 +14,15 @@
 #include <fstream>
 #include <string>
 
+#include "repeated_map.h"
 #include "waymark/io/map_file.h"
 #include "waymark/io/text.h"
-#include "waymark/map/parts.h"
 #include "waymark/place/place_index.h"
 
 namespace {
 
 using waymark::Keyframe;
 using waymark::KeyframeId;
-using waymark::Map;
-using waymark::MapParts;
 using waymark::StoredMap;
 
 /// A line of /proc/self/status in MB.
@@ -47,23 +45,9 @@ double time_ms(const Task& task) {
   return 1e3 * static_cast<double>(std::clock() - start) / CLOCKS_PER_SEC;
 }
 
-/// The features' bytes again for each copy, as if all of it had been seen.
-void copy_features(MapParts& parts) {
-  for (MapParts::StoredKeyframe& stored : parts.keyframes) {
-    stored.keyframe.features = std::make_shared<const waymark::Features>(*stored.keyframe.features);
-  }
-}
-
-std::shared_ptr<const Map> repeat(const Map& map, std::size_t num_keyframes) {
-  MapParts parts;
-  while (parts.keyframes.size() < num_keyframes) waymark::append_parts(map, parts);
-  copy_features(parts);
-  return Map::restore(std::move(parts)).freeze();
-}
-
 void measure(const std::filesystem::path& path, std::size_t num_keyframes) {
   StoredMap stored = waymark::load_map(path);
-  stored.map = repeat(*stored.map, num_keyframes);
+  stored.map = waymark::repeat_map(*stored.map, num_keyframes, true);
   stored.settings.clear();
   const std::filesystem::path file =
       std::filesystem::temp_directory_path() / ("waymark_benchmark." + std::to_string(getpid()));
