@@ -18,7 +18,12 @@ function(waymark_module name)
     add_executable(waymark_${name}_test ${MODULE_TESTS})
     target_link_libraries(waymark_${name}_test PRIVATE waymark_${name} ${MODULE_TEST_LINK}
                           GTest::gmock_main)
-    gtest_discover_tests(waymark_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
-                         PROPERTIES TIMEOUT 300 LABELS unit)
+    if(WAYMARK_TEST_WHOLE_PROGRAMS)
+      add_test(NAME ${name} COMMAND waymark_${name}_test)
+      set_tests_properties(${name} PROPERTIES TIMEOUT 900 LABELS unit)
+    else()
+      gtest_discover_tests(waymark_${name}_test TEST_PREFIX "${name}." DISCOVERY_TIMEOUT 60
+                           PROPERTIES TIMEOUT 300 LABELS unit)
+    endif()
   endif()
 endfunction()
