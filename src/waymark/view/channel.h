@@ -14,7 +14,7 @@ struct ViewChannel {
   Mailbox<ViewUpdate> updates{64};
   Mailbox<ViewRequest> requests{64};
   Mailbox<ViewReply> replies{64};
-  /// Set by the viewer when somebody watches and no image is under way, cleared by the session.
+  /// Set by the viewer when it could take one, cleared by the session.
   std::atomic<bool> wants_image{false};
 };
 

@@ -45,12 +45,9 @@ void ViewHub::tick(Clock::time_point now) {
     }
   }
   send_frames(now);
-  bool is_watched = false;
-  for (const auto& [number, client] : clients_) {
-    is_watched |= client->max_rate_hz > 0.0;
-    client->send();
-  }
-  if (is_watched && !frame_) channel_.wants_image.store(true, std::memory_order_relaxed);
+  for (const auto& [number, client] : clients_) client->send();
+  // Also while nobody watches: who comes when the session is paused sees where it stands.
+  channel_.wants_image.store(true, std::memory_order_relaxed);
 }
 
 bool ViewHub::take_updates() {
@@ -69,7 +66,12 @@ bool ViewHub::take_updates() {
       for (const Message& message : messages) client->outbox.add(message);
     }
   }
-  if (update->image && !clients_.empty()) frame_ = encode_frame(*update->image, scene_.start_ns());
+  if (update->is_reset) image_.reset();
+  if (update->image) {
+    image_ = std::move(update->image);
+    last_frame_.reset();
+    is_frame_new_ = true;
+  }
   return true;
 }
 
@@ -85,19 +87,24 @@ void ViewHub::send_snapshots() {
     if (snapshot_.empty()) snapshot_ = scene_.snapshot();
     client->outbox.add_snapshot(snapshot_);
     client->outbox.set_status(text(status()));
+    if (image_ && client->max_rate_hz > 0.0) client->outbox.set_frame(last_frame());
   }
 }
 
 void ViewHub::send_frames(Clock::time_point now) {
-  if (!frame_) return;
+  if (!std::exchange(is_frame_new_, false)) return;
   for (const auto& [number, client] : clients_) {
     // A little early is right: ticks do not fall on the beat of the client.
     const std::chrono::duration<double> since = now - client->last_frame_;
     if (since.count() * client->max_rate_hz < 0.9) continue;
     client->last_frame_ = now;
-    client->outbox.set_frame(frame_);
+    client->outbox.set_frame(last_frame());
   }
-  frame_.reset();
+}
+
+Message ViewHub::last_frame() {
+  if (!last_frame_) last_frame_ = encode_frame(*image_, scene_.start_ns());
+  return last_frame_;
 }
 
 std::uint64_t ViewHub::add(std::shared_ptr<ViewClient> client) {

@@ -66,6 +66,8 @@ class ViewHub {
   void take_replies();
   void send_snapshots();
   void send_frames(Clock::time_point now);
+  /// The message of image_.
+  Message last_frame();
   void answer(std::uint64_t number, Message message);
   Message answer_to(std::uint64_t number, const ClientRequest& request);
   Message pass_on(std::uint64_t number, const ClientRequest& request, ViewRequest::Kind kind);
@@ -77,8 +79,10 @@ class ViewHub {
   SessionStatus status_;
   std::map<std::uint64_t, std::shared_ptr<ViewClient>> clients_;
   std::uint64_t next_client_ = 1;
-  std::vector<Message> snapshot_;  ///< Of now, once somebody needed it.
-  Message frame_;                  ///< Not sent to everybody yet; null if none.
+  std::vector<Message> snapshot_;            ///< Of now, once somebody needed it.
+  std::shared_ptr<const FrameImage> image_;  ///< The newest; null if none.
+  bool is_frame_new_ = false;                ///< Whether clients have to be told of it.
+  Message last_frame_;                       ///< Of it, once somebody needed it.
   Clock::time_point last_status_;
 };
 

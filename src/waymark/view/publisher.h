@@ -13,7 +13,7 @@
 namespace waymark {
 
 /// Tells a viewer of a session, frame by frame, from the session's thread. Costs that thread some
-/// pointers, the notes of the frame and, when somebody watches, a copy of the image.
+/// pointers, the notes of the frame and, ten times per second at most, a copy of the image.
 class ViewPublisher {
  public:
   /// num_frames_total: of the input, if it is known.

@@ -33,7 +33,7 @@ class Viewer {
 
   /// For browsers; with the token where one is needed.
   std::string url() const;
-  /// Whether somebody wants to see an image; once for each.
+  /// Whether an image would be taken; once for each.
   bool take_image_wish();
   /// False, and the update stays as it was, if the server has not taken in those before.
   bool try_push(ViewUpdate& update);
