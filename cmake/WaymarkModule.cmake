@@ -1,11 +1,17 @@
 # Warnings for our own code; no fused multiply-add contraction, so that results do not depend on
 # what the compiler chose to fuse.
 add_library(waymark_options INTERFACE)
-target_compile_options(waymark_options INTERFACE -Wall -Wextra -ffp-contract=off)
-target_include_directories(waymark_options INTERFACE "${PROJECT_SOURCE_DIR}/src")
+target_compile_options(waymark_options INTERFACE "$<BUILD_INTERFACE:-Wall;-Wextra>" -ffp-contract=off)
+target_compile_features(waymark_options INTERFACE cxx_std_20)
+target_include_directories(waymark_options INTERFACE
+  "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
 
 # waymark_module(NAME SOURCES a.cc... [TESTS a_test.cc...] [LINK PUBLIC targets...]
 #                [TEST_LINK targets...])
+#
+# What only the .cc files need of another library's headers is linked as $<BUILD_INTERFACE:target>, so
+# that who links the installed module needs no such package.
+#
 # One static library waymark_NAME and, when there are tests, one test program waymark_NAME_test.
 # Modules link the modules above them only, so that an include against the order fails to link.
 function(waymark_module name)

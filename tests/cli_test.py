@@ -385,16 +385,6 @@ class Demo(CliTest):
         os.close(terminal)
 
 
-class Example(CliTest):
-    def test_maps_a_folder_of_images(self):
-        done = subprocess.run([os.environ["WAYMARK_EXAMPLE"], self.image_folder(),
-                               self.folder / "camchain.yaml"], capture_output=True, text=True)
-        self.assertEqual(done.returncode, 0, done.stderr)
-        poses = [line.split() for line in done.stdout.strip().split("\n")]
-        self.assertGreater(len(poses), NUM_FRAMES // 2)
-        self.assertEqual({len(pose) for pose in poses}, {4})
-
-
 class BadOutput(CliTest):
     @staticmethod
     def no_room():

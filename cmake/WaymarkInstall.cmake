@@ -1,0 +1,22 @@
+# cmake --install: component "program" is the program and its documents, "dev" what another project
+# needs to build with the libraries. Nothing installed knows where it was built or installed.
+include(CMakePackageConfigHelpers)
+include(WaymarkPublicHeaders)
+
+waymark_public_headers(headers)
+foreach(header ${headers})
+  cmake_path(GET header PARENT_PATH folder)
+  install(FILES "${PROJECT_SOURCE_DIR}/src/${header}" COMPONENT dev
+          DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/${folder}")
+endforeach()
+
+set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/waymark")
+write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/installed/waymark-config-version.cmake"
+                                 VERSION "${PROJECT_VERSION}" COMPATIBILITY SameMinorVersion)
+install(FILES "${CMAKE_CURRENT_LIST_DIR}/waymark-config.cmake"
+              "${CMAKE_CURRENT_BINARY_DIR}/installed/waymark-config-version.cmake"
+        DESTINATION "${package_folder}" COMPONENT dev)
+install(EXPORT waymark-targets NAMESPACE waymark:: DESTINATION "${package_folder}" COMPONENT dev)
+
+install(FILES LICENSE README.md CHANGELOG.md docs/licenses.md viewer/dist/licenses.txt
+        DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documents)

@@ -1,0 +1,51 @@
+# What a program of a user's may include. These headers are installed, with all that they include;
+# everything else in src/ may change at any time.
+set(roots
+  base/check.h # InputError, which every reader throws
+  base/config.h # settings files
+  camera/camchain.h
+  camera/camera.h
+  camera/model_camera.h # own camera models
+  camera/registry.h
+  camera/rig.h
+  camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
+  evaluate/evaluation.h
+  image/image.h
+  io/decode.h # images
+  io/export_colmap.h
+  io/export_nerfstudio.h
+  io/export_ply.h
+  io/input.h # data sets, folders, video files and devices
+  io/listing.h
+  io/map_file.h
+  io/mask.h
+  io/results.h
+  io/trajectory.h
+  map/map.h
+  simulate/sequence.h # rendered sequences with their truth, to test with
+  system/localizer.h
+  system/settings.h
+  system/system.h
+  view/publisher.h
+  view/viewer.h)
+
+# waymark_public_headers(RESULT) gives the paths below src/, sorted.
+function(waymark_public_headers result)
+  set(found "")
+  set(waiting ${roots})
+  list(TRANSFORM waiting PREPEND "waymark/")
+  while(waiting)
+    list(POP_FRONT waiting header)
+    if(header IN_LIST found)
+      continue()
+    endif()
+    list(APPEND found "${header}")
+    set(file "${PROJECT_SOURCE_DIR}/src/${header}")
+    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
+    file(STRINGS "${file}" includes REGEX "^#include \"waymark/")
+    list(TRANSFORM includes REPLACE "^#include \"([^\"]+)\".*" "\\1")
+    list(APPEND waiting ${includes})
+  endwhile()
+  list(SORT found)
+  set(${result} ${found} PARENT_SCOPE)
+endfunction()

@@ -1,0 +1,96 @@
+#!/usr/bin/python3
+# Copyright the Waymark authors.
+# SPDX-License-Identifier: Apache-2.0
+"""cmake --install, and projects of users that are built against what it installs and run.
+
+WAYMARK_BUILD is the folder of the build, WAYMARK_LAUNCHER the compiler cache or empty.
+"""
+import os
+import pathlib
+import shutil
+import subprocess
+import sys
+import unittest
+
+BUILD = pathlib.Path(os.environ["WAYMARK_BUILD"])
+ROOT = pathlib.Path(__file__).resolve().parent.parent
+WORK = BUILD / "install_test"  # Always the same, for the compiler cache.
+PREFIX = WORK / "prefix"
+
+
+def run(*command, **options):
+    return subprocess.run([str(part) for part in command], stdout=subprocess.PIPE,
+                          stderr=subprocess.STDOUT, text=True, timeout=900, **options)
+
+
+class Install(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        shutil.rmtree(WORK, ignore_errors=True)
+        done = run("cmake", "--install", BUILD, "--prefix", WORK / "first")
+        if done.returncode:
+            raise RuntimeError(done.stdout)
+        (WORK / "first").rename(PREFIX)  # It works wherever it is moved.
+
+    def succeed(self, *command, **options):
+        done = run(*command, **options)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        return done.stdout
+
+    def configure(self, source, folder, **options):
+        return run("cmake", "-S", source, "-B", folder, f"-DCMAKE_PREFIX_PATH={PREFIX}",
+                   f"-DCMAKE_CXX_COMPILER={os.environ['CXX']}",
+                   f"-DCMAKE_CXX_COMPILER_LAUNCHER={os.environ['WAYMARK_LAUNCHER']}", **options)
+
+    def build(self, source, name):
+        done = self.configure(source, WORK / name)
+        self.assertEqual(done.returncode, 0, done.stdout)
+        self.succeed("cmake", "--build", WORK / name)
+        return WORK / name
+
+    def project(self, name, text):
+        folder = WORK / name
+        folder.mkdir()
+        (folder / "CMakeLists.txt").write_text(
+            f"cmake_minimum_required(VERSION 3.25)\nproject({name} LANGUAGES CXX)\n{text}\n")
+        return folder
+
+    def test_examples(self):
+        folder = self.build(ROOT / "examples", "examples")
+        self.succeed(sys.executable, "-B", "examples_test.py", cwd=ROOT / "tests",
+                     env={**os.environ, "WAYMARK_EXAMPLES": str(folder),
+                          "WAYMARK_PROGRAM": str(PREFIX / "bin" / "waymark")})
+
+    def test_a_camera_of_ones_own(self):
+        folder = self.build(ROOT / "examples" / "custom_camera", "custom_camera")
+        self.succeed("ctest", "--test-dir", folder, "--output-on-failure")
+
+    def test_every_header_is_complete(self):
+        headers = sorted(str(p.relative_to(PREFIX / "include")) for p in PREFIX.rglob("*.h"))
+        self.assertIn("waymark/system/system.h", headers)
+        source = self.project("headers", "find_package(waymark REQUIRED)\nadd_library(headers STATIC all.cc)\n"
+                                         "target_link_libraries(headers PRIVATE waymark::waymark)")
+        (source / "all.cc").write_text("".join(f'#include "{header}"\n' for header in headers))
+        self.build(source, "headers_build")
+
+    def test_a_module_that_does_not_exist(self):
+        source = self.project("typing_error", "find_package(waymark REQUIRED COMPONENTS system sistem)")
+        done = self.configure(source, WORK / "typing_error_build")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("waymark has no module 'sistem'", done.stdout)
+
+    def test_another_version(self):
+        source = self.project("newer", "find_package(waymark 99 REQUIRED)")
+        done = self.configure(source, WORK / "newer_build")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("99", done.stdout)
+
+    def test_nothing_knows_where_it_was_built(self):
+        places = [str(place).encode() for place in (ROOT, BUILD, WORK)]
+        files = [path for path in PREFIX.rglob("*") if path.is_file() and path.suffix != ".md"]
+        self.assertGreater(len(files), 50)
+        self.assertEqual([path for path in files if any(place in path.read_bytes() for place in places)], [])
+
+
+if __name__ == "__main__":
+    unittest.main()
