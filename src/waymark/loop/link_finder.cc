@@ -8,40 +8,27 @@
 
 #include "waymark/base/median.h"
 #include "waymark/camera/same_rig.h"
+#include "waymark/loop/beside.h"
 #include "waymark/loop/drift.h"
-#include "waymark/loop/near_in_graph.h"
 
 namespace waymark {
 namespace {
 
 /// Keyframes so many steps away in the graph are known to each other well enough.
 constexpr int kNumNearSteps = 5;
-/// Beyond these, in parts of the depth of the scene and in radians, ORB features change too much.
-constexpr double kMaxDistance = 0.8;
-constexpr double kMaxAngleRad = 0.7;
+/// Beyond this ORB features change too much.
+constexpr ViewReach kReach = {0.8, 0.7};
 /// Features of the query that show landmarks of both sides, and their distances in the same ratio.
 constexpr std::size_t kMinPairs = 10;
 constexpr double kMaxRatioError = 0.15;
 
 /// The nearest in space of those that the graph does not know to be near.
 KeyframeId nearest_unknown(const Map& map, KeyframeId query) {
-  const std::vector<KeyframeId> known = within_steps(map, query, kNumNearSteps);
-  const Keyframe& in_query = map.keyframes().at(query);
-  const double depth = median_depth(map, query);
-  KeyframeId nearest;
-  double least = kMaxDistance + kMaxAngleRad;
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.submap != in_query.submap || !is_same_rig(*keyframe.rig, *in_query.rig)) return;
-    const Rigid3 query_from_id = in_query.rig_from_world * keyframe.rig_from_world.inverse();
-    const double distance = query_from_id.translation.norm() / depth;
-    const double angle = Eigen::AngleAxisd(query_from_id.rotation).angle();
-    const bool is_near = distance < kMaxDistance && angle < kMaxAngleRad;
-    if (!is_near || distance + angle >= least) return;
-    if (std::binary_search(known.begin(), known.end(), id)) return;
-    least = distance + angle;
-    nearest = id;
-  });
-  return nearest;
+  const Rig& rig = *map.keyframes().at(query).rig;
+  for (const KeyframeId id : strangers_beside(map, query, kNumNearSteps, kReach)) {
+    if (is_same_rig(*map.keyframes().at(id).rig, rig)) return id;
+  }
+  return {};
 }
 
 /// Features of a keyframe that show a landmark of its own and another one.

@@ -12,12 +12,6 @@ namespace {
 constexpr int kNumPoints = 4000;
 constexpr int kRound = LoopScene::kStepsPerRound;
 
-Vector7d drift_of(double distance, double angle_rad, double log_scale) {
-  Vector7d drift;
-  drift << distance, 0.0, 0.0, 0.0, angle_rad, 0.0, log_scale;
-  return drift;
-}
-
 /// A walk past its beginning, none of whose landmarks it knows again.
 LoopScene walk_round(bool is_metric, const Vector7d& drift) {
   LoopScene scene(cloud_all_round(kNumPoints), is_metric, drift);

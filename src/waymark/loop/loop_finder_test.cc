@@ -13,12 +13,6 @@ namespace {
 constexpr int kNumPoints = 4000;
 constexpr int kRound = LoopScene::kStepsPerRound;
 
-Vector7d drift_of(double distance, double angle_rad, double log_scale) {
-  Vector7d drift;
-  drift << distance, 0.0, 0.0, 0.0, angle_rad, 0.0, log_scale;
-  return drift;
-}
-
 /// The true relative pose of two steps, in the units that the map has at the second.
 Sim3 true_motion(const LoopScene& scene, int query_step, int match_step) {
   const Rigid3 relative =

@@ -15,6 +15,13 @@
 
 namespace waymark {
 
+/// The logarithm of a similarity that moves along x, turns round y and scales.
+inline Vector7d drift_of(double distance, double angle_rad, double log_scale) {
+  Vector7d drift;
+  drift << distance, 0.0, 0.0, 0.0, angle_rad, 0.0, log_scale;
+  return drift;
+}
+
 /// Points all round a circle on which a camera walks and looks outward.
 inline PointCloud cloud_all_round(int count) {
   PointCloud box = scatter_in({-11.0, -2.5, -11.0}, {11.0, 2.5, 11.0}, 2 * count, 4.5, 5);
