@@ -18,5 +18,8 @@ install(FILES "${CMAKE_CURRENT_LIST_DIR}/waymark-config.cmake"
         DESTINATION "${package_folder}" COMPONENT dev)
 install(EXPORT waymark-targets NAMESPACE waymark:: DESTINATION "${package_folder}" COMPONENT dev)
 
+install(FILES packaging/waymark.1 DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT program)
+install(FILES packaging/waymark.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions"
+        RENAME waymark COMPONENT program)
 install(FILES LICENSE README.md CHANGELOG.md docs/licenses.md viewer/dist/licenses.txt
         DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documents)

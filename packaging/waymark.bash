@@ -1,0 +1,11 @@
+# Completion of the command waymark for bash. The program says itself what there is.
+_waymark() {
+  local word=${COMP_WORDS[COMP_CWORD]} words=
+  if ((COMP_CWORD == 1)); then
+    words=$("${COMP_WORDS[0]}" --help 2>/dev/null | sed -n '/^Subcommands/,/^$/s/^  \([a-z]\+\) .*/\1/p')
+  elif [[ $word == -* ]]; then
+    words=$("${COMP_WORDS[0]}" "${COMP_WORDS[1]}" --help 2>/dev/null | grep -oE -- '^ +(-[a-z],)?--[a-z-]+' | grep -oE -- '--[a-z-]+')
+  fi
+  mapfile -t COMPREPLY < <(compgen -W "$words" -- "$word")
+}
+complete -o bashdefault -o default -F _waymark waymark
