@@ -19,8 +19,8 @@
 namespace waymark {
 namespace {
 
-int print_settings() {
-  fmt::print("{}", settings_as_yaml(Settings()));
+int print_settings(bool is_markdown) {
+  fmt::print("{}", is_markdown ? settings_as_markdown<Settings>() : settings_as_yaml(Settings()));
   return kDone;
 }
 
@@ -67,10 +67,13 @@ void add_config_command(CLI::App& program, Command& command) {
                                  {"ros", read_ros_calibration},
                                  {"colmap", read_colmap_calibration}},
                                 "FILE is a calibration of opencv, ros or colmap: print a camchain");
-  config.callback([files, read, &command] {
-    command = [files, read] {
+  const auto is_markdown = std::make_shared<bool>(false);
+  config.add_flag(
+      "--markdown", *is_markdown, "Print the settings as tables of a page, docs/settings.md");
+  config.callback([files, read, is_markdown, &command] {
+    command = [files, read, is_markdown] {
       if (*read != nullptr) return print_camchain(*read, *files);
-      return files->empty() ? print_settings() : check_settings(*files);
+      return files->empty() ? print_settings(*is_markdown) : check_settings(*files);
     };
   });
 }

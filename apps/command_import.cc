@@ -36,6 +36,15 @@ void print_notes(const std::vector<std::string>& notes) {
   for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", note);
 }
 
+/// Settings given where a map is expected would be called a damaged map.
+void expect_no_settings(const ImportOptions& options) {
+  const std::string suffix = options.map.extension().string();
+  if (suffix != ".yaml" && suffix != ".yml") return;
+  throw InputError(options.map.string(),
+                   "is a settings file, expected a map (.msg); settings are given as --settings " +
+                       options.map.string());
+}
+
 std::optional<CameraChain> read_chain(const ImportOptions& options) {
   if (options.settings.empty()) return std::nullopt;
   CameraChain chain = read_openvslam_settings(ConfigSource::from_file(options.settings));
@@ -68,6 +77,7 @@ int import_map(const ImportOptions& options) {
     throw InputError("command line", "MAP is missing, expected a .msg file or --settings");
   }
   if (options.map.empty()) return import_settings(options);
+  expect_no_settings(options);
   if (options.out.empty()) {
     throw InputError("command line", "-o is missing, expected the map file to write");
   }

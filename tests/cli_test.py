@@ -84,6 +84,11 @@ class Usage(CliTest):
         self.assert_fails(waymark("run", self.folder, "--pace=0"), 2, "--pace")
         self.assert_fails(waymark("run", self.folder, "--quiet", "--verbose"), 2, "--quiet")
 
+    def test_settings_are_no_map(self):
+        settings = self.config("Camera: {name: a}\n")
+        self.assert_fails(waymark("import", settings, "-o", self.folder / "map.wmap"), 2, "--settings")
+        self.assertFalse((self.folder / "map.wmap").exists())
+
     def test_settings_are_printed_and_checked(self):
         printed = waymark("config")
         self.assertEqual(printed.returncode, 0)

@@ -89,7 +89,8 @@ std::string settings_as_yaml(Settings settings) {
   return settings_as_yaml(list_settings(settings), list_settings(defaults));
 }
 
-/// The settings as a Markdown table: key, default, range, unit, meaning.
+/// The settings as Markdown: a table of key, default, range, unit, meaning, for each section one
+/// under its heading.
 std::string settings_as_markdown(const std::vector<SettingField>& fields);
 
 template <class Settings>

@@ -101,17 +101,22 @@ std::string settings_as_yaml(const std::vector<SettingField>& fields,
 }
 
 std::string settings_as_markdown(const std::vector<SettingField>& fields) {
-  std::string table = "| key | default | range | unit | meaning |\n|---|---|---|---|---|\n";
+  constexpr const char* kHead =
+      "| key | default | range | unit | meaning |\n|---|---|---|---|---|\n";
+  std::string text = kHead;
   for (const SettingField& field : fields) {
-    if (std::holds_alternative<Section>(field.value)) continue;
-    table += fmt::format("| `{}` | `{}` | {} | {} | {} |\n",
-                         field.key,
-                         printed_value(field),
-                         printed_range(field),
-                         field.info.unit,
-                         field.info.help);
+    if (std::holds_alternative<Section>(field.value)) {
+      text += fmt::format("\n## {}\n\n{}\n\n{}", field.key, field.info.help, kHead);
+    } else {
+      text += fmt::format("| `{}` | `{}` | {} | {} | {} |\n",
+                          field.key,
+                          printed_value(field),
+                          printed_range(field),
+                          field.info.unit,
+                          field.info.help);
+    }
   }
-  return table;
+  return text;
 }
 
 }  // namespace waymark
