@@ -71,6 +71,7 @@ void check_sizes(const FrameImages& images, const Rig& rig) {
     check_size(images.image1, *rig.cameras[1].camera, "right image");
   }
   if (!images.depth.is_empty()) check_size(images.depth, *rig.cameras[0].camera, "depth image");
+  if (!images.mask.is_empty()) check_size(images.mask, *rig.cameras[0].camera, "mask");
 }
 
 std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {

@@ -150,6 +150,7 @@ TEST(FrameBuilder, RefusesImagesOfAnotherSize) {
   FrameBuilder builder(make_stereo_rig(), {.features = {.count = 300}});
   EXPECT_THROW(builder.build({.image0 = small}), InputError);
   EXPECT_THROW(builder.build({.image0 = images.left(), .image1 = small}), InputError);
+  EXPECT_THROW(builder.build({.image0 = images.left(), .mask = small}), InputError);
 }
 
 }  // namespace
