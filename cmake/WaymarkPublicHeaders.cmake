@@ -10,6 +10,8 @@ set(roots
   camera/rig.h
   camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
   evaluate/evaluation.h
+  image/color.h # colour to grey
+  image/depth_units.h # depth from metres
   image/image.h
   io/decode.h # images
   io/export_colmap.h

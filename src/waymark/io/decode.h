@@ -2,18 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <array>
 #include <filesystem>
 #include <optional>
 #include <string>
 #include <string_view>
 
+#include "waymark/image/color.h"
 #include "waymark/image/image.h"
 
 namespace waymark {
-
-using Rgb = std::array<std::uint8_t, 3>;  ///< Red, green, blue.
-using ColorImage = BasicImage<Rgb>;
 
 /// Decodes an image file to 8-bit grey: colour is converted, 16 bit scaled down, transparency
 /// dropped, orientation tags ignored. Nothing when the file is missing, truncated or no image.

@@ -1,0 +1,25 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/image/color.h"
+
+namespace waymark {
+
+Image to_grey(const ColorView& image) {
+  // Weights of 15 bits, whose sum is 1.
+  constexpr std::uint32_t kRed = 9798, kGreen = 19235, kBlue = 3735;
+  constexpr int kBits = 15;
+  constexpr std::uint32_t kHalf = 1u << (kBits - 1);
+  Image grey(image.width_px, image.height_px);
+  for (int y = 0; y < image.height_px; ++y) {
+    const Rgb* from = image.row(y);
+    std::uint8_t* to = grey.row(y);
+    for (int x = 0; x < image.width_px; ++x) {
+      const auto& [red, green, blue] = from[x];
+      to[x] =
+          static_cast<std::uint8_t>((kRed * red + kGreen * green + kBlue * blue + kHalf) >> kBits);
+    }
+  }
+  return grey;
+}
+
+}  // namespace waymark

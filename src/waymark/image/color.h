@@ -1,0 +1,20 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+using Rgb = std::array<std::uint8_t, 3>;  ///< Red, green, blue.
+using ColorView = BasicImageView<Rgb>;
+using ColorImage = BasicImage<Rgb>;
+
+/// The luma of ITU-R BT.601, 0.299 R + 0.587 G + 0.114 B, rounded; bit by bit what OpenCV makes of
+/// such an image.
+Image to_grey(const ColorView& image);
+
+}  // namespace waymark
