@@ -20,6 +20,9 @@ function(waymark_module name)
   add_library(waymark::${name} ALIAS waymark_${name})
   set_property(GLOBAL APPEND PROPERTY WAYMARK_MODULES ${name})
   target_link_libraries(waymark_${name} PUBLIC waymark_options ${MODULE_LINK})
+  if(WAYMARK_BUILD_PYTHON) # Its extension is a shared library that holds the modules.
+    set_target_properties(waymark_${name} PROPERTIES POSITION_INDEPENDENT_CODE ON)
+  endif()
   if(WAYMARK_BUILD_TESTS AND MODULE_TESTS)
     add_executable(waymark_${name}_test ${MODULE_TESTS})
     target_link_libraries(waymark_${name}_test PRIVATE waymark_${name} ${MODULE_TEST_LINK}

@@ -35,6 +35,9 @@ Waymark finds out from images where a camera was and what the place looks like.
 This package has its static C++ libraries, their headers, and the CMake package
 that find_package(waymark) finds.")
 
+if(WAYMARK_BUILD_PYTHON)
+  math(EXPR WAYMARK_NEXT_PYTHON "${Python3_VERSION_MINOR} + 1") # An extension is for one minor version.
+endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-waymark)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)

@@ -25,6 +25,6 @@ num_jobs() {
 
 # Own C++ sources, one path a line.
 cxx_sources() {
-  find "$root/src" "$root/apps" "$root/examples" "$root/benchmarks" "$root/fuzz" "$root/tests" \
+  find "$root/src" "$root/apps" "$root/examples" "$root/benchmarks" "$root/fuzz" "$root/tests" "$root/python" \
     \( -name '*.cc' -o -name '*.h' \) -print | LC_ALL=C sort
 }

@@ -140,7 +140,8 @@ def check_blocks(pages, program):
     with tempfile.TemporaryDirectory(prefix="waymark_docs_") as made:
         samples, bin_folder = pathlib.Path(made) / "samples", pathlib.Path(made) / "bin"
         make_wrapper(bin_folder, program)
-        environment = {**os.environ, "PATH": f"{bin_folder}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8"}
+        environment = {**os.environ, "PATH": f"{bin_folder}:{os.environ['PATH']}", "LC_ALL": "C.UTF-8",
+                       "PYTHONPATH": str(program.parent / "python"), "PYTHONDONTWRITEBYTECODE": "1"}
         make_samples(samples, environment)
         for number, page in enumerate(pages.values()):
             folder = pathlib.Path(made) / f"page{number}"

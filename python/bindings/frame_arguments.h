@@ -1,0 +1,53 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <pybind11/numpy.h>
+#include <pybind11/pybind11.h>
+
+#include <optional>
+#include <vector>
+
+#include "waymark/image/depth.h"
+#include "waymark/io/input.h"
+#include "waymark/system/system.h"
+
+namespace waymark::python {
+
+namespace py = pybind11;
+
+/// The images of a moment as Python gives them; any but the first may be None.
+struct ImageArguments {
+  py::object image0;
+  py::object image1;
+  py::object depth;
+  py::object mask;
+};
+
+/// The images of a moment as the engine takes them: grey images and depth in units are borrowed
+/// from the arrays, colour and depth in metres are converted. Made and destroyed with the GIL held.
+class FrameArguments {
+ public:
+  /// TypeError for what has the wrong type, ValueError for a wrong shape and for images that the
+  /// set-up (nothing: one camera, with or without depth) does not have or lacks.
+  FrameArguments(const ImageArguments& images,
+                 std::optional<Setup> setup,
+                 const DepthSettings& depth_settings);
+  FrameArguments(const FrameArguments&) = delete;
+  FrameArguments& operator=(const FrameArguments&) = delete;
+
+  FrameInput input(std::int64_t timestamp_ns) const;
+  bool has_depth() const { return !input_.depth.is_empty(); }
+
+ private:
+  ImageView add_image(const char* name, py::handle argument);
+  ImageView add_mask(py::handle argument);
+  DepthView add_depth(py::handle argument, const DepthSettings& settings);
+
+  std::vector<py::array> borrowed_;
+  std::vector<Image> grey_;
+  DepthImage depth_;
+  FrameInput input_;
+};
+
+}  // namespace waymark::python

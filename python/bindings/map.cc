@@ -1,0 +1,282 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/map/map.h"
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <string>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "features.h"
+#include "session_config.h"
+#include "waymark/io/map_file.h"
+
+namespace waymark::python {
+namespace {
+
+/// A keyframe of a map, which it keeps.
+struct PythonKeyframe {
+  std::shared_ptr<const Map> map;
+  KeyframeId id;
+  const Keyframe& get() const { return map->keyframes().at(id); }
+};
+
+struct PythonLandmark {
+  std::shared_ptr<const Map> map;
+  LandmarkId id;
+  const Landmark& get() const { return map->landmarks().at(id); }
+};
+
+struct PythonSubmap {
+  std::uint32_t id;
+  Submap submap;
+};
+
+/// The id of something that is there, or KeyError.
+template <class Key, class Table>
+Key find_id(const Table& table, const char* name, const py::object& argument) {
+  const std::int64_t value = integer_argument("id", argument);
+  const bool fits = value >= 0 && value < UINT32_MAX;
+  if (!fits || !table.contains(Key{static_cast<std::uint32_t>(value)})) {
+    throw py::key_error(std::string(name) + " " + std::to_string(value) + " is not in the map");
+  }
+  return Key{static_cast<std::uint32_t>(value)};
+}
+
+KeyframeId keyframe_id(const PythonMap& self, const py::object& id) {
+  return find_id<KeyframeId>(self.map().keyframes(), "keyframe", id);
+}
+
+py::array observations(const PythonLandmark& self) {
+  const auto& values = self.get().observations;
+  static_assert(sizeof(Observation) == 2 * sizeof(std::uint32_t));
+  const std::uint32_t* first = values.empty() ? nullptr : &values.front().keyframe.value;
+  return view_of(first, {static_cast<py::ssize_t>(values.size()), 2}, self.map);
+}
+
+py::tuple covisible(const PythonMap& self, const py::object& id) {
+  std::vector<std::uint32_t> keyframes, counts;
+  for (const CovisibilityEdge& edge : self.map().covisible(keyframe_id(self, id))) {
+    keyframes.push_back(edge.keyframe.value);
+    counts.push_back(edge.num_shared);
+  }
+  return py::make_tuple(array_of(std::move(keyframes)), array_of(std::move(counts)));
+}
+
+std::vector<PythonSubmap> submaps(const PythonMap& self) {
+  std::vector<PythonSubmap> result;
+  for (const Submap& submap : self.map().submaps()) {
+    result.push_back({static_cast<std::uint32_t>(result.size()), submap});
+  }
+  return result;
+}
+
+std::optional<py::bytes> image(const PythonMap& self, const py::object& id) {
+  const auto found = self.stored.images.find(keyframe_id(self, id));
+  if (found == self.stored.images.end()) return std::nullopt;
+  return py::bytes(*found->second);
+}
+
+std::shared_ptr<PythonMap> load(const py::object& path) {
+  const std::filesystem::path file = path_argument("path", path);
+  const py::gil_scoped_release release;
+  return std::make_shared<PythonMap>(PythonMap{load_map(file)});
+}
+
+void save(const PythonMap& self, const py::object& path) {
+  const std::filesystem::path file = path_argument("path", path);
+  const py::gil_scoped_release release;
+  save_map(file, self.stored);
+}
+
+std::string describe_map(const PythonMap& self) {
+  return "<Map of " + std::to_string(self.map().keyframes().size()) + " keyframes, " +
+         std::to_string(self.map().landmarks().size()) + " landmarks, " +
+         (is_metric(self.map()) ? "in metres>" : "scale free>");
+}
+
+void bind_keyframe(py::module_& module) {
+  py::class_<PythonKeyframe>(module, "Keyframe", "A frame that stays in the map.")
+      .def_property_readonly(
+          "id", [](const PythonKeyframe& self) { return self.id.value; }, "int: never reused.")
+      .def_property_readonly(
+          "frame",
+          [](const PythonKeyframe& self) { return self.get().frame.value; },
+          "int: unique in a map; a session that extends one counts on.")
+      .def_property_readonly(
+          "timestamp_ns",
+          [](const PythonKeyframe& self) { return self.get().timestamp_ns; },
+          "int: nanoseconds, as fed.")
+      .def_property_readonly(
+          "world_from_rig",
+          [](const PythonKeyframe& self) { return array_of(self.get().rig_from_world.inverse()); },
+          "float64 array (4, 4).")
+      .def_property_readonly(
+          "submap",
+          [](const PythonKeyframe& self) { return self.get().submap.value; },
+          "int: whose frame the pose is in.")
+      .def_property_readonly(
+          "parent",
+          [](const PythonKeyframe& self) { return optional_id(self.get().parent); },
+          "int or None: in the spanning tree; None for the root of a sub-map.")
+      .def_property_readonly(
+          "features",
+          [](const PythonKeyframe& self) {
+            return PythonFeatures{self.get().features, self.map, &self.get().landmarks};
+          },
+          "Features: with the landmarks they show.")
+      .def_property_readonly(
+          "cameras",
+          [](const PythonKeyframe& self) { return self.get().rig->cameras; },
+          "list of Camera: those that took it.")
+      .def("__repr__", [](const PythonKeyframe& self) {
+        return "<Keyframe " + std::to_string(self.id.value) + " of " +
+               std::to_string(self.get().features->size()) + " features>";
+      });
+}
+
+void bind_landmark(py::module_& module) {
+  py::class_<PythonLandmark>(module, "Landmark", "A point of the map.")
+      .def_property_readonly(
+          "id", [](const PythonLandmark& self) { return self.id.value; }, "int: never reused.")
+      .def_property_readonly(
+          "submap",
+          [](const PythonLandmark& self) { return self.get().submap.value; },
+          "int: whose frame the position is in.")
+      .def_property_readonly(
+          "position_in_world",
+          [](const PythonLandmark& self) {
+            const Eigen::Vector3d& position = self.get().position_in_world;
+            return array_of(std::vector<double>(position.begin(), position.end()));
+          },
+          "float64 array (3,): metres (map units for one camera).")
+      .def_property_readonly(
+          "observations",
+          &observations,
+          "uint32 array (N, 2): id of a keyframe and index of the feature in it, "
+          "ascending; a view without a copy.")
+      .def_property_readonly(
+          "num_visible",
+          [](const PythonLandmark& self) { return self.get().num_visible; },
+          "int: frames in which it should have been seen.")
+      .def_property_readonly(
+          "num_found",
+          [](const PythonLandmark& self) { return self.get().num_found; },
+          "int: frames in which it was.")
+      .def("__repr__", [](const PythonLandmark& self) {
+        return "<Landmark " + std::to_string(self.id.value) + " of " +
+               std::to_string(self.get().observations.size()) + " observations>";
+      });
+}
+
+void bind_parts(py::module_& module) {
+  py::class_<PythonSubmap>(module, "Submap", "A connected part of a map with its own frame.")
+      .def_readonly("id", &PythonSubmap::id, "int.")
+      .def_property_readonly(
+          "is_metric",
+          [](const PythonSubmap& self) { return self.submap.is_metric; },
+          "bool: False where the scale is free.")
+      .def_property_readonly(
+          "root",
+          [](const PythonSubmap& self) { return optional_id(self.submap.root); },
+          "int or None: its first keyframe; None once joined.")
+      .def_property_readonly(
+          "joined_into",
+          [](const PythonSubmap& self) { return optional_id(self.submap.joined_into); },
+          "int or None: the sub-map that it is a part of now.");
+  py::class_<LoopEdge>(module, "LoopEdge", "Two keyframes that were found to show the same place.")
+      .def_property_readonly(
+          "from_keyframe", [](const LoopEdge& self) { return self.from.value; }, "int.")
+      .def_property_readonly(
+          "to_keyframe", [](const LoopEdge& self) { return self.to.value; }, "int.")
+      .def_property_readonly(
+          "to_from_from",
+          [](const LoopEdge& self) {
+            return array_of(Rigid3(self.to_from_from.rotation, self.to_from_from.translation));
+          },
+          "float64 array (4, 4): rotation and translation between the rigs, as measured.")
+      .def_property_readonly(
+          "scale",
+          [](const LoopEdge& self) { return self.to_from_from.scale; },
+          "float: lengths around to_keyframe by those around from_keyframe; 1 in metres.");
+}
+
+using MapClass = py::class_<PythonMap, std::shared_ptr<PythonMap>>;
+
+void bind_whole(MapClass& map) {
+  map.def_static("load", &load, py::arg("path"), R"(load(path)
+--
+
+Reads a map file (.wmap) of any version. InputError for one that is missing or damaged.)")
+      .def("save", &save, py::arg("path"), R"(save(self, path)
+--
+
+Writes a map file, whole or not at all. OutputError when that fails.)")
+      .def_property_readonly(
+          "is_metric",
+          [](const PythonMap& self) { return is_metric(self.map()); },
+          "bool: whether all sub-maps have a scale in metres.")
+      .def_property_readonly(
+          "num_keyframes",
+          [](const PythonMap& self) { return self.map().keyframes().size(); },
+          "int.")
+      .def_property_readonly(
+          "num_landmarks",
+          [](const PythonMap& self) { return self.map().landmarks().size(); },
+          "int.")
+      .def_property_readonly(
+          "settings",
+          [](const PythonMap& self) { return self.stored.settings; },
+          "str: those used, as YAML.");
+}
+
+void bind_access(MapClass& map) {
+  map.def("submaps", &submaps, "submaps(self)\n--\n\nlist of Submap, by id; joined ones, too.")
+      .def(
+          "keyframe",
+          [](const PythonMap& self, const py::object& id) {
+            return PythonKeyframe{self.stored.map, keyframe_id(self, id)};
+          },
+          py::arg("id"),
+          "keyframe(self, id)\n--\n\nThe Keyframe of an id. KeyError where there is none.")
+      .def(
+          "landmark",
+          [](const PythonMap& self, const py::object& id) {
+            return PythonLandmark{self.stored.map,
+                                  find_id<LandmarkId>(self.map().landmarks(), "landmark", id)};
+          },
+          py::arg("id"),
+          "landmark(self, id)\n--\n\nThe Landmark of an id. KeyError where there is none.")
+      .def("covisible", &covisible, py::arg("keyframe_id"), R"(covisible(self, keyframe_id)
+--
+
+The keyframes that share landmarks with one, and how many: two uint32 arrays (N,), by id.)")
+      .def(
+          "loop_edges",
+          [](const PythonMap& self) { return self.map().loop_edges(); },
+          "loop_edges(self)\n--\n\nPlaces seen again, in the order found: list of LoopEdge.")
+      .def("image", &image, py::arg("keyframe_id"), R"(image(self, keyframe_id)
+--
+
+The image of a keyframe as the bytes of a JPEG file, or None: maps made with --keep-images.)")
+      .def("__repr__", &describe_map);
+}
+
+}  // namespace
+
+void bind_map(py::module_& module) {
+  bind_keyframe(module);
+  bind_landmark(module);
+  bind_parts(module);
+  MapClass map(module, "Map", R"(A map as it was at one moment; it never changes.
+
+Free to be read by any number of threads. Its frame is that of the first keyframe of a sub-map.)");
+  bind_whole(map);
+  bind_access(map);
+  bind_map_tables(map, module);
+}
+
+}  // namespace waymark::python

@@ -1,0 +1,167 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// The whole of a map as arrays. They are copies: the engine keeps keyframes and landmarks in pages.
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <array>
+#include <cstddef>
+#include <optional>
+#include <unordered_map>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "waymark/io/export_scene.h"
+
+namespace waymark::python {
+namespace {
+
+struct KeyframeTable {
+  py::array ids, frames, timestamps_ns, world_from_rig, submaps, parents;
+};
+
+struct LandmarkTable {
+  py::array ids, positions_in_world, submaps, num_observers, num_visible, num_found;
+};
+
+KeyframeTable keyframes(const PythonMap& self) {
+  std::vector<std::uint32_t> ids, frames, submaps, parents;
+  std::vector<std::int64_t> timestamps_ns;
+  std::vector<double> poses;
+  self.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    ids.push_back(id.value);
+    frames.push_back(keyframe.frame.value);
+    timestamps_ns.push_back(keyframe.timestamp_ns);
+    append_matrix(keyframe.rig_from_world.inverse(), poses);
+    submaps.push_back(keyframe.submap.value);
+    parents.push_back(keyframe.parent.value);
+  });
+  const auto count = static_cast<py::ssize_t>(ids.size());
+  return {array_of(std::move(ids)),
+          array_of(std::move(frames)),
+          array_of(std::move(timestamps_ns)),
+          array_of(std::move(poses), {count, 4, 4}),
+          array_of(std::move(submaps)),
+          array_of(std::move(parents))};
+}
+
+LandmarkTable landmarks(const PythonMap& self) {
+  std::vector<std::uint32_t> ids, submaps, observers, visible, found;
+  std::vector<double> positions;
+  self.map().landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+    ids.push_back(id.value);
+    const Eigen::Vector3d& position = landmark.position_in_world;
+    positions.insert(positions.end(), position.begin(), position.end());
+    submaps.push_back(landmark.submap.value);
+    observers.push_back(static_cast<std::uint32_t>(num_observers(landmark)));
+    visible.push_back(landmark.num_visible);
+    found.push_back(landmark.num_found);
+  });
+  const auto count = static_cast<py::ssize_t>(ids.size());
+  return {array_of(std::move(ids)),
+          array_of(std::move(positions), {count, 3}),
+          array_of(std::move(submaps)),
+          array_of(std::move(observers)),
+          array_of(std::move(visible)),
+          array_of(std::move(found))};
+}
+
+py::array covisibility(const PythonMap& self) {
+  std::vector<std::uint32_t> edges;
+  self.map().covisibility().for_each([&](KeyframeId id, const Covisibility& covisible) {
+    for (const CovisibilityEdge& edge : covisible.edges) {
+      if (edge.keyframe < id) continue;
+      edges.insert(edges.end(), {id.value, edge.keyframe.value, edge.num_shared});
+    }
+  });
+  const auto count = static_cast<py::ssize_t>(edges.size() / 3);
+  return array_of(std::move(edges), {count, 3});
+}
+
+using Color = std::array<std::uint8_t, 3>;
+
+/// As the images of the keyframes show them; grey where none does.
+std::vector<std::uint8_t> find_colors(const StoredMap& stored) {
+  std::unordered_map<std::uint32_t, Color> by_landmark;  // For looking up only.
+  for (const SubmapId submap : submaps_by_size(*stored.map)) {
+    for (const ExportPoint& point : make_export_scene(*stored.map, submap, stored.images).points) {
+      by_landmark[point.landmark.value] = point.color;
+    }
+  }
+  std::vector<std::uint8_t> colors;
+  stored.map->landmarks().for_each([&](LandmarkId id, const Landmark&) {
+    const auto found = by_landmark.find(id.value);
+    const Color color = found == by_landmark.end() ? Color{128, 128, 128} : found->second;
+    colors.insert(colors.end(), color.begin(), color.end());
+  });
+  return colors;
+}
+
+std::optional<py::array> landmark_colors(const PythonMap& self) {
+  if (self.stored.images.empty()) return std::nullopt;
+  std::vector<std::uint8_t> colors;
+  {
+    const py::gil_scoped_release release;
+    colors = find_colors(self.stored);
+  }
+  const auto count = static_cast<py::ssize_t>(colors.size() / 3);
+  return array_of(std::move(colors), {count, 3});
+}
+
+void bind_keyframes(py::module_& module) {
+  py::class_<KeyframeTable>(
+      module, "Keyframes", "All keyframes of a map, by id, as arrays of the same length K.")
+      .def("__len__", [](const KeyframeTable& self) { return self.ids.size(); })
+      .def_readonly("ids", &KeyframeTable::ids, "uint32 array (K,): ascending.")
+      .def_readonly("frames", &KeyframeTable::frames, "uint32 array (K,): Keyframe.frame.")
+      .def_readonly(
+          "timestamps_ns", &KeyframeTable::timestamps_ns, "int64 array (K,): nanoseconds, as fed.")
+      .def_readonly("world_from_rig", &KeyframeTable::world_from_rig, "float64 array (K, 4, 4).")
+      .def_readonly(
+          "submaps", &KeyframeTable::submaps, "uint32 array (K,): whose frame the pose is in.")
+      .def_readonly("parents",
+                    &KeyframeTable::parents,
+                    "uint32 array (K,): in the spanning tree; NO_ID for the root of a sub-map.");
+}
+
+void bind_landmarks(py::module_& module) {
+  py::class_<LandmarkTable>(
+      module, "Landmarks", "All landmarks of a map, by id, as arrays of the same length M.")
+      .def("__len__", [](const LandmarkTable& self) { return self.ids.size(); })
+      .def_readonly("ids", &LandmarkTable::ids, "uint32 array (M,): ascending.")
+      .def_readonly("positions_in_world",
+                    &LandmarkTable::positions_in_world,
+                    "float64 array (M, 3): metres (map units for one camera).")
+      .def_readonly(
+          "submaps", &LandmarkTable::submaps, "uint32 array (M,): whose frame the position is in.")
+      .def_readonly("num_observers",
+                    &LandmarkTable::num_observers,
+                    "uint32 array (M,): keyframes that see it.")
+      .def_readonly("num_visible",
+                    &LandmarkTable::num_visible,
+                    "uint32 array (M,): frames in which it should have been seen.")
+      .def_readonly(
+          "num_found", &LandmarkTable::num_found, "uint32 array (M,): frames in which it was.");
+}
+
+}  // namespace
+
+void bind_map_tables(py::class_<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module) {
+  bind_keyframes(module);
+  bind_landmarks(module);
+  map.def("keyframes", &keyframes, "keyframes(self)\n--\n\nAll keyframes: Keyframes (copies).")
+      .def("landmarks", &landmarks, "landmarks(self)\n--\n\nAll landmarks: Landmarks (copies).")
+      .def("covisibility", &covisibility, R"(covisibility(self)
+--
+
+uint32 array (E, 3): pairs of keyframes, the smaller id first, and how many landmarks they share.)")
+      .def("landmark_colors", &landmark_colors, R"(landmark_colors(self)
+--
+
+uint8 array (M, 3): red, green, blue of each landmark of landmarks(), as the images of the keyframes
+show it, grey (128) where none does; None for a map without images.)");
+}
+
+}  // namespace waymark::python

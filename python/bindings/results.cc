@@ -1,0 +1,198 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// What System and Localizer return.
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <string>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "session_config.h"
+#include "trajectory.h"
+#include "waymark/io/trajectory.h"
+#include "waymark/mapping/focal_check.h"
+#include "waymark/system/system.h"
+
+namespace waymark::python {
+namespace {
+
+py::object pose_or_none(const TrackingResult& result) {
+  if (!result.world_from_rig) return py::none();
+  return array_of(*result.world_from_rig);
+}
+
+py::dict stages_ms(const TrackingResult& result) {
+  py::dict stages;
+  for (std::size_t i = 0; i < kNumStages; ++i) stages[kStageNames[i]] = result.stages.ms[i];
+  return stages;
+}
+
+std::string describe_result(const TrackingResult& result) {
+  std::string text = "<TrackingResult frame " + std::to_string(result.frame.value) + ": " +
+                     std::string(to_string(result.state));
+  if (result.reason != FrameReason::kNone) text += ", " + std::string(to_string(result.reason));
+  return text + ", " + std::to_string(result.num_inliers) + " inliers>";
+}
+
+void bind_tracking_result(py::module_& module) {
+  py::class_<TrackingResult>(
+      module, "TrackingResult", R"(What is known of a frame right after it was fed.
+
+A result without a pose says how far the search got: how many places were compared
+(num_candidates), and of the one that came closest the matches, the inliers and why it was
+refused (reason).)")
+      .def_property_readonly(
+          "frame",
+          [](const TrackingResult& self) { return self.frame.value; },
+          "int: of this session, from 0 on.")
+      .def_property_readonly(
+          "state",
+          [](const TrackingResult& self) { return to_string(self.state); },
+          "str: 'initializing', 'tracked', 'filled' or 'lost'.")
+      .def_property_readonly(
+          "reason",
+          [](const TrackingResult& self) { return to_string(self.reason); },
+          "str: why there is no pose, for example 'too_few_matches'; 'none' where there is one.")
+      .def_property_readonly(
+          "world_from_rig",
+          &pose_or_none,
+          "float64 array (4, 4) or None: where the rig (camera 0) is in the world "
+          "and how it stands, in metres (map units for one camera).")
+      .def_property_readonly(
+          "covariance",
+          [](const TrackingResult& self) { return array_of(self.covariance); },
+          "float64 array (6, 6): of the pose, for perturbations exp(xi) * rig_from_world, xi = "
+          "(rho, "
+          "phi) in (m, rad); zeros where there is no pose.")
+      .def_readonly("num_matches", &TrackingResult::num_matches, "int: landmarks recognised.")
+      .def_readonly(
+          "num_inliers", &TrackingResult::num_inliers, "int: of these, that agree on the pose.")
+      .def_readonly("num_candidates",
+                    &TrackingResult::num_candidates,
+                    "int: places in the map compared when all else had failed.")
+      .def_readonly("is_keyframe", &TrackingResult::is_keyframe, "bool: goes into the map.")
+      .def_property_readonly(
+          "submap",
+          [](const TrackingResult& self) { return optional_id(self.submap); },
+          "int or None: the sub-map whose frame the pose is in.")
+      .def_property_readonly(
+          "stages_ms", &stages_ms, "dict of str to float: milliseconds by stage, in order.")
+      .def_property_readonly(
+          "tracking_ms",
+          [](const TrackingResult& self) { return self.stages.tracking_ms(); },
+          "float: from image to pose, without waiting for the mapper.")
+      .def("__repr__", &describe_result);
+}
+
+py::array matrices_of(const Trajectory& trajectory) {
+  std::vector<double> values;
+  values.reserve(16 * trajectory.frames.size());
+  for (const TrajectoryFrame& frame : trajectory.frames)
+    append_matrix(frame.world_from_rig, values);
+  return array_of(std::move(values), {static_cast<py::ssize_t>(trajectory.frames.size()), 4, 4});
+}
+
+py::array is_filled(const Trajectory& trajectory) {
+  std::vector<std::uint8_t> flags;
+  for (const TrajectoryFrame& frame : trajectory.frames) {
+    flags.push_back(frame.state == FrameState::kFilled);
+  }
+  return flags_of(std::move(flags));
+}
+
+template <class Field>
+auto column_of(Field field) {
+  return [field](const Trajectory& trajectory) {
+    std::vector<std::decay_t<decltype(field(trajectory.frames.front()))>> values;
+    for (const TrajectoryFrame& frame : trajectory.frames) values.push_back(field(frame));
+    return array_of(std::move(values));
+  };
+}
+
+void write(const Trajectory& trajectory, const py::object& path, const std::string& format) {
+  std::vector<StampedPose> poses;
+  for (const TrajectoryFrame& frame : trajectory.frames) {
+    poses.push_back({frame.timestamp_ns, frame.world_from_rig});
+  }
+  for (const auto known :
+       {TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}) {
+    if (format == to_string(known))
+      return write_trajectory(path_argument("path", path), poses, known);
+  }
+  throw py::value_error("format: is '" + format + "', expected tum, kitti or euroc");
+}
+
+void bind_trajectory(py::module_& module) {
+  py::class_<Trajectory>(
+      module,
+      "Trajectory",
+      "The frames that have a pose, in order, as arrays of the same length N. len() gives N.")
+      .def_property_readonly(
+          "frames",
+          column_of([](const TrajectoryFrame& frame) { return frame.frame.value; }),
+          "uint32 array (N,): TrackingResult.frame.")
+      .def_property_readonly(
+          "timestamps_ns",
+          column_of([](const TrajectoryFrame& frame) { return frame.timestamp_ns; }),
+          "int64 array (N,): as fed.")
+      .def_property_readonly(
+          "world_from_rig", &matrices_of, "float64 array (N, 4, 4): metres (map units for mono).")
+      .def_property_readonly(
+          "submaps",
+          column_of([](const TrajectoryFrame& frame) { return frame.submap.value; }),
+          "uint32 array (N,): the sub-map whose frame the pose is in.")
+      .def_property_readonly(
+          "is_filled", &is_filled, "bool array (N,): True for poses found after the fact.")
+      .def("of_submap", &Trajectory::of_submap, py::arg("submap"), R"(of_submap(self, submap)
+--
+
+The frames of one sub-map: a Trajectory.)")
+      .def("largest", &Trajectory::largest, R"(largest(self)
+--
+
+The frames of the sub-map that has most of them: what the program writes to trajectory.txt.)")
+      .def("write",
+           &write,
+           py::arg("path"),
+           py::arg("format") = "tum",
+           R"(write(self, path, format='tum')
+--
+
+Writes a file: 'tum' (t tx ty tz qx qy qz qw), 'kitti' or 'euroc'. OutputError when that fails.)")
+      .def("__len__", [](const Trajectory& self) { return self.frames.size(); });
+}
+
+void bind_statistics(py::module_& module) {
+  py::class_<SystemStatistics>(module, "Statistics", "Totals of a session.")
+      .def_readonly("num_keyframes", &SystemStatistics::num_keyframes, "int.")
+      .def_readonly("num_landmarks", &SystemStatistics::num_landmarks, "int.")
+      .def_readonly("num_submaps", &SystemStatistics::num_submaps, "int: that are not joined.")
+      .def_readonly("num_loops", &SystemStatistics::num_loops, "int: loops closed.")
+      .def_readonly("num_relocalizations",
+                    &SystemStatistics::num_relocalizations,
+                    "int: times the lost camera was found again.")
+      .def_property_readonly(
+          "mapping_ms",
+          [](const SystemStatistics& self) { return array_of(self.mapping_ms); },
+          "float64 array: milliseconds of the mapper per keyframe.");
+  py::class_<FocalCheck>(
+      module, "FocalCheck", "What the residuals say of the calibration's focal length.")
+      .def_readonly(
+          "factor", &FocalCheck::factor, "float: the true focal length by that of the calibration.")
+      .def_readonly("sigma", &FocalCheck::sigma, "float: standard deviation of the factor.")
+      .def_property_readonly(
+          "is_off", &FocalCheck::is_off, "bool: off by more than 2 %, beyond doubt.");
+}
+
+}  // namespace
+
+void bind_results(py::module_& module) {
+  bind_tracking_result(module);
+  bind_trajectory(module);
+  bind_statistics(module);
+}
+
+}  // namespace waymark::python

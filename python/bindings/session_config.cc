@@ -1,0 +1,134 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "session_config.h"
+
+#include <vector>
+
+#include "arrays.h"
+#include "waymark/base/check.h"
+#include "waymark/base/config.h"
+#include "waymark/base/config_value.h"
+
+namespace waymark::python {
+namespace {
+
+constexpr const char* kExpectedCameras =
+    "the path of a camchain, a dict with the same content, several of these, or a Calibration";
+
+/// YAML of a value of Python's: JSON is YAML.
+std::string yaml_of(py::handle value) {
+  const py::cpp_function numpy_values([](const py::object& object) -> py::object {
+    if (!py::hasattr(object, "tolist")) fail_type("settings", object, "what YAML can hold");
+    return object.attr("tolist")();
+  });
+  const py::object json = py::module_::import("json").attr("dumps");
+  return py::cast<std::string>(json(value, py::arg("default") = numpy_values));
+}
+
+void add_sources(py::handle cameras, std::vector<ConfigSource>& sources) {
+  if (py::isinstance<py::dict>(cameras)) {
+    sources.push_back({"cameras", yaml_of(cameras)});
+  } else if (py::isinstance<py::list>(cameras) || py::isinstance<py::tuple>(cameras)) {
+    for (const py::handle part : cameras) add_sources(part, sources);
+  } else if (py::isinstance<py::str>(cameras) || py::hasattr(cameras, "__fspath__")) {
+    sources.push_back(ConfigSource::from_file(path_argument("cameras", cameras)));
+  } else {
+    fail_type("cameras", cameras, kExpectedCameras);
+  }
+}
+
+CameraChain chain_of(const ConfigNode& config) {
+  std::optional<CameraChain> chain = read_camchain(config);
+  if (!chain) throw InputError("cameras", "describe no camera, expected cam0");
+  return *std::move(chain);
+}
+
+void add_settings(py::handle settings, std::vector<ConfigSource>& sources) {
+  if (settings.is_none()) return;
+  if (!py::isinstance<py::dict>(settings)) {
+    fail_type("settings", settings, "a dict such as {\"features.count\": 1500}");
+  }
+  for (const auto& [key, value] : py::reinterpret_borrow<py::dict>(settings)) {
+    if (!py::isinstance<py::str>(key)) fail_type("settings", key, "names of settings as keys");
+    // As on the command line, which checks the key.
+    ConfigSource source = ConfigSource::from_assignment(py::cast<std::string>(key) + "=");
+    source.name = "settings";
+    source.text = yaml_of(value);
+    sources.push_back(std::move(source));
+  }
+}
+
+/// The cameras of a document or, where the calibration is given, that with what the document adds.
+CameraChain complete(std::optional<CameraChain> chain, const ConfigNode& config) {
+  if (!chain) return chain_of(config);
+  const ConfigNode* depth = config.find("depth");
+  const ConfigNode* factor = depth ? depth->find("factor") : nullptr;
+  if (factor)
+    chain->depth_factor = config_double(*factor, "depth.factor", {.low = 1e-3, .high = 1e9});
+  return *std::move(chain);
+}
+
+void limit_cameras(CameraChain& chain, std::optional<Setup>& setup) {
+  if (!setup && chain.cameras.size() == 2) setup = Setup::kStereo;
+  const std::size_t wanted = setup == Setup::kStereo ? 2 : 1;
+  if (chain.cameras.size() < wanted) {
+    throw InputError("cameras", "describe one camera, expected two for setup stereo");
+  }
+  if (!setup && chain.cameras.size() > wanted) {
+    throw InputError("cameras", "are more than two, expected a setup that says which to use");
+  }
+  chain.cameras.resize(wanted);
+}
+
+}  // namespace
+
+std::filesystem::path path_argument(const char* name, py::handle path) {
+  if (!py::isinstance<py::str>(path) && !py::hasattr(path, "__fspath__")) {
+    fail_type(name, path, "a path");
+  }
+  return py::cast<std::string>(py::module_::import("os").attr("fspath")(path));
+}
+
+std::optional<Setup> setup_argument(py::handle setup) {
+  if (setup.is_none()) return std::nullopt;
+  if (!py::isinstance<py::str>(setup)) fail_type("setup", setup, "mono, stereo, rgbd or None");
+  const std::string name = py::cast<std::string>(setup);
+  for (const Setup known : {Setup::kMono, Setup::kStereo, Setup::kRgbd}) {
+    if (name == to_string(known)) return known;
+  }
+  throw py::value_error("setup: is '" + name + "', expected mono, stereo, rgbd or None");
+}
+
+CameraChain read_cameras(py::handle cameras) {
+  if (py::isinstance<CameraChain>(cameras)) return py::cast<CameraChain>(cameras);
+  std::vector<ConfigSource> sources;
+  add_sources(cameras, sources);
+  return chain_of(merge_configs(sources));
+}
+
+SessionConfig read_session_config(const ConfigArguments& arguments) {
+  SessionConfig result;
+  result.setup = setup_argument(arguments.setup);
+  std::vector<ConfigSource> sources;
+  std::optional<CameraChain> chain;
+  if (py::isinstance<CameraChain>(arguments.cameras)) {
+    chain = py::cast<CameraChain>(arguments.cameras);
+  } else {
+    add_sources(arguments.cameras, sources);
+  }
+  add_settings(arguments.settings, sources);
+  const ConfigNode config = merge_configs(sources);
+  read_settings(result.settings, config);
+  CameraChain complete_chain = complete(std::move(chain), config);
+  if (complete_chain.depth_factor) result.settings.depth.factor = *complete_chain.depth_factor;
+  if (!arguments.seed.is_none()) {
+    // Read as a setting, which checks its range.
+    const std::string seed = std::to_string(integer_argument("seed", arguments.seed));
+    read_settings(result.settings, parse_config({"seed", seed, "seed"}));
+  }
+  limit_cameras(complete_chain, result.setup);
+  result.rig = make_rig(complete_chain);
+  return result;
+}
+
+}  // namespace waymark::python

@@ -1,0 +1,308 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/system.h"
+
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arrays.h"
+#include "bindings.h"
+#include "frame_arguments.h"
+#include "session_config.h"
+#include "trajectory.h"
+#include "turn.h"
+
+namespace waymark::python {
+namespace {
+
+Timing timing_argument(const std::string& name) {
+  if (name == "inline") return Timing::kInline;
+  if (name == "lockstep") return Timing::kLockstep;
+  if (name == "realtime") return Timing::kRealtime;
+  throw py::value_error("timing: is '" + name + "', expected inline, lockstep or realtime");
+}
+
+/// A System with what the arguments of Python need to be understood. Methods that take long let
+/// other threads of Python run.
+class PythonSystem {
+ public:
+  PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map);
+
+  TrackingResult feed(const py::object& timestamp_ns, const ImageArguments& images);
+  void finish();
+  void reset();
+  void set_mapping(bool is_on);
+  std::shared_ptr<PythonMap> map();
+  Trajectory trajectory();
+  std::vector<std::string> frame_states();
+  SystemStatistics statistics();
+  std::optional<FocalCheck> focal_check();
+  FrameDetails details();
+  void save(const std::filesystem::path& path);
+  bool is_finished() const { return is_finished_; }
+
+ private:
+  void expect_unfinished(const char* method) const;
+  Turn take() { return Turn(is_taken_, "System"); }
+
+  SessionConfig config_;
+  const std::string settings_yaml_;
+  System system_;
+  KeyframeImages images_;  // Of the map to go on in.
+  std::shared_ptr<PythonMap> last_map_;
+  bool is_finished_ = false;
+  bool is_taken_ = false;
+};
+
+PythonSystem::PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map)
+    : config_(std::move(config)),
+      settings_yaml_(settings_as_yaml(config_.settings)),
+      system_(config_.rig, config_.settings, timing, map ? map->stored.map : nullptr) {
+  if (map) images_ = map->stored.images;
+}
+
+void PythonSystem::expect_unfinished(const char* method) const {
+  if (is_finished_) {
+    throw std::runtime_error(std::string("System: ") + method +
+                             "() after finish(), expected before");
+  }
+}
+
+TrackingResult PythonSystem::feed(const py::object& timestamp_ns, const ImageArguments& images) {
+  const Turn turn = take();
+  expect_unfinished("feed");
+  const FrameArguments frame(images, config_.setup, config_.settings.depth);
+  if (config_.setup == Setup::kRgbd && !frame.has_depth() && system_.frame_states().empty()) {
+    fail_value("depth", images.depth, "the depth of the first frame in setup rgbd");
+  }
+  const FrameInput input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+  TrackingResult result;
+  {
+    const py::gil_scoped_release release;
+    result = system_.feed(input);
+  }
+  // The first frame decides.
+  if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
+  return result;
+}
+
+void PythonSystem::finish() {
+  const Turn turn = take();
+  const py::gil_scoped_release release;
+  system_.finish();
+  is_finished_ = true;
+}
+
+void PythonSystem::reset() {
+  const Turn turn = take();
+  expect_unfinished("reset");
+  const py::gil_scoped_release release;
+  system_.reset();
+  images_.clear();
+}
+
+void PythonSystem::set_mapping(bool is_on) {
+  const Turn turn = take();
+  expect_unfinished("set_mapping");
+  system_.set_mapping(is_on);
+}
+
+std::shared_ptr<PythonMap> PythonSystem::map() {
+  const Turn turn = take();
+  const std::shared_ptr<const Map> newest = system_.map();
+  if (!last_map_ || last_map_->stored.map != newest) {
+    last_map_ = std::make_shared<PythonMap>();
+    last_map_->stored = {newest, settings_yaml_, images_};
+  }
+  return last_map_;
+}
+
+Trajectory PythonSystem::trajectory() {
+  const Turn turn = take();
+  return {system_.trajectory()};
+}
+
+std::vector<std::string> PythonSystem::frame_states() {
+  const Turn turn = take();
+  std::vector<std::string> names;
+  for (const FrameState state : system_.frame_states()) names.emplace_back(to_string(state));
+  return names;
+}
+
+SystemStatistics PythonSystem::statistics() {
+  const Turn turn = take();
+  if (!is_finished_)
+    throw std::runtime_error("System: statistics() before finish(), expected after");
+  return system_.statistics();
+}
+
+std::optional<FocalCheck> PythonSystem::focal_check() {
+  const Turn turn = take();
+  const FocalCheck* check = system_.focal_check();
+  return check ? std::optional(*check) : std::nullopt;
+}
+
+FrameDetails PythonSystem::details() {
+  const Turn turn = take();
+  return system_.details();
+}
+
+void PythonSystem::save(const std::filesystem::path& path) {
+  const std::shared_ptr<PythonMap> newest = map();
+  const py::gil_scoped_release release;
+  save_map(path, newest->stored);
+}
+
+std::unique_ptr<PythonSystem> make_system(const py::object& cameras,
+                                          const py::object& setup,
+                                          const std::string& timing,
+                                          const py::object& settings,
+                                          const py::object& seed,
+                                          std::shared_ptr<PythonMap> map) {
+  return std::make_unique<PythonSystem>(read_session_config({cameras, setup, settings, seed}),
+                                        timing_argument(timing),
+                                        std::move(map));
+}
+
+using SystemClass = py::class_<PythonSystem>;
+
+void bind_feed(SystemClass& system) {
+  system.def(
+      "feed",
+      [](PythonSystem& self,
+         const py::object& timestamp_ns,
+         const py::object& image0,
+         const py::object& image1,
+         const py::object& depth,
+         const py::object& mask) {
+        return self.feed(timestamp_ns, {image0, image1, depth, mask});
+      },
+      py::arg("timestamp_ns"),
+      py::arg("image0"),
+      py::arg("image1") = py::none(),
+      py::arg("depth") = py::none(),
+      py::arg("mask") = py::none(),
+      R"(feed(self, timestamp_ns, image0, image1=None, depth=None, mask=None)
+--
+
+Tracks one frame and returns its TrackingResult.
+
+timestamp_ns: int, nanoseconds, later than that of the frame before.
+image0: of camera 0, uint8 array (H, W), or (H, W, 3) in the order red, green, blue, of the size
+    that the calibration states.
+image1: of camera 1 of a stereo pair, the same.
+depth: along z, registered to camera 0: uint16 array (H, W) in units of the sensor (setting
+    depth.factor of them are a metre), or float32 in metres, which is rounded to these units;
+    0 (and nan) where there is none.
+mask: of camera 0, uint8 or bool array (H, W), 0 where the image is not to be used.
+
+Arrays whose rows are contiguous are read in place, others are copied; none is kept. Other threads
+of Python run meanwhile; they must not write into the arrays.
+
+TypeError, ValueError for arrays of the wrong type or shape and for images that the setup does not
+have; InputError for a wrong size or time; RuntimeError after finish().)");
+}
+
+void bind_control(SystemClass& system) {
+  system
+      .def("finish", &PythonSystem::finish, R"(finish(self)
+--
+
+Ends the input: waits for outstanding mapping and refines the whole map. No feed() afterwards.)")
+      .def("reset", &PythonSystem::reset, R"(reset(self)
+--
+
+Begins anew with an empty map; frames count from 0 again.)")
+      .def("set_mapping", &PythonSystem::set_mapping, py::arg("is_on"), R"(set_mapping(self, is_on)
+--
+
+Off: the camera is followed in the map, which stays as it is. On at first.)")
+      .def(
+          "save",
+          [](PythonSystem& self, const py::object& path) {
+            self.save(path_argument("path", path));
+          },
+          py::arg("path"),
+          R"(save(self, path)
+--
+
+Writes the newest map to a file (.wmap), whole or not at all. OutputError when that fails.)")
+      .def_property_readonly(
+          "is_finished", &PythonSystem::is_finished, "bool: finish() was called.")
+      .def("__enter__", [](const py::object& self) { return self; })
+      .def("__exit__", [](PythonSystem& self, const py::args& args) {
+        if (args[0].is_none()) self.finish();
+      });
+}
+
+void bind_reading(SystemClass& system) {
+  system
+      .def("map", &PythonSystem::map, R"(map(self)
+--
+
+The newest finished Map, which never changes. The same object as last time where nothing new is
+there, so that `is` tells whether the map changed.)")
+      .def("trajectory", &PythonSystem::trajectory, R"(trajectory(self)
+--
+
+Every frame that has a pose, with what is known now: a Trajectory. Final after finish().)")
+      .def("frame_states", &PythonSystem::frame_states, R"(frame_states(self)
+--
+
+State of every frame fed so far, including those filled in after the fact: a list of str.)")
+      .def("statistics", &PythonSystem::statistics, R"(statistics(self)
+--
+
+Totals of the session: Statistics. After finish() only.)")
+      .def("focal_check", &PythonSystem::focal_check, R"(focal_check(self)
+--
+
+What the residuals say of the calibration's focal length: a FocalCheck, once some 200 frames are
+mapped and where the motion tells; None before.)")
+      .def("details", &PythonSystem::details, R"(details(self)
+--
+
+More of the frame fed last, for those who show it: FrameDetails.)");
+}
+
+}  // namespace
+
+void bind_system(py::module_& module) {
+  SystemClass system(module, "System", R"(Visual SLAM on a stream of frames.
+
+One thread at a time; a second one gets a RuntimeError. As a context manager it finishes at the end
+of the block, unless that raised.)");
+  system.def(
+      py::init(&make_system),
+      py::arg("cameras"),
+      py::kw_only(),
+      py::arg("setup") = py::none(),
+      py::arg("timing") = "lockstep",
+      py::arg("settings") = py::none(),
+      py::arg("seed") = py::none(),
+      py::arg("map") = py::none(),
+      R"(__init__(self, cameras, *, setup=None, timing='lockstep', settings=None, seed=None, map=None)
+--
+
+cameras: path of a camchain, a dict of the same content, a list of these (later ones override), or
+    a Calibration. Files and dicts may hold settings, too.
+setup: 'mono', 'stereo' or 'rgbd'. None: stereo with two cameras; with one, the first frame decides
+    by having depth or not.
+timing: 'inline' (one thread), 'lockstep' (threads, same results) or 'realtime' (never waits for
+    the mapper; results depend on how fast it is).
+settings: dict by dotted key or by section, for example {'features.count': 1500}.
+seed: of all random numbers.
+map: a Map to go on in; a copy is extended.
+
+InputError for cameras or settings that are malformed or cannot work together.)");
+  bind_feed(system);
+  bind_control(system);
+  bind_reading(system);
+}
+
+}  // namespace waymark::python
