@@ -17,8 +17,10 @@ def check_links(pages):
             fault = broken(page, target, pages, reached)
             if fault:
                 faults.append(f"{page.path.relative_to(ROOT)}:{line}: link to {target}: {fault}")
-    docs = ROOT / "docs"
+    docs, site = ROOT / "docs", (ROOT / "mkdocs.yml").read_text(encoding="utf-8")
     for path in pages:
+        if docs in path.parents and f" {path.relative_to(docs)}\n" not in site:
+            faults.append(f"{path.relative_to(ROOT)}:1: is missing in the table of contents in mkdocs.yml")
         if docs in path.parents and path not in reached and path != docs / "README.md":
             faults.append(f"{path.relative_to(ROOT)}:1: no other page links to it")
     return faults

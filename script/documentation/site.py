@@ -18,6 +18,8 @@ def on_page_markdown(markdown, page, **_):
         if not target or "://" in target:
             return match[0]
         path = (folder / target).resolve()
-        return match[0] if DOCS in path.parents and path.is_file() else text
+        if DOCS in path.parents and path.is_file():
+            return match[0]
+        return f"`{text}`" if re.search(r"[./]", text) and "`" not in text else text
 
     return MARKER.sub("", LINK.sub(keep_or_drop, markdown))
