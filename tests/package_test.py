@@ -73,6 +73,15 @@ class Package(unittest.TestCase):
         self.work.mkdir()
         self.addCleanup(shutil.rmtree, self.work)
 
+    def test_python_module(self):
+        if "python3-waymark" not in self.packages:
+            raise unittest.SkipTest("the Python module is not built")
+        said = run("/usr/bin/python3", "-c", "import waymark; print(waymark.__file__, waymark.__version__)",
+                   env={**os.environ, "PYTHONPATH": str(CLEAN / "usr/lib/python3/dist-packages"),
+                        "PYTHONDONTWRITEBYTECODE": "1"})
+        self.assertIn(str(CLEAN), said)
+        self.assertIn(field(self.packages["python3-waymark"], "Version").split("-")[0], said)
+
     def test_demo(self):
         out = self.work / "demo"
         run(self.program, "demo", "--frames", 100, "--once", "--port", "127.0.0.1:0", "-o", out)
