@@ -6,7 +6,9 @@ include(WaymarkPublicHeaders)
 waymark_public_headers(headers)
 foreach(header ${headers})
   cmake_path(GET header PARENT_PATH folder)
-  install(FILES "${PROJECT_SOURCE_DIR}/src/${header}" COMPONENT dev
+  set(file "${PROJECT_SOURCE_DIR}/src/${header}")
+  set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}") # For what it includes.
+  install(FILES "${file}" COMPONENT dev
           DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/${folder}")
 endforeach()
 

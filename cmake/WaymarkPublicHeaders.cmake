@@ -1,5 +1,6 @@
 # What a program of a user's may include. These headers are installed, with all that they include;
-# everything else in src/ may change at any time.
+# everything else in src/ may change at any time. `cmake -P` on this file lists them.
+cmake_minimum_required(VERSION 3.25)
 set(roots
   base/check.h # InputError, which every reader throws
   base/config.h # settings files
@@ -42,12 +43,15 @@ function(waymark_public_headers result)
       continue()
     endif()
     list(APPEND found "${header}")
-    set(file "${PROJECT_SOURCE_DIR}/src/${header}")
-    set_property(DIRECTORY APPEND PROPERTY CMAKE_CONFIGURE_DEPENDS "${file}")
-    file(STRINGS "${file}" includes REGEX "^#include \"waymark/")
+    file(STRINGS "${CMAKE_CURRENT_FUNCTION_LIST_DIR}/../src/${header}" includes REGEX "^#include \"waymark/")
     list(TRANSFORM includes REPLACE "^#include \"([^\"]+)\".*" "\\1")
     list(APPEND waiting ${includes})
   endwhile()
   list(SORT found)
   set(${result} ${found} PARENT_SCOPE)
 endfunction()
+
+if(CMAKE_SCRIPT_MODE_FILE STREQUAL CMAKE_CURRENT_LIST_FILE)
+  waymark_public_headers(headers)
+  execute_process(COMMAND "${CMAKE_COMMAND}" -E echo ${headers})
+endif()

@@ -11,6 +11,7 @@ namespace waymark {
 /// "WHERE: what is wrong, what was expected" on one line.
 class InputError : public std::runtime_error {
  public:
+  /// where: file and line, setting or argument; what: what is wrong and what was expected.
   InputError(const std::string& where, const std::string& what)
       : std::runtime_error(where + ": " + what) {}
 };
@@ -18,6 +19,7 @@ class InputError : public std::runtime_error {
 /// The results cannot be written or the work cannot be finished; same form of message.
 class OutputError : public std::runtime_error {
  public:
+  /// where: the file or device; what: why it cannot be written.
   OutputError(const std::string& where, const std::string& what)
       : std::runtime_error(where + ": " + what) {}
 };
@@ -28,6 +30,7 @@ class CheckError : public std::logic_error {
   using std::logic_error::logic_error;
 };
 
+/// Throws the CheckError of WAYMARK_CHECK.
 [[noreturn]] void fail_check(const char* condition, const char* file, int line);
 
 }  // namespace waymark

@@ -12,13 +12,14 @@ namespace waymark {
 
 /// A value of a YAML document, which remembers where it was written.
 struct ConfigNode {
+  /// The kinds of YAML values; numbers, words and true are scalars.
   enum class Kind { kNull, kScalar, kList, kMap };
 
-  Kind kind = Kind::kNull;
-  std::string scalar;             ///< As written, without quotes.
-  std::vector<std::string> keys;  ///< Of a map, as many as items, in the order written.
-  std::vector<ConfigNode> items;  ///< Elements of a list, values of a map.
-  std::shared_ptr<const std::string> file;
+  Kind kind = Kind::kNull;                  ///< Nothing was written: null.
+  std::string scalar;                       ///< As written, without quotes.
+  std::vector<std::string> keys;            ///< Of a map, as many as items, in the order written.
+  std::vector<ConfigNode> items;            ///< Elements of a list, values of a map.
+  std::shared_ptr<const std::string> file;  ///< Name of the source; null: none.
   int line = 0;  ///< From 1; of a value in a map the line of its key. 0: no file.
 
   /// "FILE:LINE", as error messages begin.
@@ -29,8 +30,8 @@ struct ConfigNode {
 
 /// Text of YAML from somewhere.
 struct ConfigSource {
-  std::string name;  ///< Of the file, for messages.
-  std::string text;
+  std::string name;      ///< Of the file, for messages.
+  std::string text;      ///< YAML, UTF-8.
   std::string key = {};  ///< Dotted key that the text is the value of; empty: the whole document.
 
   /// Reads a file. Throws InputError when it is missing, unreadable or larger than 1 MiB.

@@ -24,8 +24,9 @@ template <class Key, class T, std::size_t kPageSize = 64>
 class CowTable {
  public:
   CowTable() = default;
+  /// Takes the pages over; what is left of the other may only be assigned to or destroyed.
   CowTable(CowTable&&) noexcept = default;
-  CowTable& operator=(CowTable&&) noexcept = default;
+  CowTable& operator=(CowTable&&) noexcept = default;  ///< As the constructor.
 
   /// Copy that shares every page with this table and never changes. O(pages).
   CowTable freeze() {
@@ -40,12 +41,15 @@ class CowTable {
     return CowTable(frozen);
   }
 
+  /// Number of elements.
   std::size_t size() const { return size_; }
+  /// Whether there is no element.
   bool is_empty() const { return size_ == 0; }
 
   /// One past the largest id ever given; every id of the table is below.
   Key end_id() const { return Key{next_}; }
 
+  /// Whether there is an element with this id.
   bool contains(Key id) const { return find(id) != nullptr; }
 
   /// The element, or nullptr. Valid until the table is edited or destroyed.

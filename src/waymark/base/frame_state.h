@@ -32,6 +32,7 @@ enum class FrameReason {
 
 /// Names as written to result files, for example "initializing", "too_few_matches".
 std::string_view to_string(FrameState state);
+/// Its name as written to result files.
 std::string_view to_string(FrameReason reason);
 
 }  // namespace waymark

@@ -11,8 +11,10 @@ namespace waymark {
 /// between libraries.
 class Rng {
  public:
+  /// Different streams of one seed are independent of each other.
   Rng(std::uint64_t seed, std::uint64_t stream) : state_(mix(seed) ^ mix(~stream)) {}
 
+  /// 64 uniform bits.
   std::uint64_t next() {
     state_ += 0x9E3779B97F4A7C15ull;
     return mix(state_);
@@ -26,6 +28,7 @@ class Rng {
   /// Uniform in [0, 1).
   double uniform() { return static_cast<double>(next() >> 11) * 0x1.0p-53; }
 
+  /// Uniform in [low, high).
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
 
   /// Standard normal (Box and Muller 1958).

@@ -29,18 +29,19 @@ namespace waymark {
 struct SettingInfo {
   double low = -std::numeric_limits<double>::infinity();  ///< Smallest allowed value.
   double high = std::numeric_limits<double>::infinity();  ///< Largest allowed value.
-  const char* unit = "";
-  const char* help = "";
+  const char* unit = "";  ///< Of the value, for people; empty: a number or a ratio.
+  const char* help = "";  ///< One sentence.
 };
 
 /// One field of a settings struct, whatever its type. A section has no value.
 struct SettingField {
   struct Section {};
+  /// Pointer to the field.
   using Value = std::variant<Section, bool*, int*, double*, std::string*, std::vector<double>*>;
 
-  std::string key;  ///< Dotted: "features.count".
-  Value value;
-  SettingInfo info;
+  std::string key;   ///< Dotted: "features.count".
+  Value value;       ///< Where the field is; valid as long as the settings that were listed.
+  SettingInfo info;  ///< Range, unit and help.
 };
 
 /// All fields in the order described, a section before its fields.
@@ -67,6 +68,7 @@ std::vector<SettingField> list_settings(Settings& settings, const std::string& p
 /// camera/camchain.h reads them.
 void read_settings(const std::vector<SettingField>& fields, const ConfigNode& config);
 
+/// The same for a whole settings struct.
 template <class Settings>
 void read_settings(Settings& settings, const ConfigNode& config) {
   read_settings(list_settings(settings), config);
@@ -83,6 +85,7 @@ void read_settings(Settings& settings, const std::vector<ConfigSource>& sources)
 std::string settings_as_yaml(const std::vector<SettingField>& fields,
                              const std::vector<SettingField>& defaults);
 
+/// The same for a whole settings struct.
 template <class Settings>
 std::string settings_as_yaml(Settings settings) {
   Settings defaults;
@@ -93,6 +96,7 @@ std::string settings_as_yaml(Settings settings) {
 /// under its heading.
 std::string settings_as_markdown(const std::vector<SettingField>& fields);
 
+/// The same for the defaults of a settings struct.
 template <class Settings>
 std::string settings_as_markdown() {
   Settings defaults;

@@ -25,6 +25,7 @@ class ThreadPool {
   ThreadPool(const ThreadPool&) = delete;
   ThreadPool& operator=(const ThreadPool&) = delete;
 
+  /// The calling thread included, hence at least 1.
   unsigned num_threads() const { return static_cast<unsigned>(workers_.size()) + 1; }
 
   /// Calls body(begin, end) for consecutive chunks of [0, count), each of chunk_size but the last,

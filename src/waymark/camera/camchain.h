@@ -17,13 +17,13 @@ namespace waymark {
 
 /// A camera of a chain; camera 0 is the rig's origin.
 struct ChainCamera {
-  CameraDescription description;
-  Rigid3 cam_from_rig;
+  CameraDescription description;  ///< Model and numbers, not checked yet.
+  Rigid3 cam_from_rig;            ///< Identity for camera 0; translation in metres.
 };
 
 /// The calibration of a rig, as written: cameras are made of it by make_rig().
 struct CameraChain {
-  std::vector<ChainCamera> cameras;
+  std::vector<ChainCamera> cameras;    ///< cam0, cam1, ... in order.
   std::optional<double> depth_factor;  ///< Units of the depth image per metre.
   std::vector<std::string> notes;      ///< What was ignored, each with its place.
 };

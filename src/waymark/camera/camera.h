@@ -11,7 +11,9 @@
 
 namespace waymark {
 
+/// Derivative of a pixel by a point, double precision.
 using Matrix23d = Eigen::Matrix<double, 2, 3>;
+/// The same in single precision, as features hold it.
 using Matrix23f = Eigen::Matrix<float, 2, 3>;
 
 /// A central camera: maps points of its own frame (x right, y down, z forward, metres) to pixels,
@@ -24,7 +26,9 @@ class Camera {
   /// Name of the model as in settings files, for example "pinhole".
   virtual std::string_view model() const = 0;
 
+  /// Width of the image.
   int width_px() const { return width_px_; }
+  /// Height of the image.
   int height_px() const { return height_px_; }
 
   /// Projects points (any distance but 0). is_visible is 1 where the point lies in the model's
@@ -54,6 +58,7 @@ class Camera {
   }
 
  protected:
+  /// Size of the image, both positive.
   Camera(int width_px, int height_px) : width_px_(width_px), height_px_(height_px) {}
 
  private:

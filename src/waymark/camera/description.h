@@ -11,11 +11,12 @@ namespace waymark {
 struct CameraDescription {
   std::string camera_model;        ///< "pinhole" or the name of another registered model.
   std::vector<double> intrinsics;  ///< For pinhole fu fv pu pv, in pixels.
+  /// "none", or the distortion of the model: "radtan", "equidistant".
   std::string distortion_model = "none";
-  std::vector<double> distortion_coeffs;
-  int width_px = 0;
-  int height_px = 0;
-  std::string where;  ///< Begins error messages, for example "camchain.yaml:3".
+  std::vector<double> distortion_coeffs;  ///< For radtan k1 k2 p1 p2, for equidistant k1 k2 k3 k4.
+  int width_px = 0;                       ///< Of the images.
+  int height_px = 0;                      ///< Of the images.
+  std::string where;                      ///< Begins error messages, for example "camchain.yaml:3".
 
   /// The same camera, wherever it was written.
   bool is_same(const CameraDescription& other) const;

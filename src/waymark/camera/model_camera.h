@@ -36,9 +36,11 @@ concept CameraModel = requires(const Model& model,
 template <CameraModel Model>
 class ModelCamera final : public Camera {
  public:
+  /// A camera with these parameters and an image of this size.
   ModelCamera(Model model, int width_px, int height_px)
       : Camera(width_px, height_px), parameters_(std::move(model)) {}
 
+  /// The model struct.
   const Model& parameters() const { return parameters_; }
 
   std::string_view model() const override { return Model::kName; }

@@ -14,8 +14,9 @@ namespace waymark {
 
 /// One camera of a rig. cam_from_rig is fixed; camera 0 is the rig's origin.
 struct RigCamera {
+  /// Shared by everything that looks through it; never null.
   std::shared_ptr<const Camera> camera;
-  Rigid3 cam_from_rig;
+  Rigid3 cam_from_rig;  ///< Translation in metres.
   /// What make_rig() made the camera of; map files hold it. A map whose cameras lack it cannot be
   /// saved.
   std::optional<CameraDescription> description = std::nullopt;
@@ -23,7 +24,7 @@ struct RigCamera {
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.
 struct Rig {
-  std::vector<RigCamera> cameras;
+  std::vector<RigCamera> cameras;  ///< At least one.
 };
 
 }  // namespace waymark

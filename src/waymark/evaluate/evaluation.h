@@ -21,7 +21,9 @@ enum class TrajectoryAlignment { kNone, kSe3, kSim3 };
 /// "none", "se3", "sim3".
 std::string_view to_string(TrajectoryAlignment alignment);
 
+/// How two trajectories are compared.
 struct EvaluationOptions {
+  /// kSim3 where the scale is free (one camera), kNone where both have the same frame.
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
   std::int64_t max_difference_ns = 20'000'000;  ///< Between a pose and its true one.
   /// Input frames of the run; with it the coverage counts poses, without it time.
@@ -30,23 +32,25 @@ struct EvaluationOptions {
 
 /// Of the distances between estimated and true positions.
 struct ErrorStatistics {
-  double rmse = 0.0;
-  double mean = 0.0;
-  double median = 0.0;
-  double max = 0.0;
+  double rmse = 0.0;    ///< Root of the mean square.
+  double mean = 0.0;    ///< Arithmetic mean.
+  double median = 0.0;  ///< Of an even number the mean of the middle two.
+  double max = 0.0;     ///< The largest.
 };
 
 /// Distance between an estimated position, aligned, and the true one.
 struct PositionError {
-  std::int64_t timestamp_ns = 0;
-  double error_m = 0.0;
+  std::int64_t timestamp_ns = 0;  ///< Of the estimated pose.
+  double error_m = 0.0;           ///< In units of the ground truth.
 };
 
+/// What a comparison gives. Lengths are in the unit of the ground truth, which is taken for metres.
 struct Evaluation {
-  TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;
+  TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;  ///< That of the options.
+  /// The motion that was applied to the estimate; identity for kNone.
   Sim3 groundtruth_from_estimate;
-  std::size_t num_estimate_poses = 0;
-  std::size_t num_pairs = 0;
+  std::size_t num_estimate_poses = 0;  ///< Poses of the estimate, with and without a true one.
+  std::size_t num_pairs = 0;           ///< Poses that were compared.
   /// Estimated poses per input frame when their number is known, else covered_part().
   double coverage = 0.0;
   double path_length_m = 0.0;             ///< Of the true path through the pairs.

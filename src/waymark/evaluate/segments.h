@@ -13,10 +13,10 @@ namespace waymark {
 
 /// Mean relative error over path segments of one length.
 struct SegmentError {
-  double length_m = 0.0;
-  double translation_percent = 0.0;
-  double rotation_deg_per_100m = 0.0;
-  std::size_t num_segments = 0;
+  double length_m = 0.0;               ///< Along the true path.
+  double translation_percent = 0.0;    ///< Position error at the end, in percent of the length.
+  double rotation_deg_per_100m = 0.0;  ///< Angle error at the end, per 100 m of length.
+  std::size_t num_segments = 0;        ///< That the mean is over.
 };
 
 /// The measure of the KITTI odometry benchmark (Geiger et al. 2012).

@@ -10,8 +10,8 @@
 namespace waymark {
 
 using Rgb = std::array<std::uint8_t, 3>;  ///< Red, green, blue.
-using ColorView = BasicImageView<Rgb>;
-using ColorImage = BasicImage<Rgb>;
+using ColorView = BasicImageView<Rgb>;    ///< A borrowed image in colour.
+using ColorImage = BasicImage<Rgb>;       ///< An image in colour.
 
 /// The luma of ITU-R BT.601, 0.299 R + 0.587 G + 0.114 B, rounded; bit by bit what OpenCV makes of
 /// such an image.

@@ -6,24 +6,11 @@
 #include <span>
 #include <vector>
 
-#include "waymark/base/settings.h"
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
+#include "waymark/image/settings.h"
 
 namespace waymark {
-
-struct DepthSettings {
-  double factor = 1000.0;
-
-  template <class Self, class Field>
-  static void describe(Self& self, Field&& field) {
-    field(
-        "factor",
-        self.factor,
-        SettingInfo{
-            .low = 1.0, .high = 1e6, .unit = "1/m", .help = "Units of the depth image per metre."});
-  }
-};
 
 /// Range along its bearing of each keypoint, from a depth image that is registered to the camera
 /// (depth along z), and the standard deviation of the inverse range. Both are 0 where the image

@@ -5,33 +5,12 @@
 #include <memory>
 #include <vector>
 
-#include "waymark/base/settings.h"
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
 #include "waymark/image/pyramid.h"
+#include "waymark/image/settings.h"
 
 namespace waymark {
-
-struct FeatureSettings {
-  int count = 1000;
-  int min_contrast = 7;
-
-  template <class Self, class Field>
-  static void describe(Self& self, Field&& field) {
-    field("count",
-          self.count,
-          SettingInfo{
-              .low = 50,
-              .high = 20000,
-              .help = "Features per image; half as many again where it shows all directions."});
-    field("min_contrast",
-          self.min_contrast,
-          SettingInfo{.low = 1,
-                      .high = 100,
-                      .unit = "grey values",
-                      .help = "Corners with less contrast to their surroundings are ignored."});
-  }
-};
 
 /// Finds features: FAST corners (Rosten & Drummond 2006) on the levels of a pyramid, spread evenly
 /// over the image (Bailo et al. 2018), located to sub-pixel accuracy, oriented and described by

@@ -15,8 +15,8 @@ namespace waymark {
 
 /// A corner in the image of one camera of the rig. Pixel of level 0, sub-pixel.
 struct Keypoint {
-  float x_px = 0.0f;
-  float y_px = 0.0f;
+  float x_px = 0.0f;        ///< To the right; 0 is the centre of the leftmost pixels.
+  float y_px = 0.0f;        ///< Down; 0 is the centre of the top pixels.
   float angle_rad = 0.0f;   ///< Orientation of the patch, clockwise as y points down.
   float response = 0.0f;    ///< Corner score; comparable within one image only.
   std::uint8_t level = 0;   ///< Pyramid level it was found at.
@@ -26,20 +26,21 @@ struct Keypoint {
 /// 256 bits of rotated BRIEF.
 using Descriptor = std::array<std::uint64_t, 4>;
 
+/// In place of the index of a feature: none.
 inline constexpr std::uint32_t kNoFeature = UINT32_MAX;
 
 /// Inverse of a measured range and its standard deviation in 1/m; both 0 where none was measured.
 struct MeasuredRange {
-  float inverse = 0.0f;
-  float inverse_sigma = 0.0f;
+  float inverse = 0.0f;        ///< In 1/m.
+  float inverse_sigma = 0.0f;  ///< In 1/m.
 };
 
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
 /// none and belong to a primary feature.
 struct Features {
-  std::size_t num_primary = 0;
-  std::vector<Keypoint> keypoints;
+  std::size_t num_primary = 0;            ///< Features of camera 0.
+  std::vector<Keypoint> keypoints;        ///< All features; pixels are those of each one's camera.
   std::vector<Descriptor> descriptors;    ///< num_primary entries.
   std::vector<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
   /// Derivative of the pixel of the feature's level by the bearing, at the measured bearing (W).
@@ -55,6 +56,7 @@ struct Features {
   std::vector<float> inverse_range_sigma;
   FeatureGrid grid;  ///< Of the primary features, by level-0 pixel.
 
+  /// Features of both cameras.
   std::size_t size() const { return keypoints.size(); }
 
   /// What the depth image says of a feature; nothing of those of camera 1.

@@ -11,13 +11,16 @@ namespace waymark {
 /// A borrowed image: rows of width_px values, stride values apart. Row-major, single channel.
 template <class T>
 struct BasicImageView {
-  const T* data = nullptr;
-  int width_px = 0;
-  int height_px = 0;
+  const T* data = nullptr;    ///< The first value of the top row.
+  int width_px = 0;           ///< Columns.
+  int height_px = 0;          ///< Rows.
   std::ptrdiff_t stride = 0;  ///< In values, not bytes.
 
+  /// The first value of a row; y in [0, height_px).
   const T* row(int y) const { return data + y * stride; }
+  /// The value at column x of row y, unchecked.
   T at(int x, int y) const { return row(y)[x]; }
+  /// Whether there is no image.
   bool is_empty() const { return data == nullptr || width_px <= 0 || height_px <= 0; }
 };
 
@@ -28,22 +31,26 @@ using DepthView =
 /// An image that owns its rows; stride is the width.
 template <class T>
 struct BasicImage {
-  std::vector<T> values;
-  int width_px = 0;
-  int height_px = 0;
+  std::vector<T> values;  ///< Row-major, height_px * width_px of them.
+  int width_px = 0;       ///< Columns.
+  int height_px = 0;      ///< Rows.
 
   BasicImage() = default;
+  /// All values 0.
   BasicImage(int width, int height)
       : values(static_cast<std::size_t>(width) * static_cast<std::size_t>(height)),
         width_px(width),
         height_px(height) {}
 
+  /// The first value of a row; y in [0, height_px).
   T* row(int y) { return values.data() + static_cast<std::ptrdiff_t>(y) * width_px; }
+  /// The first value of a row; y in [0, height_px).
   const T* row(int y) const { return values.data() + static_cast<std::ptrdiff_t>(y) * width_px; }
+  /// Borrows the image: valid until it is resized, moved or destroyed.
   BasicImageView<T> view() const { return {values.data(), width_px, height_px, width_px}; }
 };
 
-using Image = BasicImage<std::uint8_t>;
-using DepthImage = BasicImage<std::uint16_t>;
+using Image = BasicImage<std::uint8_t>;        ///< Grey values.
+using DepthImage = BasicImage<std::uint16_t>;  ///< Depth along z in units of the sensor; 0: none.
 
 }  // namespace waymark

@@ -9,28 +9,15 @@
 #include <span>
 #include <vector>
 
-#include "waymark/base/settings.h"
 #include "waymark/camera/rig.h"
 #include "waymark/image/features.h"
 #include "waymark/image/pyramid.h"
+#include "waymark/image/settings.h"
 #include "waymark/image/stereo_curve.h"
 #include "waymark/image/stereo_kernel.h"
 #include "waymark/image/stereo_patch.h"
 
 namespace waymark {
-
-struct StereoSettings {
-  double min_range_baselines = 4.0;
-
-  template <class Self, class Field>
-  static void describe(Self& self, Field&& field) {
-    field("min_range_baselines",
-          self.min_range_baselines,
-          SettingInfo{.low = 0.1,
-                      .high = 1000.0,
-                      .help = "Nearest range that stereo search looks at, in baselines."});
-  }
-};
 
 /// A feature of camera 0 found again in camera 1.
 struct StereoMatch {

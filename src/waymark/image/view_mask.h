@@ -6,41 +6,11 @@
 #include <cstdint>
 #include <memory>
 
-#include "waymark/base/settings.h"
 #include "waymark/camera/camera.h"
 #include "waymark/image/image.h"
+#include "waymark/image/settings.h"
 
 namespace waymark {
-
-/// Directions that are not used, for what moves with the camera.
-struct ViewSettings {
-  double max_angle_deg = 180.0;
-  double top_deg = 0.0;
-  double bottom_deg = 0.0;
-
-  template <class Self, class Field>
-  static void describe(Self& self, Field&& field) {
-    field("max_angle_deg",
-          self.max_angle_deg,
-          SettingInfo{.low = 1.0,
-                      .high = 180.0,
-                      .unit = "degrees",
-                      .help = "No features farther than this off the optical axis."});
-    field("top_deg",
-          self.top_deg,
-          SettingInfo{.low = 0.0,
-                      .high = 90.0,
-                      .unit = "degrees",
-                      .help = "No features closer than this to straight up (-y of the camera)."});
-    field("bottom_deg",
-          self.bottom_deg,
-          SettingInfo{.low = 0.0,
-                      .high = 90.0,
-                      .unit = "degrees",
-                      .help = "No features closer than this to straight down (+y), where whoever "
-                              "carries a 360 degree camera is."});
-  }
-};
 
 /// Where in the images of a camera features may be. Kept free are pixels without a bearing, the
 /// black surroundings of a lens's image circle, and directions that the settings exclude.

@@ -28,6 +28,7 @@ std::optional<std::string> read_as_jpeg(const std::filesystem::path& path);
 
 /// The bytes of an image file.
 std::string encode_jpeg(const ColorImage& image);
+/// The bytes of an image file, lossless.
 std::string encode_png(const Image& image);
 
 /// Keeps OpenCV and its video library from printing to standard error; errors reach the user as

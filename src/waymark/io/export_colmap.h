@@ -9,15 +9,16 @@
 
 namespace waymark {
 
+/// Both forms that COLMAP reads: .txt and .bin files.
 enum class ColmapForm { kText, kBinary };
 
 /// The three files of a COLMAP model, as its documentation describes them. Numbers of images,
 /// cameras and points are our indices and ids plus one; pixels are counted from the corner of the
 /// image, as COLMAP does.
 struct ColmapModel {
-  std::string cameras;
-  std::string images;
-  std::string points;
+  std::string cameras;  ///< Contents of cameras.txt or cameras.bin.
+  std::string images;   ///< Contents of images.txt or images.bin: poses and pixels.
+  std::string points;   ///< Contents of points3D.txt or points3D.bin.
 };
 
 /// InputError for a camera model that COLMAP does not have.

@@ -10,9 +10,9 @@ namespace waymark {
 
 /// What belongs to a transforms.json, as it names it: relative to itself.
 struct NerfstudioPaths {
-  std::string image_folder = "images";
-  std::string mask_folder = "masks";
-  std::string point_file = "points.ply";
+  std::string image_folder = "images";    ///< Holds the images of the views by name.
+  std::string mask_folder = "masks";      ///< Holds the masks of the views by name.
+  std::string point_file = "points.ply";  ///< The points, see format_ply().
 };
 
 /// The views of a scene as the transforms.json of nerfstudio ("Data conventions" of its

@@ -22,7 +22,7 @@ std::vector<SubmapId> submaps_by_size(const Map& map);
 /// Camera 0 of the keyframes of a sub-map in the world, by time.
 std::vector<StampedPose> keyframe_trajectory(const Map& map, SubmapId submap);
 
-inline constexpr std::uint32_t kNoPoint = UINT32_MAX;
+inline constexpr std::uint32_t kNoPoint = UINT32_MAX;  ///< In place of the index of a point: none.
 
 /// What camera 0 of a keyframe saw, or a part of it.
 struct ExportView {
@@ -30,18 +30,21 @@ struct ExportView {
   std::string mask_name;   ///< Of the mask that belongs to it; empty if everything is seen.
   KeyframeId keyframe;     ///< Whose it is.
   std::size_t camera = 0;  ///< Index in ExportScene::cameras.
-  Rigid3 cam_from_world;
+  Rigid3 cam_from_world;   ///< In metres (map units where the scale is free).
   std::vector<Eigen::Vector2d> pixels;  ///< Of its features.
   std::vector<std::uint32_t> points;    ///< Per feature the index in ExportScene::points, or none.
 };
 
+/// A view that sees a point.
 struct ExportSighting {
   std::uint32_t view = 0;     ///< Index in ExportScene::views.
   std::uint32_t feature = 0;  ///< Index in its pixels.
 };
 
+/// A landmark.
 struct ExportPoint {
-  LandmarkId landmark;
+  LandmarkId landmark;  ///< Which one of the map.
+  /// In metres (map units where the scale is free).
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
   std::array<std::uint8_t, 3> color = {128, 128, 128};  ///< Red, green, blue.
   double error_px = 0.0;                                ///< Mean reprojection error.
@@ -50,9 +53,9 @@ struct ExportPoint {
 
 /// A sub-map as other programs know maps: cameras, views with features, points with tracks.
 struct ExportScene {
-  std::vector<CameraDescription> cameras;
-  std::vector<ExportView> views;  ///< By id of the keyframe.
-  std::vector<ExportPoint> points;
+  std::vector<CameraDescription> cameras;  ///< Of the views; equal ones once.
+  std::vector<ExportView> views;           ///< By id of the keyframe.
+  std::vector<ExportPoint> points;         ///< By id of the landmark.
 };
 
 /// A sub-map in these terms. Sightings that are off by more than kMaxExportErrorPx are left out,

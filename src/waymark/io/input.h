@@ -32,15 +32,16 @@ enum class FrameFault {
 
 /// The images of one moment. With a fault there are none.
 struct InputFrame {
-  std::size_t index = 0;  ///< In the whole INPUT, before --first, --every.
-  std::int64_t timestamp_ns = 0;
+  std::size_t index = 0;            ///< In the whole INPUT, before --first, --every.
+  std::int64_t timestamp_ns = 0;    ///< Increases from frame to frame.
   std::vector<Image> images;        ///< Grey, one per camera of the setup.
   std::optional<DepthImage> depth;  ///< Of camera 0; nothing where the moment has no depth image.
   std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
   std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
-  FrameFault fault = FrameFault::kNone;
+  FrameFault fault = FrameFault::kNone;  ///< Why there are no images.
 };
 
+/// What to take of an input, and how.
 struct InputOptions {
   std::string format;          ///< "euroc", "kitti", "tum", "images", "video"; empty: recognised.
   std::optional<Setup> setup;  ///< Nothing: all that the input offers.
@@ -61,9 +62,9 @@ struct InputInfo {
   std::optional<std::size_t> num_frames;
   /// One camera per image of a frame: from the options, else from the data set, else nothing.
   std::optional<CameraChain> calibration;
-  bool is_live = false;  ///< A camera: frames come when they come.
-  int width_px = 0;      ///< Of the images of camera 0.
-  int height_px = 0;
+  bool is_live = false;            ///< A camera: frames come when they come.
+  int width_px = 0;                ///< Of the images of camera 0.
+  int height_px = 0;               ///< Of the images of camera 0.
   std::vector<std::string> lines;  ///< The same in words, for people.
 };
 
@@ -71,6 +72,7 @@ struct InputInfo {
 class Input {
  public:
   virtual ~Input() = default;
+  /// What was understood when it was opened.
   virtual const InputInfo& info() const = 0;
   /// The next frame, or nothing at the end. A bad image is a fault of its frame, never an
   /// exception.

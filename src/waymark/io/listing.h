@@ -15,7 +15,7 @@ namespace waymark {
 
 /// Files of one moment.
 struct ListedFrame {
-  std::int64_t timestamp_ns = 0;
+  std::int64_t timestamp_ns = 0;              ///< As the data set states it.
   std::vector<std::filesystem::path> images;  ///< One per camera.
   std::filesystem::path depth;                ///< Empty: none.
 };
@@ -25,7 +25,7 @@ struct Listing {
   std::string format;               ///< As in InputOptions.
   std::string title;                ///< For people, for example "KITTI odometry".
   std::vector<ListedFrame> frames;  ///< At least one; times increase.
-  Setup setup = Setup::kMono;
+  Setup setup = Setup::kMono;       ///< That of the frames' images.
   /// Calibration that the data set carries; a resolution of 0 is that of the first image.
   std::optional<CameraChain> calibration;
   std::vector<std::string> notes;  ///< What else was understood.
@@ -43,6 +43,7 @@ Setup choose_setup(const std::filesystem::path& path,
 /// Image files of a folder, sorted by name with numbers in it compared as numbers. Throws
 /// InputError when the folder is missing or holds none.
 std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+/// Video files of a folder in the same order; empty if there are none.
 std::vector<std::filesystem::path> list_videos(const std::filesystem::path& folder);
 
 /// Whether the extension is one of a video that may hold frames.

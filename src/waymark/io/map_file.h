@@ -16,8 +16,8 @@ namespace waymark {
 
 /// What a map file holds; docs/map-format.md describes its bytes.
 struct StoredMap {
-  std::shared_ptr<const Map> map;
-  std::string settings;  ///< Those used, as YAML.
+  std::shared_ptr<const Map> map;  ///< Never null.
+  std::string settings;            ///< Those used, as YAML.
   /// Of some keyframes or none; those of erased ones are not saved.
   KeyframeImages images;
   std::string producer = {};  ///< The program that wrote the file; save_map() sets its own.

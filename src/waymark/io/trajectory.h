@@ -16,8 +16,8 @@ namespace waymark {
 
 /// Pose of camera 0 at a time; metres (map units for a map of free scale).
 struct StampedPose {
-  std::int64_t timestamp_ns = 0;
-  Rigid3 world_from_camera;
+  std::int64_t timestamp_ns = 0;  ///< Of the image.
+  Rigid3 world_from_camera;       ///< x right, y down, z forward.
 };
 
 /// kTum:   "t tx ty tz qx qy qz qw", seconds (Sturm et al. 2012).
@@ -28,6 +28,7 @@ enum class TrajectoryFormat { kTum, kKitti, kEuroc };
 /// "tum", "kitti", "euroc".
 std::string_view to_string(TrajectoryFormat format);
 
+/// The text of a trajectory file, a pose per line in the order given.
 std::string format_trajectory(std::span<const StampedPose> poses, TrajectoryFormat format);
 
 /// Writes the file atomically; throws OutputError.
@@ -38,7 +39,9 @@ void write_trajectory(const std::filesystem::path& path,
 /// Parse text in one format; name is what errors call it. Rows keep their order. Throw InputError
 /// for malformed rows and for rotations that are none.
 std::vector<StampedPose> parse_tum_trajectory(std::string_view text, const std::string& name);
+/// The same for rows of EuRoC.
 std::vector<StampedPose> parse_euroc_trajectory(std::string_view text, const std::string& name);
+/// The same for rows of KITTI, which have no time.
 std::vector<Rigid3> parse_kitti_poses(std::string_view text, const std::string& name);
 
 /// One time in seconds per row, strictly increasing, at least one; nanoseconds come back.

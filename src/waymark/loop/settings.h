@@ -6,9 +6,11 @@
 
 namespace waymark {
 
+/// Places seen before.
 struct LoopSettings {
-  bool enabled = true;
+  bool enabled = true;  ///< Off: loops stay open and sub-maps apart.
 
+  /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
     field("enabled",

@@ -16,28 +16,28 @@ namespace waymark {
 
 /// A frame that stays in the map.
 struct Keyframe {
-  FrameId frame;  ///< Unique in a map: a session that extends one counts on.
-  std::int64_t timestamp_ns = 0;
-  SubmapId submap;
-  Rigid3 rig_from_world;
-  KeyframeId parent;  ///< In the spanning tree; invalid for the root of a sub-map.
+  FrameId frame;                  ///< Unique in a map: a session that extends one counts on.
+  std::int64_t timestamp_ns = 0;  ///< Of its images.
+  SubmapId submap;                ///< Whose frame the pose is in.
+  Rigid3 rig_from_world;          ///< In metres (map units where the scale is free).
+  KeyframeId parent;              ///< In the spanning tree; invalid for the root of a sub-map.
   /// Product of the scale corrections applied to this keyframe's surroundings; poses stored
   /// relative to it are rescaled by how much it changed since.
   double applied_scale = 1.0;
-  std::shared_ptr<const Rig> rig;
-  std::shared_ptr<const Features> features;
-  std::vector<LandmarkId> landmarks;  ///< One per feature, invalid where none.
+  std::shared_ptr<const Rig> rig;            ///< The cameras that saw it; never null.
+  std::shared_ptr<const Features> features;  ///< Never null.
+  std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
 };
 
 /// How many landmarks two keyframes share.
 struct CovisibilityEdge {
-  KeyframeId keyframe;
-  std::uint32_t num_shared = 0;
+  KeyframeId keyframe;           ///< The other one.
+  std::uint32_t num_shared = 0;  ///< At least 1.
 };
 
 /// Edges of one keyframe, ascending by id.
 struct Covisibility {
-  std::vector<CovisibilityEdge> edges;
+  std::vector<CovisibilityEdge> edges;  ///< Without the keyframe itself.
 };
 
 /// Where an erased keyframe went: poses relative to it are read relative to its heir.
@@ -50,8 +50,8 @@ struct KeyframeForwarding {
 
 /// Two keyframes that were found to show the same place, and how they lie to each other.
 struct LoopEdge {
-  KeyframeId from;
-  KeyframeId to;
+  KeyframeId from;    ///< The one that was in the map before.
+  KeyframeId to;      ///< The one that shows its place again.
   Sim3 to_from_from;  ///< Of the rigs; lengths in the units of the map around `to`.
 };
 

@@ -15,14 +15,16 @@ namespace waymark {
 
 /// A feature of a keyframe that sees a landmark.
 struct Observation {
-  KeyframeId keyframe;
-  std::uint32_t feature = kNoFeature;
+  KeyframeId keyframe;                 ///< That sees the landmark.
+  std::uint32_t feature = kNoFeature;  ///< Index in its Features.
+  /// By keyframe, then by feature.
   friend constexpr auto operator<=>(const Observation&, const Observation&) = default;
 };
 
 /// What a landmark looks like and from where; a pure function of its observations.
 struct Appearance {
-  Descriptor descriptor{};
+  Descriptor
+      descriptor{};  ///< Of its observers' the one with the least median distance to the others.
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Mean unit vector towards its observers.
   /// Extent in metres of one pixel of the level it was seen at: distance times size_rad.
   double size_m = 0.0;
@@ -30,13 +32,14 @@ struct Appearance {
 
 /// A point of the map.
 struct Landmark {
-  SubmapId submap;
+  SubmapId submap;  ///< Whose frame the position is in.
+  /// In metres (map units where the scale is free).
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
   KeyframeId reference;                   ///< The keyframe it was made from; moves with it.
   std::vector<Observation> observations;  ///< Ascending.
-  Appearance appearance;
-  std::uint32_t num_visible = 0;  ///< Frames in which it should have been seen.
-  std::uint32_t num_found = 0;    ///< Frames in which it was.
+  Appearance appearance;                  ///< Brought up to date by the mapper.
+  std::uint32_t num_visible = 0;          ///< Frames in which it should have been seen.
+  std::uint32_t num_found = 0;            ///< Frames in which it was.
 };
 
 /// Number of distinct keyframes among observations in ascending order.

@@ -22,30 +22,34 @@ struct Submap {
 /// All of a map in plain lists, as files hold it. Covisibility and the observations of the
 /// landmarks follow from the landmarks of the keyframes.
 struct MapParts {
+  /// A keyframe and its id.
   struct StoredKeyframe {
-    KeyframeId id;
-    Keyframe keyframe;
+    KeyframeId id;      ///< Of the keyframe.
+    Keyframe keyframe;  ///< With its features and the landmarks it sees.
   };
+  /// A landmark and its id.
   struct StoredLandmark {
-    LandmarkId id;
+    LandmarkId id;      ///< Of the landmark.
     Landmark landmark;  ///< Without observations.
   };
+  /// A keyframe that is gone.
   struct ErasedKeyframe {
-    KeyframeId id;
-    KeyframeForwarding forwarding;
+    KeyframeId id;                  ///< Its former id.
+    KeyframeForwarding forwarding;  ///< Where it went.
   };
+  /// A landmark that is gone.
   struct MergedLandmark {
-    LandmarkId id;
-    LandmarkId survivor;
+    LandmarkId id;        ///< Its former id.
+    LandmarkId survivor;  ///< The one it was merged into.
   };
-  std::vector<Submap> submaps;
+  std::vector<Submap> submaps;                   ///< By id; joined ones stay in the list.
   std::vector<StoredKeyframe> keyframes;         ///< Ascending.
   std::vector<StoredLandmark> landmarks;         ///< Ascending.
   std::vector<ErasedKeyframe> erased_keyframes;  ///< Ascending.
   std::vector<MergedLandmark> merged_landmarks;  ///< Ascending; that are gone.
   std::vector<LoopEdge> loop_edges;              ///< As Map::measured_loop_edges() gives them.
   KeyframeId end_keyframe;                       ///< One past the largest id ever given.
-  LandmarkId end_landmark;
+  LandmarkId end_landmark;                       ///< The same.
 };
 
 /// The map of a session: a value with one owner, changed through its mutators only, which keep both
@@ -56,8 +60,9 @@ struct MapParts {
 class Map {
  public:
   Map() = default;
+  /// Takes everything over; what is left may only be assigned to or destroyed.
   Map(Map&&) noexcept = default;
-  Map& operator=(Map&&) noexcept = default;
+  Map& operator=(Map&&) noexcept = default;  ///< As the constructor.
 
   /// The map that was taken apart. Ids must ascend below their ends, features and rigs be there;
   /// of whatever else is wrong, list_broken_invariants() tells.
@@ -69,8 +74,11 @@ class Map {
   /// Immutable copy that shares all unchanged pages; takes microseconds.
   std::shared_ptr<const Map> freeze();
 
+  /// The living keyframes, by id.
   const CowTable<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
+  /// The living landmarks, by id.
   const CowTable<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+  /// All sub-maps by id, joined ones, too.
   const std::vector<Submap>& submaps() const { return submaps_; }
   /// Covisible keyframes of a living keyframe, ascending by id.
   const std::vector<CovisibilityEdge>& covisible(KeyframeId id) const {
@@ -94,6 +102,7 @@ class Map {
   std::vector<LoopEdge> loop_edges() const;
   /// The same, lengths in the units before any correction. For writers of files.
   const std::vector<LoopEdge>& measured_loop_edges() const { return loop_edges_; }
+  /// Whether a keyframe is an end of a loop edge.
   bool has_loop_edge(KeyframeId id) const;
   /// Pose of a rig that was stored relative to a keyframe: the rig from the world as of now.
   /// scale_then is the keyframe's applied_scale when rig_from_keyframe was stored.
@@ -105,9 +114,11 @@ class Map {
   /// The living keyframe that stands for a possibly erased one.
   KeyframeId resolve(KeyframeId id) const;
 
+  /// Adds an empty sub-map.
   SubmapId add_submap(bool is_metric);
   /// Adds a keyframe without observations; the first of a sub-map becomes its root.
   KeyframeId add_keyframe(Keyframe keyframe);
+  /// Adds a landmark without observations. reference is a living keyframe of the sub-map.
   LandmarkId add_landmark(SubmapId submap,
                           const Eigen::Vector3d& position_in_world,
                           KeyframeId reference);
@@ -118,18 +129,23 @@ class Map {
   /// Moves the observations of one landmark to another, which survives; where a keyframe already
   /// sees the survivor, the absorbed one's feature is freed.
   void merge_landmarks(LandmarkId survivor, LandmarkId absorbed);
+  /// Erases a landmark with its observations.
   void erase_landmark(LandmarkId id);
   /// Erases a keyframe that is neither a root nor in a loop edge, its observations and the
   /// landmarks only it saw.
   void erase_keyframe(KeyframeId id);
+  /// Sets the pose of a keyframe; the landmarks stay where they are.
   void move_keyframe(KeyframeId id, const Rigid3& rig_from_world);
   /// Notes that lengths around a keyframe were multiplied by a factor.
   void rescale_keyframe(KeyframeId id, double factor);
+  /// Adds an edge between two living keyframes, measured in the units of now.
   void add_loop_edge(const LoopEdge& edge);
   /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
   /// first becomes its root and hangs below `parent` of the second.
   void join_submaps(KeyframeId child, KeyframeId parent);
+  /// Sets the position of a landmark, in the frame of its sub-map.
   void move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world);
+  /// Sets what a landmark looks like.
   void set_appearance(LandmarkId id, const Appearance& appearance);
   /// Adds to the counts of how often a landmark should have been and was seen.
   void count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found);

@@ -6,9 +6,11 @@
 
 namespace waymark {
 
+/// Landmarks and keyframes.
 struct MappingSettings {
-  int window_keyframes = 12;
+  int window_keyframes = 12;  ///< That local bundle adjustment moves.
 
+  /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
     field("window_keyframes",

@@ -15,10 +15,10 @@ namespace waymark {
 /// Where the rig is and looks: yaw 0 looks along +x, 90 along +y; pitch up and roll clockwise are
 /// positive. The world's z axis points up.
 struct MotionKey {
-  Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  double yaw_deg = 0.0;
-  double pitch_deg = 0.0;
-  double roll_deg = 0.0;
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();  ///< In the world, in metres.
+  double yaw_deg = 0.0;                                ///< To the left, seen from above.
+  double pitch_deg = 0.0;                              ///< Upwards.
+  double roll_deg = 0.0;                               ///< Clockwise.
 };
 
 /// Pose of the rig (axes of camera 0: x right, y down, z forward).
@@ -26,9 +26,9 @@ Rigid3 pose_of(const MotionKey& key);
 
 /// How much a hand or a step shakes the rig: amplitudes of a few sines between 0.4 and 2 Hz.
 struct Sway {
-  double position_m = 0.0;
-  double angle_deg = 0.0;
-  std::uint64_t seed = 0;
+  double position_m = 0.0;  ///< Amplitude along each axis.
+  double angle_deg = 0.0;   ///< Amplitude of yaw, pitch and roll.
+  std::uint64_t seed = 0;   ///< Of frequencies and phases.
 };
 
 /// A camera motion with continuous acceleration: a uniform cubic B-spline (de Boor 1978) whose
@@ -39,6 +39,7 @@ class Motion {
   /// At least four keys.
   Motion(std::vector<MotionKey> keys, double duration_s, const Sway& sway = {});
 
+  /// Time from the first pose to the last.
   double duration_s() const { return duration_s_; }
   /// Pose at a time of [0, duration]; times outside are moved to the nearer end.
   Rigid3 world_from_rig(double seconds) const;

@@ -21,6 +21,7 @@ namespace waymark {
 /// result is the same for any number of threads.
 class Renderer {
  public:
+  /// Neither is null.
   Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Camera> camera);
 
   /// What the camera sees.
@@ -33,7 +34,9 @@ class Renderer {
   /// Angle between neighbouring pixels in the middle of the image.
   double pixel_rad() const;
 
+  /// What is rendered.
   const World& world() const { return *world_; }
+  /// What it is rendered for.
   const Camera& camera() const { return *camera_; }
 
  private:

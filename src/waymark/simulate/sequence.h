@@ -19,54 +19,65 @@ namespace waymark {
 
 /// Other effects for the frames [first_frame, end_frame).
 struct EffectSpan {
-  int first_frame = 0;
-  int end_frame = 0;
-  ImageEffects effects;
+  int first_frame = 0;   ///< Index of the first frame.
+  int end_frame = 0;     ///< One past the last.
+  ImageEffects effects;  ///< In place of those of the sequence.
 };
 
 /// A sequence in words and numbers. The cameras may be of any model the registry knows; with a
 /// depth_factor in the chain, camera 0 also measures depth.
 struct SequenceSpec {
-  std::string name;
-  std::string world = "room";
-  std::string motion = "loop";
-  std::uint64_t seed = 0;
-  CameraChain chain;
-  double rate_hz = 20.0;
-  int num_frames = 200;
-  ImageEffects effects;
+  std::string name;               ///< For people.
+  std::string world = "room";     ///< See make_world().
+  std::string motion = "loop";    ///< See make_motion().
+  std::uint64_t seed = 0;         ///< Of the world's looks, the sway and the noise.
+  CameraChain chain;              ///< One camera, or two for stereo.
+  double rate_hz = 20.0;          ///< Frames per second.
+  int num_frames = 200;           ///< Which also say how long the motion takes.
+  ImageEffects effects;           ///< Of the frames that no span holds.
   std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
 };
 
 /// Chains of cameras for sequences.
 CameraChain mono_chain(const CameraDescription& camera);
+/// Two cameras; lengths in metres.
 CameraChain stereo_chain(const CameraDescription& camera0,
                          const CameraDescription& camera1,
                          const Rigid3& cam1_from_cam0);
+/// A camera that also measures depth, depth_factor units per metre.
 CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor);
 
+/// A rendered frame and where the rig was.
 struct SimulatedFrame {
-  std::int64_t timestamp_ns = 0;
-  std::vector<Image> images;  ///< One per camera of the rig.
-  DepthImage depth;           ///< Registered to camera 0; empty without depth.
-  Rigid3 world_from_rig;      ///< Truth at the middle of the exposure.
+  std::int64_t timestamp_ns = 0;  ///< Frames are 1 / rate_hz apart.
+  std::vector<Image> images;      ///< One per camera of the rig.
+  DepthImage depth;               ///< Registered to camera 0; empty without depth.
+  Rigid3 world_from_rig;          ///< Truth at the middle of the exposure.
 };
 
 /// Renders the frames of a spec, each from (seed, index) alone: in any order, with the same bits
 /// for any number of threads. Not for use by several threads at a time.
 class SimulatedSequence {
  public:
+  /// Throws InputError for an unknown world, motion or camera model.
   explicit SimulatedSequence(
       SequenceSpec spec,
       unsigned num_threads = 1,
       const CameraRegistry& registry = CameraRegistry::with_builtin_models());
 
+  /// What was asked for.
   const SequenceSpec& spec() const { return spec_; }
+  /// Its cameras.
   const Rig& rig() const { return rig_; }
+  /// What they see.
   const World& world() const { return *world_; }
+  /// That of the spec.
   int num_frames() const { return spec_.num_frames; }
+  /// Time of a frame, without rendering it.
   std::int64_t timestamp_ns(int index) const;
+  /// True pose of a frame, without rendering it.
   Rigid3 world_from_rig(int index) const;
+  /// Renders a frame; index in [0, num_frames()).
   SimulatedFrame frame(int index);
 
  private:

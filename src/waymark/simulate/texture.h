@@ -23,8 +23,11 @@ class Texture {
                const Eigen::Vector2f& edge_a_m,
                const Eigen::Vector2f& edge_b_m) const;
 
+  /// Width of a texel of level 0.
   double texel_m() const { return texel_m_; }
+  /// Of the whole image.
   double width_m() const { return texel_m_ * levels_.front().width_px; }
+  /// Of the whole image.
   double height_m() const { return texel_m_ * levels_.front().height_px; }
 
  private:

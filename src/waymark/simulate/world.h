@@ -16,15 +16,15 @@ namespace waymark {
 
 /// Where a ray meets the world.
 struct WorldHit {
-  std::uint32_t surface = 0;
-  SurfaceHit hit;
+  std::uint32_t surface = 0;  ///< Index in World::surfaces.
+  SurfaceHit hit;             ///< Where on it.
 };
 
 /// Textured analytic surfaces; z points up, the ground is near z = 0. Immutable once made.
 struct World {
-  std::string name;
-  std::vector<Surface> surfaces;
-  std::vector<Texture> textures;
+  std::string name;               ///< As make_world() knows it.
+  std::vector<Surface> surfaces;  ///< In no order.
+  std::vector<Texture> textures;  ///< That surfaces refer to by index.
 
   /// The nearest surface along origin + t * direction, t > 0; nothing where there is only sky.
   std::optional<WorldHit> intersect(const Eigen::Vector3d& origin,

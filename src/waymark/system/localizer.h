@@ -14,8 +14,8 @@ namespace waymark {
 
 /// About where an image was taken, in the frame of a sub-map.
 struct PoseHint {
-  Rigid3 world_from_rig;
-  SubmapId submap{0};
+  Rigid3 world_from_rig;  ///< About; what keyframes near it show is looked for first.
+  SubmapId submap{0};     ///< Whose frame it is in.
 };
 
 /// Finds images in a map that stays as it is. The camera may be of another model, size and lens
@@ -33,6 +33,7 @@ class Localizer {
   Localizer(const Localizer&) = delete;
   Localizer& operator=(const Localizer&) = delete;
 
+  /// The map that was given.
   const Map& map() const;
 
   /// The next image of a stream: looked for near the one before, and anywhere where it is not.

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "waymark/image/frame_builder.h"
+#include "waymark/image/settings.h"
 #include "waymark/loop/settings.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/track/settings.h"
@@ -13,17 +13,18 @@ namespace waymark {
 
 /// All settings of the engine, one section per module. Cameras are read separately (camchain).
 struct Settings {
-  int seed = 0;
-  int map_latency = 2;
-  int global_latency = 60;
-  FeatureSettings features;
-  StereoSettings stereo;
-  DepthSettings depth;
-  ViewSettings view;
-  TrackingSettings tracking;
-  MappingSettings mapping;
-  LoopSettings loop;
+  int seed = 0;               ///< Of all random numbers.
+  int map_latency = 2;        ///< In frames.
+  int global_latency = 60;    ///< In frames.
+  FeatureSettings features;   ///< Corners and descriptors.
+  StereoSettings stereo;      ///< Search in the second camera's image.
+  DepthSettings depth;        ///< Depth images.
+  ViewSettings view;          ///< Which directions are used.
+  TrackingSettings tracking;  ///< Pose of each frame.
+  MappingSettings mapping;    ///< Landmarks and keyframes.
+  LoopSettings loop;          ///< Places seen before.
 
+  /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
     field("seed",

@@ -18,13 +18,6 @@
 
 namespace waymark {
 
-/// A frame that got its pose after the fact.
-struct FilledPose {
-  FrameId frame;
-  RelativePose pose;
-  std::shared_ptr<const Features> features;
-};
-
 /// A new sub-map and what follows from it for the frames seen meanwhile.
 struct Initialization {
   NewSubmap submap;

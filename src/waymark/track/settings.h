@@ -6,12 +6,14 @@
 
 namespace waymark {
 
+/// Pose of each frame.
 struct TrackingSettings {
-  int min_inliers = 20;
-  double keyframe_ratio = 0.45;
-  double keyframe_parallax_px = 60.0;
-  int max_keyframe_interval = 30;
+  int min_inliers = 20;                ///< Landmarks that a pose must rest on.
+  double keyframe_ratio = 0.45;        ///< Of the landmarks of the reference keyframe.
+  double keyframe_parallax_px = 60.0;  ///< Median against the reference keyframe.
+  int max_keyframe_interval = 30;      ///< In frames.
 
+  /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
   static void describe(Self& self, Field&& field) {
     field("min_inliers",

@@ -19,15 +19,18 @@ enum class Stage {
   kRecover,     ///< Recovery after loss.
   kKeyframe,    ///< Decision, hand-over.
 };
-inline constexpr std::size_t kNumStages = 8;
+inline constexpr std::size_t kNumStages = 8;  ///< Number of stages.
+/// Names of the stages, as in result files.
 inline constexpr std::array<const char*, kNumStages> kStageNames = {
     "features", "depth", "wait", "predict", "local_map", "initialize", "recover", "keyframe"};
 
 /// Milliseconds spent in each stage of one frame.
 struct StageTimes {
-  std::array<double, kNumStages> ms{};
+  std::array<double, kNumStages> ms{};  ///< In the order of Stage.
 
+  /// Milliseconds of one stage.
   double& operator[](Stage stage) { return ms[static_cast<std::size_t>(stage)]; }
+  /// Milliseconds of one stage.
   double operator[](Stage stage) const { return ms[static_cast<std::size_t>(stage)]; }
 
   /// From image in memory to pose returned, less the waiting for the mapper.
@@ -41,6 +44,7 @@ struct StageTimes {
 /// Adds the time of its scope to a stage.
 class StageTimer {
  public:
+  /// times must outlive the timer.
   StageTimer(StageTimes& times, Stage stage)
       : times_(times), stage_(stage), start_(std::chrono::steady_clock::now()) {}
   ~StageTimer() {

@@ -23,7 +23,9 @@ class ViewPublisher {
   void tell(const System& system, const FrameInput& input, const TrackingResult& result);
   /// A frame was not fed.
   void skip(FrameState state, FrameReason reason);
+  /// Where the session is in its course.
   void set_phase(SessionPhase phase);
+  /// Whether the map grows.
   void set_mapping(bool is_on);
   /// The session began anew; whatever came before is void.
   void reset();

@@ -23,90 +23,92 @@ namespace waymark {
 
 /// A frame of the trajectory and of the time line.
 struct FrameNote {
-  FrameId frame;
-  std::int64_t timestamp_ns = 0;
-  FrameState state = FrameState::kLost;
-  FrameReason reason = FrameReason::kNone;
-  float tracking_ms = 0.0f;
-  std::optional<RelativePose> pose;       ///< Moves with the map.
-  std::optional<Rigid3> final_pose = {};  ///< world_from_rig, in place of it.
-  SubmapId submap;
+  FrameId frame;                            ///< Which one.
+  std::int64_t timestamp_ns = 0;            ///< Of the input.
+  FrameState state = FrameState::kLost;     ///< What became of it.
+  FrameReason reason = FrameReason::kNone;  ///< Why it has no pose.
+  float tracking_ms = 0.0f;                 ///< From image in memory to pose.
+  std::optional<RelativePose> pose;         ///< Moves with the map.
+  std::optional<Rigid3> final_pose = {};    ///< world_from_rig, in place of it.
+  SubmapId submap;                          ///< Whose frame the pose is in.
 };
 
 /// Colours at the features of a frame, for the landmarks that will be made from them.
 struct FeatureColors {
-  FrameId frame;
+  FrameId frame;                                 ///< Which one.
   std::vector<std::array<std::uint8_t, 3>> rgb;  ///< Per primary feature.
 };
 
 /// What is drawn of the newest frame.
 struct FrameImage {
-  FrameId frame;
-  std::int64_t timestamp_ns = 0;
-  int width_px = 0;
-  int height_px = 0;
-  std::shared_ptr<const Features> features;
-  std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none; or empty.
-  Image image;                        ///< Empty: no image this time.
+  FrameId frame;                  ///< Which one.
+  std::int64_t timestamp_ns = 0;  ///< Of the input.
+  int width_px = 0;               ///< Of the images of camera 0, whether there is one or not.
+  int height_px = 0;              ///< The same.
+  std::shared_ptr<const Features> features;  ///< May be null.
+  std::vector<LandmarkId> landmarks;         ///< Per feature, invalid where none; or empty.
+  Image image;                               ///< Empty: no image this time.
 };
 
+/// Where a session is in its course; kMap: there is none, a saved map is shown.
 enum class SessionPhase { kStarting, kRunning, kPaused, kFinishing, kDone, kMap };
 
 /// Numbers of the session, as the status message has them.
 struct SessionStatus {
-  SessionPhase phase = SessionPhase::kStarting;
-  bool is_mapping = true;
-  std::optional<FrameId> frame;  ///< The newest.
-  double time_s = 0.0;
-  FrameState state = FrameState::kInitializing;
-  FrameReason reason = FrameReason::kNone;
-  SubmapId submap;
-  int num_matches = 0;
-  int num_inliers = 0;
-  StageTimes stages;
-  double median_tracking_ms = 0.0;
-  std::size_t num_frames = 0;
-  std::optional<std::size_t> num_frames_total;
-  std::size_t num_tracked = 0;
-  std::size_t num_unreadable = 0;
-  std::size_t num_dropped = 0;
-  std::size_t lost_count = 0;
-  double frames_per_s = 0.0;
+  SessionPhase phase = SessionPhase::kStarting;  ///< Where the session is in its course.
+  bool is_mapping = true;                        ///< Whether the map grows.
+  std::optional<FrameId> frame;                  ///< The newest.
+  double time_s = 0.0;                           ///< Of the newest frame, since the first.
+  FrameState state = FrameState::kInitializing;  ///< Of the newest frame.
+  FrameReason reason = FrameReason::kNone;       ///< Why it has no pose.
+  SubmapId submap;                               ///< Of the newest frame.
+  int num_matches = 0;                           ///< Of the newest frame.
+  int num_inliers = 0;                           ///< Of the newest frame.
+  StageTimes stages;                             ///< Of the newest frame.
+  double median_tracking_ms = 0.0;               ///< Of the recent frames.
+  std::size_t num_frames = 0;                    ///< So far.
+  std::optional<std::size_t> num_frames_total;   ///< Of the input, if it is known.
+  std::size_t num_tracked = 0;                   ///< Frames with a pose.
+  std::size_t num_unreadable = 0;                ///< Frames whose images could not be used.
+  std::size_t num_dropped = 0;                   ///< Frames that came too late.
+  std::size_t lost_count = 0;                    ///< Transitions to lost.
+  double frames_per_s = 0.0;                     ///< Of the recent frames.
 };
 
 /// What changed in the session since the update before.
 struct ViewUpdate {
-  bool is_reset = false;  ///< Everything before is void.
-  std::shared_ptr<const Map> map;
-  std::vector<FrameNote> frames;  ///< New ones and those that are known better now.
-  std::vector<FeatureColors> colors;
+  bool is_reset = false;                    ///< Everything before is void.
+  std::shared_ptr<const Map> map;           ///< Null: as before.
+  std::vector<FrameNote> frames;            ///< New ones and those that are known better now.
+  std::vector<FeatureColors> colors;        ///< Of new frames.
   std::shared_ptr<const FrameImage> image;  ///< Null: none this time.
-  SessionStatus status;
+  SessionStatus status;                     ///< As of now.
 };
 
 /// What a viewer asks of the session.
 struct ViewRequest {
+  /// Stop ends the session, save writes the map.
   enum class Kind { kPause, kResume, kReset, kSave, kMappingOn, kMappingOff, kStop };
-  Kind kind = Kind::kPause;
+  Kind kind = Kind::kPause;  ///< What is asked for.
   std::uint64_t client = 0;  ///< Whom to answer.
   std::uint64_t number = 0;  ///< The client's.
 };
 
 /// The answer to a request that takes time.
 struct ViewReply {
-  ViewRequest request;
-  std::string path;   ///< Of what was saved.
-  std::string error;  ///< Empty if all went well.
+  ViewRequest request;  ///< What is answered.
+  std::string path;     ///< Of what was saved.
+  std::string error;    ///< Empty if all went well.
 };
 
 /// What does not change during a session.
 struct SessionInfo {
-  std::string program;  ///< With version.
-  bool is_live = true;  ///< False for a saved map.
-  std::string input;
-  std::string setup;
-  std::string timing;
-  bool can_save = false;
+  std::string program;    ///< With version.
+  bool is_live = true;    ///< False for a saved map.
+  std::string input;      ///< What is mapped, for people.
+  std::string setup;      ///< "mono", "stereo" or "rgbd".
+  std::string timing;     ///< "inline", "lockstep" or "realtime".
+  bool can_save = false;  ///< Whether there is where to save the map.
 };
 
 }  // namespace waymark

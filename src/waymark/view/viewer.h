@@ -11,6 +11,7 @@
 
 namespace waymark {
 
+/// Where the server listens.
 struct ViewerOptions {
   std::string host = "127.0.0.1";  ///< Address to listen at; "0.0.0.0" for all of the machine.
   std::uint16_t port = 8080;       ///< 0: one that is free.

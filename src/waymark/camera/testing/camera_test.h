@@ -30,11 +30,13 @@ struct CameraTestOptions {
 
 /// What the functions below see of a camera: results of one call for a whole array.
 struct CameraTestProjection {
-  std::vector<Eigen::Vector2d> pixels;
-  std::vector<Matrix23d> jacobians;
+  std::vector<Eigen::Vector2d> pixels;  ///< Per point.
+  std::vector<Matrix23d> jacobians;     ///< Per point: d pixel / d point, px/m.
+  /// Per point: 1 where the pixel and the Jacobian mean something.
   std::vector<std::uint8_t> is_visible;
 };
 
+/// Projects all points, in metres in the frame of the camera, in one call.
 inline CameraTestProjection project_for_test(const Camera& camera,
                                              const std::vector<Eigen::Vector3d>& points) {
   CameraTestProjection result{std::vector<Eigen::Vector2d>(points.size()),
