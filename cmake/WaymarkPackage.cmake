@@ -41,8 +41,11 @@ endif()
 set(CPACK_DEBIAN_PYTHON_PACKAGE_NAME python3-waymark)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SECTION python)
 set(CPACK_DEBIAN_PYTHON_PACKAGE_SHLIBDEPS ON)
-set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
-    "python3 (>= ${Python3_VERSION_MAJOR}.${Python3_VERSION_MINOR}), python3 (<< ${Python3_VERSION_MAJOR}.${WAYMARK_NEXT_PYTHON}), python3-numpy")
+if("python" IN_LIST CPACK_COMPONENTS_ALL) # An extension fits one version of Python.
+  math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
+      "python3 (>= 3.${Python3_VERSION_MINOR}~), python3 (<< 3.${next_minor}), python3-numpy")
+endif()
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "visual SLAM for any camera, Python module
 Waymark finds out from images where a camera was and what the place looks like.
 This package has its module for Python, with images and poses as numpy arrays.")

@@ -17,8 +17,8 @@
 #include "waymark/track/messages.h"
 #include "waymark/track/stage_times.h"
 
-/// What travels between the session's thread and the viewer's. Values only; what is shared is
-/// immutable.
+// What travels between the session's thread and the viewer's. Values only; what is shared is
+// immutable.
 namespace waymark {
 
 /// A frame of the trajectory and of the time line.
