@@ -12,6 +12,16 @@ foreach(header ${headers})
           DESTINATION "${CMAKE_INSTALL_INCLUDEDIR}/${folder}")
 endforeach()
 
+# A program for a wider instruction set would see other layouts of the same structs.
+include(CheckCXXSourceCompiles)
+set(CMAKE_REQUIRED_LIBRARIES Eigen3::Eigen)
+check_cxx_source_compiles("#include <Eigen/Geometry>
+static_assert(alignof(Eigen::Quaterniond) == 16);
+int main() {}" WAYMARK_ALIGNS_TO_16)
+unset(CMAKE_REQUIRED_LIBRARIES)
+target_compile_definitions(waymark_options INTERFACE
+  "$<INSTALL_INTERFACE:WAYMARK_ALIGNMENT=$<IF:$<BOOL:${WAYMARK_ALIGNS_TO_16}>,16,32>>")
+
 set(package_folder "${CMAKE_INSTALL_LIBDIR}/cmake/waymark")
 write_basic_package_version_file("${CMAKE_CURRENT_BINARY_DIR}/installed/waymark-config-version.cmake"
                                  VERSION "${PROJECT_VERSION}" COMPATIBILITY SameMinorVersion)

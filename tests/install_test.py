@@ -7,6 +7,7 @@ WAYMARK_BUILD is the folder of the build, WAYMARK_LAUNCHER the compiler cache or
 """
 import os
 import pathlib
+import platform
 import shutil
 import subprocess
 import sys
@@ -84,6 +85,17 @@ class Install(unittest.TestCase):
         done = self.configure(source, WORK / "newer_build")
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("99", done.stdout)
+
+    @unittest.skipUnless(platform.machine() == "x86_64", "AVX is of x86-64")
+    def test_another_instruction_set(self):
+        source = self.project("wider", "find_package(waymark REQUIRED)\nadd_library(wider STATIC wider.cc)\n"
+                                       "target_compile_options(wider PRIVATE -mavx)\n"
+                                       "target_link_libraries(wider PRIVATE waymark::system)")
+        (source / "wider.cc").write_text('#include "waymark/system/system.h"\n')
+        self.assertEqual(self.configure(source, WORK / "wider_build").returncode, 0)
+        done = run("cmake", "--build", WORK / "wider_build")
+        self.assertNotEqual(done.returncode, 0)
+        self.assertIn("Eigen's alignment depends on the instruction set", done.stdout)
 
     def test_nothing_knows_where_it_was_built(self):
         places = [str(place).encode() for place in (ROOT, BUILD, WORK)]

@@ -7,6 +7,12 @@
 
 namespace waymark {
 
+#ifdef WAYMARK_ALIGNMENT
+static_assert(alignof(Eigen::Quaterniond) == WAYMARK_ALIGNMENT,
+              "Eigen's alignment depends on the instruction set: compile for the one that the "
+              "installed Waymark was built for, or build Waymark with the same flags (-march=...)");
+#endif
+
 /// Tangent vector (rho, phi) of Rigid3, in metres and radians.
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 /// Linear map, or covariance, of such tangent vectors.
