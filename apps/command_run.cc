@@ -49,6 +49,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                   summary.keyframes,
                   summary.landmarks,
                   summary.submaps));
+  report_reasons(reporter, results.table);
   const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
   reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
                             format_duration(summary.wall_s),

@@ -5,9 +5,13 @@
 #include <fmt/format.h>
 
 #include <CLI/CLI.hpp>
+#include <algorithm>
 #include <exception>
+#include <map>
 #include <optional>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "choice_option.h"
 #include "waymark/base/frame_state.h"
@@ -86,6 +90,23 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
                     num_candidates > 0 ? fmt::format(", best of {} places", num_candidates) : ""));
     reporter.progress(++num_done, total, to_string(frame.state));
   };
+}
+
+void report_reasons(Reporter& reporter, const FrameTable& table) {
+  std::map<FrameReason, int> counts;
+  for (const FrameRecord& frame : table.frames) {
+    if (frame.reason != FrameReason::kNone) ++counts[frame.reason];
+  }
+  if (counts.empty()) return;
+  std::vector<std::pair<FrameReason, int>> sorted(counts.begin(), counts.end());
+  std::stable_sort(sorted.begin(), sorted.end(), [](const auto& a, const auto& b) {
+    return a.second > b.second;
+  });
+  std::string text;
+  for (const auto& [reason, count] : sorted) {
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, to_string(reason));
+  }
+  reporter.info("without a pose: " + text);
 }
 
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work) {

@@ -39,6 +39,9 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
 /// Tells of every frame.
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
 
+/// Why frames have no pose, the commonest reason first; nothing if all have one.
+void report_reasons(Reporter& reporter, const FrameTable& table);
+
 /// Calls work with a reporter; what it throws also goes to the log.
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work);
 

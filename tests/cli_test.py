@@ -364,6 +364,7 @@ class BadInput(CliTest):
         self.assertEqual(self.summary()["tracked"], 0)
         self.assertIsNone(self.summary()["initialized_at"])
         self.assertEqual({f["reason"] for f in self.frames()}, {"no_features"})
+        self.assertIn(f"without a pose: {NUM_FRAMES} no_features", done.stderr)
 
 
 class Demo(CliTest):
