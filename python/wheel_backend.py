@@ -31,7 +31,7 @@ def version():
 def metadata():
     return (f"Metadata-Version: 2.1\nName: waymark\nVersion: {version()}\n"
             "Summary: Visual SLAM for any camera\nLicense: Apache-2.0\nRequires-Python: >=3.9\n"
-            "Requires-Dist: numpy\nDescription-Content-Type: text/markdown\n\n"
+            "Requires-Dist: numpy<2\nDescription-Content-Type: text/markdown\n\n"
             + (ROOT / "README.md").read_text())
 
 

@@ -28,6 +28,11 @@ void check_flat(const char* name, const py::array& array, const char* expected) 
   if (!is_good) fail_value(name, array, expected);
 }
 
+bool is_color(const py::array& array) {
+  return array.ndim() == 3 && array.shape(2) == 3 && array.size() > 0 &&
+         array.shape(0) <= kMaxSide && array.shape(1) <= kMaxSide;
+}
+
 /// Pixels of three bytes without gaps between rows.
 ColorView borrow_color(py::array& array) {
   array = py::array_t<std::uint8_t, py::array::c_style | py::array::forcecast>(array);
@@ -48,6 +53,20 @@ void check_setup(const ImageArguments& images, std::optional<Setup> setup) {
 }
 
 }  // namespace
+
+ColorImage color_argument(const char* name, py::handle argument) {
+  py::array array = array_argument(name, argument, kExpectedImage);
+  if (!holds<std::uint8_t>(array)) fail_type(name, array, kExpectedImage);
+  if (!is_color(array)) {
+    check_flat(name, array, kExpectedImage);
+    array = py::module_::import("numpy").attr("repeat")(
+        array.attr("reshape")(array.shape(0), array.shape(1), 1), 3, 2);
+  }
+  const ColorView view = borrow_color(array);
+  ColorImage image(view.width_px, view.height_px);
+  image.values.assign(view.data, view.data + image.values.size());
+  return image;
+}
 
 FrameArguments::FrameArguments(const ImageArguments& images,
                                std::optional<Setup> setup,
@@ -71,8 +90,7 @@ FrameInput FrameArguments::input(std::int64_t timestamp_ns) const {
 ImageView FrameArguments::add_image(const char* name, py::handle argument) {
   py::array& array = borrowed_.emplace_back(array_argument(name, argument, kExpectedImage));
   if (!holds<std::uint8_t>(array)) fail_type(name, array, kExpectedImage);
-  if (array.ndim() == 3 && array.shape(2) == 3 && array.size() > 0 && array.shape(0) <= kMaxSide &&
-      array.shape(1) <= kMaxSide) {
+  if (is_color(array)) {
     return grey_.emplace_back(to_grey(borrow_color(array))).view();
   }
   check_flat(name, array, kExpectedImage);

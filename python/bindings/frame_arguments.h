@@ -8,6 +8,7 @@
 #include <optional>
 #include <vector>
 
+#include "waymark/image/color.h"
 #include "waymark/image/depth.h"
 #include "waymark/io/input.h"
 #include "waymark/system/system.h"
@@ -23,6 +24,9 @@ struct ImageArguments {
   py::object depth;
   py::object mask;
 };
+
+/// An image as colour, of grey or colour; TypeError, ValueError as below.
+ColorImage color_argument(const char* name, py::handle argument);
 
 /// The images of a moment as the engine takes them: grey images and depth in units are borrowed
 /// from the arrays, colour and depth in metres are converted. Made and destroyed with the GIL held.

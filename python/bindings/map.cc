@@ -11,7 +11,9 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "features.h"
+#include "frame_arguments.h"
 #include "session_config.h"
+#include "waymark/io/decode.h"
 #include "waymark/io/map_file.h"
 
 namespace waymark::python {
@@ -78,6 +80,26 @@ std::optional<py::bytes> image(const PythonMap& self, const py::object& id) {
   const auto found = self.stored.images.find(keyframe_id(self, id));
   if (found == self.stored.images.end()) return std::nullopt;
   return py::bytes(*found->second);
+}
+
+SharedJpeg jpeg_argument(py::handle image) {
+  if (py::isinstance<py::bytes>(image)) {
+    auto bytes = std::make_shared<const std::string>(py::cast<std::string>(image));
+    if (!bytes->starts_with("\xff\xd8") || !decode_color_image(*bytes)) {
+      throw py::value_error("images: bytes of something else, expected those of a JPEG file");
+    }
+    return bytes;
+  }
+  return std::make_shared<const std::string>(encode_jpeg(color_argument("images", image)));
+}
+
+std::shared_ptr<PythonMap> with_images(const PythonMap& self, const py::dict& images) {
+  auto result = std::make_shared<PythonMap>(self);
+  for (const auto& [id, image] : images) {
+    const KeyframeId keyframe = keyframe_id(self, py::reinterpret_borrow<py::object>(id));
+    result->stored.images[keyframe] = jpeg_argument(image);
+  }
+  return result;
 }
 
 std::shared_ptr<PythonMap> load(const py::object& path) {
@@ -261,7 +283,14 @@ The keyframes that share landmarks with one, and how many: two uint32 arrays (N,
       .def("image", &image, py::arg("keyframe_id"), R"(image(self, keyframe_id)
 --
 
-The image of a keyframe as the bytes of a JPEG file, or None: maps made with --keep-images.)")
+The image of a keyframe as the bytes of a JPEG file, or None: of maps made with --keep-images or with_images().)")
+      .def("with_images", &with_images, py::arg("images"), R"(with_images(self, images)
+--
+
+The same map with images of keyframes, for exports and colours: a Map.
+
+images: dict of keyframe ids to images of camera 0, each the bytes of a JPEG file or a uint8 array
+    (H, W), or (H, W, 3) in the order red, green, blue, which becomes a JPEG file.)")
       .def("__repr__", &describe_map);
 }
 

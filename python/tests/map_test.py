@@ -7,7 +7,7 @@ import unittest
 
 import numpy as np
 import waymark
-from support import DATA, Test, camchain, map_stereo
+from support import DATA, Test, camchain, frames, map_stereo
 
 FILE = DATA / "stereo_out/map.wmap"
 
@@ -119,6 +119,29 @@ class MapArrays(Test):
         fed = map_stereo().map()
         self.assertIsNone(fed.image(0))
         self.assertIsNone(fed.landmark_colors())
+
+    def test_images_from_arrays(self):
+        fed = map_stereo().map()
+        times = {frame.timestamp_ns: frame.image0 for frame in frames()}
+        images = {id: times[time] for id, time in zip(fed.keyframes().ids, fed.keyframes().timestamps_ns)}
+        red = np.zeros((240, 376, 3), np.uint8)
+        red[..., 0] = 255
+        shown = fed.with_images(images)
+        np.testing.assert_allclose(shown.landmark_colors(), self.map.landmark_colors(), atol=12)
+        self.assertIsNone(fed.image(0))
+        of_red = fed.with_images({id: red for id in images}).landmark_colors()
+        self.assertGreater(np.median(of_red[:, 0]), 245)
+        self.assertLess(np.median(of_red[:, 1]), 10)
+        again = fed.with_images({0: shown.image(0)})
+        self.assertEqual(again.image(0), shown.image(0))
+        again.save(self.folder / "images.wmap")
+        self.assertEqual(waymark.Map.load(self.folder / "images.wmap").image(0), shown.image(0))
+        self.assert_raises(KeyError, "10000", fed.with_images, {10000: red})
+        self.assert_raises(ValueError, "images: ", fed.with_images, {0: b"no image"})
+        png = sorted((DATA / "stereo/mav0/cam0/data").iterdir())[0].read_bytes()
+        self.assert_raises(ValueError, "JPEG", fed.with_images, {0: png})
+        self.assert_raises(ValueError, "images: ", fed.with_images, {0: red[0, 0]})
+        self.assert_raises(TypeError, "images: ", fed.with_images, {0: "image.jpg"})
 
     def test_empty_map(self):
         empty = waymark.System(camchain()).map()

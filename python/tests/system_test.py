@@ -2,6 +2,8 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """System: fed from arrays it gives what the program gives; what is wrong is said in one line."""
+import subprocess
+import sys
 import threading
 import unittest
 
@@ -158,6 +160,23 @@ class Results(Test):
         system.finish()
         self.assertGreater(system.map().num_keyframes, 0)
         self.assertEqual(saved.num_keyframes, waymark.Map.load(DATA / "stereo_out/map.wmap").num_keyframes)
+
+
+    def test_settings_beside_a_calibration(self):
+        calibration = waymark.Calibration(camchain("rgbd"))
+        system = waymark.System(calibration, settings={"depth.factor": 2500, "features": {"count": 700}})
+        self.assertIn("factor: 2500", system.map().settings)
+        self.assertIn("count: 700", system.map().settings)
+        self.assert_raises(waymark.InputError, "depth.factor", waymark.System, calibration,
+                           settings={"depth": {"factor": 0}})
+
+    def test_left_unfinished(self):
+        """A program may end without finish()."""
+        program = ("import waymark; frames = list(waymark.open_input(%r)); system = waymark.System(%r)\n"
+                   "for f in frames[:8]: system.feed(f.timestamp_ns, f.image0, f.image1)"
+                   % (str(DATA / "stereo"), str(camchain())))
+        done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
 
 
 class WrongArguments(Test):
