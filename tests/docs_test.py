@@ -2,11 +2,15 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """What script/check_docs finds: one page with one fault each."""
+import json
 import os
 import pathlib
+import re
 import sys
 import tempfile
 import unittest
+
+from cli_support import CliTest
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "script"))
@@ -78,6 +82,35 @@ class Docs(unittest.TestCase):
 
     def test_blocks_that_never_end(self):
         self.assertEqual(len(self.page("```sh\ntrue\n").faults), 1)
+
+
+class Results(CliTest):
+    """docs/results.md has every column, key, state and reason, and no others."""
+
+    def tables(self):
+        """The names in the first cells of each table, by the table's head."""
+        found, head = {}, None
+        lines = (ROOT / "docs" / "results.md").read_text().split("\n")
+        for line, below in zip(lines, lines[1:]):
+            if below.startswith("|---"):
+                head = found.setdefault(line, set())
+            elif line.startswith("| `"):
+                head.update(re.findall(r"`(\w+)`", line.split(" | ")[0]))
+        return found
+
+    def names_of(self, kind):
+        """What to_string() gives for an enum of base/frame_state.h."""
+        source = (ROOT / "src/waymark/base/frame_state.cc").read_text()
+        return set(re.findall(rf"case {kind}::\w+:\s*return \"(\w+)\";", source))
+
+    def test_page_and_program_agree(self):
+        self.assertEqual(self.run_on(self.sequence("stereo")).returncode, 0)
+        tables = self.tables()
+        self.assertEqual(tables["| column | meaning |"], set((self.out / "frames.csv").read_text().split("\n")[0].split(",")))
+        keys = set(json.loads((self.out / "summary.json").read_text()))
+        self.assertEqual(tables["| key | meaning |"], keys | {"localized"})
+        self.assertEqual(tables["| state | meaning |"], self.names_of("FrameState"))
+        self.assertEqual(tables["| reason | meaning |"], self.names_of("FrameReason") - {"none"})
 
 
 if __name__ == "__main__":
