@@ -47,7 +47,7 @@ def make_samples(folder, environment):
 
     def run(*command):
         subprocess.run([str(word) for word in command], cwd=folder, env=environment, check=True,
-                       capture_output=True, text=True, timeout=120)
+                       capture_output=True, text=True, timeout=300)
 
     def simulate(world, name, camera, *arguments):
         (folder / "camera.yaml").write_text(camera)
