@@ -1,5 +1,16 @@
 # Debian packages by cpack -G DEB (script/package): waymark is the program, libwaymark-dev the libraries,
 # python3-waymark the Python module where that is built.
+#
+# What is packed is built by the target waymark_packed, without tests and examples.
+set(CMAKE_SKIP_INSTALL_ALL_DEPENDENCY ON)
+add_custom_target(waymark_packed DEPENDS waymark)
+foreach(module ${waymark_modules})
+  add_dependencies(waymark_packed waymark_${module})
+endforeach()
+if(TARGET waymark_python)
+  add_dependencies(waymark_packed waymark_python)
+endif()
+
 set(CPACK_PACKAGE_VENDOR "The Waymark authors")
 set(CPACK_PACKAGE_CONTACT "The Waymark authors <authors@waymark.invalid>")
 set(CPACK_PACKAGING_INSTALL_PREFIX "/usr")
