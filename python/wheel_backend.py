@@ -1,6 +1,6 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
-"""Makes a wheel of the Python module, for pip (PEP 517).
+"""Makes a wheel of the Python module and the program, for pip (PEP 517).
 
     pip install .
     pip wheel . --no-deps --config-settings build-folder=build/release
@@ -10,6 +10,7 @@ Python and the system it was made with: it links the libraries of the distributi
 """
 import base64
 import hashlib
+import os
 import pathlib
 import re
 import shutil
@@ -46,17 +47,21 @@ def run(*command):
 
 
 def install(folder, prefix):
-    """Builds the module and installs it; gives the folder that holds the package."""
+    """Builds and installs module and program; gives the files of the wheel, by name."""
     if folder is None:
         folder = ROOT / "build" / "wheel"
         generator = ["-G", "Ninja"] if shutil.which("ninja") else []
         run("cmake", "-S", ROOT, "-B", folder, *generator, *OPTIONS, f"-DPython3_EXECUTABLE={sys.executable}")
-    run("cmake", "--build", folder, "--parallel", "--target", "waymark_python")
-    run("cmake", "--install", folder, "--prefix", prefix, "--component", "python")
+    run("cmake", "--build", folder, "--parallel", os.cpu_count(), "--target", "waymark_python", "waymark")
+    for component in ("python", "program"):
+        run("cmake", "--install", folder, "--prefix", prefix, "--component", component)
     package = next(prefix.rglob("__init__.py")).parent
     if not (package / f"_waymark{sysconfig.get_config_var('EXT_SUFFIX')}").exists():
         raise RuntimeError(f"{folder}: built for another Python, expected -DPython3_EXECUTABLE={sys.executable}")
-    return package.parent
+    files = {path.relative_to(package.parent).as_posix(): path.read_bytes()
+             for path in sorted(package.iterdir()) if path.is_file()}
+    files[f"waymark-{version()}.data/scripts/waymark"] = (prefix / "bin/waymark").read_bytes()
+    return files
 
 
 def row(name, content):
@@ -85,16 +90,17 @@ def prepare_metadata_for_build_wheel(metadata_directory, config_settings=None):
 def build_wheel(wheel_directory, config_settings=None, metadata_directory=None):
     wheel = f"waymark-{version()}-{tag()}.whl"
     with tempfile.TemporaryDirectory() as prefix:
-        root = install((config_settings or {}).get("build-folder"), pathlib.Path(prefix))
-        files = {path.relative_to(root).as_posix(): path.read_bytes()
-                 for path in sorted(root.rglob("*")) if path.is_file()}
+        files = install((config_settings or {}).get("build-folder"), pathlib.Path(prefix))
     info = f"waymark-{version()}.dist-info"
     files.update(information(info))
     record = "".join(row(name, content) for name, content in files.items()) + f"{info}/RECORD,,\n"
     files[f"{info}/RECORD"] = record.encode()
-    with zipfile.ZipFile(pathlib.Path(wheel_directory) / wheel, "w", zipfile.ZIP_DEFLATED) as archive:
+    with zipfile.ZipFile(pathlib.Path(wheel_directory) / wheel, "w") as archive:
         for name, content in files.items():
-            archive.writestr(name, content)
+            entry = zipfile.ZipInfo(name, (2020, 1, 1, 0, 0, 0))  # Same files, same bytes.
+            entry.compress_type = zipfile.ZIP_DEFLATED
+            entry.external_attr = (0o100755 if "/scripts/" in name else 0o100644) << 16
+            archive.writestr(entry, content)
     return wheel
 
 

@@ -131,8 +131,9 @@ map's frame. One thread at a time; a second one gets a RuntimeError.)");
                             const py::object& setup,
                             const py::object& settings,
                             const py::object& seed) {
-                  return std::make_unique<PythonLocalizer>(
-                      read_session_config({cameras, setup, settings, seed}), std::move(map));
+                  SessionConfig config = read_session_config({cameras, setup, settings, seed});
+                  const py::gil_scoped_release release;
+                  return std::make_unique<PythonLocalizer>(std::move(config), std::move(map));
                 }),
                 py::arg("map").none(false),
                 py::arg("cameras"),

@@ -164,9 +164,10 @@ std::unique_ptr<PythonSystem> make_system(const py::object& cameras,
                                           const py::object& settings,
                                           const py::object& seed,
                                           std::shared_ptr<PythonMap> map) {
-  return std::make_unique<PythonSystem>(read_session_config({cameras, setup, settings, seed}),
-                                        timing_argument(timing),
-                                        std::move(map));
+  SessionConfig config = read_session_config({cameras, setup, settings, seed});
+  const Timing mode = timing_argument(timing);
+  const py::gil_scoped_release release;
+  return std::make_unique<PythonSystem>(std::move(config), mode, std::move(map));
 }
 
 using SystemClass = py::class_<PythonSystem>;

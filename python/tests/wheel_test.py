@@ -35,6 +35,7 @@ class Wheel(Test):
                                "waymark.System.feed.__doc__.split('.')[0])")
         self.assertIn(str(self.folder / "venv"), said)
         self.assertIn("Tracks one frame", said)
+        self.assertIn("waymark", self.run_python(self.folder / "venv/bin/waymark", "--version"))
         self.assertIn("Name: waymark", self.run_python(*pip, "show", "waymark"))
         self.run_python(*pip, "uninstall", "-y", "waymark")
         left = [path for path in self.folder.rglob("*waymark*") if (self.folder / "venv") in path.parents]
