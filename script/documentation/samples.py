@@ -28,10 +28,14 @@ for argument in "$@"; do
   esac
   arguments+=("$argument")
 done
-case ${{1:-}} in
-view) exec timeout --preserve-status -s INT 2 {program} "${{arguments[@]}}" --port 0 ;;
-esac
-exec {program} "${{arguments[@]}}"
+[[ ${{1:-}} == view ]] || exec {program} "${{arguments[@]}}"
+coproc {program} "${{arguments[@]}}" --port 0
+server=$COPROC_PID printed=${{COPROC[0]}}
+while read -r line <&"$printed"; do
+  echo "$line"
+  [[ $line == *"Ctrl-C ends" ]] && kill -TERM "$server"
+done
+wait "$server"
 """
 
 
