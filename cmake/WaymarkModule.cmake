@@ -6,6 +6,10 @@ target_compile_features(waymark_options INTERFACE cxx_std_20)
 target_include_directories(waymark_options INTERFACE
   "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")
 
+if(WAYMARK_BUILD_TESTS)
+  add_custom_target(waymark_unit_tests)
+endif()
+
 # waymark_module(NAME SOURCES a.cc... [TESTS a_test.cc...] [LINK PUBLIC targets...]
 #                [TEST_LINK targets...])
 #
@@ -27,6 +31,7 @@ function(waymark_module name)
     add_executable(waymark_${name}_test ${MODULE_TESTS})
     target_link_libraries(waymark_${name}_test PRIVATE waymark_${name} ${MODULE_TEST_LINK}
                           GTest::gmock_main)
+    add_dependencies(waymark_unit_tests waymark_${name}_test)
     if(WAYMARK_TEST_WHOLE_PROGRAMS)
       add_test(NAME ${name} COMMAND waymark_${name}_test)
       set_tests_properties(${name} PROPERTIES TIMEOUT 900 LABELS unit)
