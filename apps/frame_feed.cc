@@ -54,12 +54,6 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   return record;
 }
 
-/// After a reset: what was fed before belongs to no map.
-void forget_session(FedFrames& frames) {
-  for (const std::size_t row : frames.fed) frames.table.frames[row].submap.reset();
-  frames.fed.clear();
-}
-
 FrameInput borrow(const InputFrame& frame) {
   FrameInput input;
   input.timestamp_ns = frame.timestamp_ns;
@@ -71,6 +65,11 @@ FrameInput borrow(const InputFrame& frame) {
 }
 
 }  // namespace
+
+void forget_session(FedFrames& frames) {
+  for (const std::size_t row : frames.fed) frames.table.frames[row].submap.reset();
+  frames.fed.clear();
+}
 
 FedFrames feed_all(Input& input,
                    const std::function<TrackingResult(const FrameInput&)>& feed,

@@ -25,6 +25,9 @@ struct FedFrames {
   std::vector<double> tracking_ms;
 };
 
+/// After a reset: what was fed before belongs to no map.
+void forget_session(FedFrames& frames);
+
 /// Feeds an input until it ends or should_stop() says so. Frames with a fault are not fed, but have
 /// their row.
 FedFrames feed_all(Input& input,

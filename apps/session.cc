@@ -12,6 +12,7 @@ namespace {
 /// What became of the frames after the fact: filled in, moved to another sub-map.
 void update_states(const System& system, FedFrames& frames) {
   const std::vector<FrameState> states = system.frame_states();
+  if (states.empty()) forget_session(frames);  // There was a reset since the last frame.
   WAYMARK_CHECK(states.size() == frames.fed.size());
   for (std::size_t i = 0; i < states.size(); ++i) {
     FrameRecord& record = frames.table.frames[frames.fed[i]];

@@ -121,6 +121,15 @@ class Session(ViewerTest):
         self.end()
         self.assertGreater(self.summary()["tracked"], 0)
 
+    def test_a_session_may_end_right_after_it_began_anew(self):
+        client = self.connect(self.run_with_viewer())
+        client.wait_for(lambda c: c.status and c.status["tracked"] > 0)
+        for request in ("pause", "reset", "stop"):
+            client.ask(request)
+        self.end()
+        self.assertEqual((self.out / "trajectory.txt").read_text(), "")
+        self.assertEqual(self.summary()["keyframes"], 0)
+
     def test_a_saved_map_has_the_same_page(self):
         self.assertEqual(self.run_on(self.sequence("stereo"), "--map-out", self.map).returncode, 0)
         url = self.start("view", self.map, "--port", "0")
