@@ -8,7 +8,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
-#include "waymark/optimize/ceres_solver.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/schur_solver.h"
 
@@ -93,9 +92,7 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   const double gate = options.gate_px * options.gate_px;
   for (int round = 0; round < options.num_rounds; ++round) {
     const BundleOptions round_options = narrowed(options, problem, is_used);
-    const BundleRound done = options.solver == BundleSolver::kSchur
-                                 ? minimize_with_schur(problem, is_used, round_options)
-                                 : minimize_with_ceres(problem, is_used, round_options);
+    const BundleRound done = minimize_with_schur(problem, is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/optimize/ceres_solver.h"
+#include "waymark/optimize/test_ceres.h"
 
 #include <ceres/ceres.h>
 
@@ -10,7 +10,7 @@
 
 #include "waymark/optimize/residual.h"
 
-namespace waymark {
+namespace waymark::testing {
 
 namespace {
 
@@ -220,4 +220,4 @@ BundleRound minimize_with_ceres(BundleProblem& problem,
   return {};
 }
 
-}  // namespace waymark
+}  // namespace waymark::testing
