@@ -37,13 +37,13 @@ double squared_residual(const BundleProblem& problem, const BundleObservation& o
   const Rigid3& cam_from_rig =
       problem.rigs[observation.pose]->cameras[observation.camera].cam_from_rig;
   const Rigid3& rig_from_world = problem.rig_from_world[observation.pose];
-  const Sighting sighting =
-      sight(cam_from_rig * (rig_from_world * problem.points[observation.point]));
+  const InverseRangePoint seen =
+      in_inverse_range(cam_from_rig * (rig_from_world * problem.points[observation.point]));
   const double squared =
-      bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing)
+      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing)
           .squaredNorm();
   if (!std::isfinite(squared)) return squared;
-  return is_ahead(sighting, observation.bearing) ? squared : kGrossSquaredResidual;
+  return is_ahead(seen, observation.bearing) ? squared : kGrossSquaredResidual;
 }
 
 /// Standard deviation of a residual component as the used observations show it: the median length
