@@ -8,7 +8,6 @@
 #include <string>
 
 #include "waymark/base/check.h"
-#include "waymark/base/rng.h"
 
 namespace waymark {
 namespace {
@@ -26,23 +25,6 @@ TEST(ThreadPool, VisitsEveryElementOnce) {
       EXPECT_THAT(visits, ::testing::Each(1)) << count;
     }
   }
-}
-
-TEST(ThreadPool, SumsHaveTheSameBitsOnAnyNumberOfThreads) {
-  Rng rng(1, 0);
-  std::vector<double> terms(20000);
-  for (double& term : terms) term = rng.normal() * 1e6;
-  const auto sum_with = [&](unsigned num_threads) {
-    ThreadPool pool(num_threads);
-    return pool.sum_chunks(terms.size(), 128, 0.0, [&](std::size_t begin, std::size_t end) {
-      double sum = 0.0;
-      for (std::size_t i = begin; i < end; ++i) sum += terms[i];
-      return sum;
-    });
-  };
-  const double expected = sum_with(1);
-  EXPECT_NE(expected, 0.0);
-  for (const unsigned num_threads : {2u, 3u, 8u}) EXPECT_EQ(sum_with(num_threads), expected);
 }
 
 TEST(ThreadPool, ManyShortLoopsInARow) {
