@@ -6,7 +6,7 @@
 
 #include <memory>
 
-#include "waymark/io/map_file.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark::python {
 

@@ -15,8 +15,8 @@
 #include "session_config.h"
 #include "turn.h"
 #include "waymark/base/check.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/input.h"
+#include "waymark/input/decode.h"
+#include "waymark/input/input.h"
 
 namespace waymark::python {
 namespace {

@@ -13,8 +13,8 @@
 #include "features.h"
 #include "frame_arguments.h"
 #include "session_config.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/map_file.h"
+#include "waymark/input/decode.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark::python {
 namespace {

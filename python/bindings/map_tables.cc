@@ -13,7 +13,7 @@
 
 #include "arrays.h"
 #include "bindings.h"
-#include "waymark/io/export_scene.h"
+#include "waymark/exchange/export_scene.h"
 
 namespace waymark::python {
 namespace {

@@ -12,7 +12,7 @@
 #include "bindings.h"
 #include "session_config.h"
 #include "trajectory.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/system.h"
 

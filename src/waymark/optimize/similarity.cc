@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/optimize/similarity.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
+#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
 
@@ -36,8 +36,6 @@ constexpr double kMinRangeNoise = 0.002;
 constexpr double kMaxRangeNoise = 0.5;
 /// Standard deviation of a normal distribution by its median absolute deviation.
 constexpr double kSigmaFromMedian = 1.4826;
-/// Prior information that keeps the covariance finite.
-constexpr double kSimilarityPriorInformation = 1e-6;
 
 using Indices = std::span<const std::uint32_t>;
 
@@ -51,20 +49,14 @@ struct Loss {
   }
 };
 
-struct SimilarityEquations {
-  Matrix7d hessian = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-  double cost = 0.0;
-};
-
 /// The similarity of one set of matches.
 class SimilaritySolver {
  public:
   SimilaritySolver(const LandmarkMatches& matches, const SimilarityOptions& options)
       : matches_(matches), options_(options) {}
 
-  SimilarityEquations linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
-    SimilarityEquations equations;
+  NormalEquations<7> linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
+    NormalEquations<7> equations;
     for (const std::uint32_t index : indices) {
       const auto residual = similarity_residual(b_from_a, matches_, index);
       if (!residual) {
@@ -88,38 +80,11 @@ class SimilaritySolver {
     return equations;
   }
 
-  /// Levenberg-Marquardt with the damping of Madsen, Nielsen & Tingleff 2004, 3.2; returns the
-  /// equations at the similarity reached.
-  SimilarityEquations minimize(Sim3& b_from_a,
-                               Indices indices,
-                               const Loss& loss,
-                               int max_iterations) const {
+  void minimize(Sim3& b_from_a, Indices indices, const Loss& loss, int max_iterations) const {
+    const auto at = [&](const Sim3& similarity) { return linearize(similarity, indices, loss); };
     const double negligible = kNegligibleSimilarityDecrease * options_.noise_px * options_.noise_px;
-    SimilarityEquations equations = linearize(b_from_a, indices, loss);
-    double damping = 1e-6;
-    double growth = 2.0;
-    for (int iteration = 0; iteration < max_iterations; ++iteration) {
-      const Vector7d scale = equations.hessian.diagonal().array() + kSimilarityPriorInformation;
-      Matrix7d damped = equations.hessian;
-      damped.diagonal() += damping * scale;
-      damped.diagonal().array() += kSimilarityPriorInformation;
-      const Vector7d step = -damped.ldlt().solve(equations.gradient);
-      const double decrease = step.dot(damping * scale.cwiseProduct(step) - equations.gradient);
-      if (!(decrease > negligible) || !step.allFinite()) break;
-      const Sim3 candidate = Sim3::exp(step) * b_from_a;
-      const SimilarityEquations next = linearize(candidate, indices, loss);
-      const double gain = (equations.cost - next.cost) / decrease;
-      if (gain > 0.0) {
-        b_from_a = candidate;
-        equations = next;
-        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-        growth = 2.0;
-      } else {
-        damping *= growth;
-        growth *= 2.0;
-      }
-    }
-    return equations;
+    int num_iterations = 0;
+    minimize_over_pose(b_from_a, at, max_iterations, negligible, num_iterations);
   }
 
   /// Runs through Geman-McClure losses from the width of the residuals at hand to that of the
@@ -161,7 +126,7 @@ class SimilaritySolver {
   /// In units of the bearings' noise, and under the same loss.
   void add_range(const SimilarityResidual& residual,
                  const Loss& loss,
-                 SimilarityEquations& equations) const {
+                 NormalEquations<7>& equations) const {
     const double factor = options_.noise_px / range_noise_;
     const double value = factor * residual.log_range_ratio;
     const Vector7d by_similarity = factor * residual.log_range_jacobian.transpose();
@@ -237,14 +202,6 @@ class SimilarityEstimator {
   const SimilarityOptions& options_;
 };
 
-Matrix7d covariance_from(Matrix7d information, bool is_scale_free) {
-  const double floor = 1e-12 * information.diagonal().maxCoeff();
-  information.diagonal().array() += std::max(kSimilarityPriorInformation, floor);
-  Matrix7d inverse = information.ldlt().solve(Matrix7d::Identity());
-  if (!is_scale_free) inverse(6, 6) = 0.0;
-  return 0.5 * (inverse + inverse.transpose());
-}
-
 }  // namespace
 
 std::optional<SimilarityEstimate> find_similarity(const LandmarkMatches& matches,
@@ -286,9 +243,9 @@ SimilarityEstimate refine_similarity(const LandmarkMatches& matches,
   if (!indices.empty()) {
     estimate.mean_squared_residual_px2 /= static_cast<double>(indices.size());
   }
-  const SimilarityEquations last = solver.linearize(estimate.b_from_a, indices, huber_loss);
-  estimate.covariance =
-      covariance_from(last.hessian / (options.noise_px * options.noise_px), options.is_scale_free);
+  const NormalEquations<7> last = solver.linearize(estimate.b_from_a, indices, huber_loss);
+  estimate.covariance = covariance_from<7>(last.hessian / (options.noise_px * options.noise_px));
+  if (!options.is_scale_free) estimate.covariance(6, 6) = 0.0;
   return estimate;
 }
 

@@ -10,7 +10,8 @@
 namespace waymark {
 namespace {
 
-/// As in guided matching: what was seen from elsewhere does not look alike from here.
+/// As in guided matching: what was seen from elsewhere does not look alike from here (Mur-Artal et
+/// al. 2015, V.D).
 constexpr double kMinSameViewCos = 0.5;
 /// The image is judged in so many columns and rows; regions with fewer landmarks say nothing.
 constexpr int kRegions = 4;
