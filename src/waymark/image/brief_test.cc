@@ -16,6 +16,7 @@
 #include "waymark/image/hamming.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/orientation.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {
@@ -109,7 +110,6 @@ TEST(Brief, KernelIsEqualToReference) {
 }
 
 TEST(Brief, StaysWithinItsRadius) {
-  const PaddedImage smooth = testing::make_noise(2 * kBriefRadius + 1, 2 * kBriefRadius + 1, 1);
   for (int step = 0; step < 720; ++step) {
     const auto angle = static_cast<float>(step * std::numbers::pi / 360.0);
     for (const BriefTest& test : kBriefPattern) {

@@ -7,9 +7,9 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "waymark/image/downscale.h"
 #include "waymark/image/gaussian.h"
 #include "waymark/image/image_testing.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {
