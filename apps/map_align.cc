@@ -16,6 +16,7 @@
 #include "waymark/exchange/export_scene.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
+#include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {

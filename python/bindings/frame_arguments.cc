@@ -6,8 +6,7 @@
 #include <string>
 
 #include "arrays.h"
-#include "waymark/image/color.h"
-#include "waymark/image/depth_units.h"
+#include "waymark/image/convert.h"
 
 namespace waymark::python {
 namespace {

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/image/color.h"
+#include "waymark/image/convert.h"
 #include "waymark/image/depth.h"
 #include "waymark/input/input.h"
 #include "waymark/system/system.h"

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <bit>
+#include <cstddef>
 #include <cstdint>
 #include <string_view>
 #include <vector>
@@ -14,6 +15,16 @@
 #include "waymark/image/features.h"
 
 namespace waymark {
+
+// What map files may hold. Readers refuse more before they allocate it.
+
+inline constexpr std::size_t kMaxArrayBytes = std::size_t{64} << 20;
+inline constexpr std::size_t kMaxRecordBytes = std::size_t{256} << 20;
+inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 20;
+inline constexpr std::uint32_t kMaxIds = std::uint32_t{1} << 28;  ///< Ids are below.
+inline constexpr std::size_t kMaxCamerasPerRig = 16;
+inline constexpr std::size_t kMaxSubmaps = std::size_t{1} << 20;
+inline constexpr std::size_t kLandmarksPerRecord = 4096;
 
 // Arrays are written and read as they lie in memory.
 static_assert(std::endian::native == std::endian::little);
