@@ -77,7 +77,7 @@ FedFrames feed_all(Input& input,
                    const FrameObserver& observer) {
   FedFrames frames;
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
-  while (!should_stop()) {
+  while (!should_stop || !should_stop()) {
     const std::optional<InputFrame> frame = input.next();
     if (!frame) break;
     if (frame->fault != FrameFault::kNone) {
@@ -89,7 +89,7 @@ FedFrames feed_all(Input& input,
       frames.tracking_ms.push_back(result.stages.tracking_ms());
       frames.table.frames.push_back(record_of_result(*frame, result));
     }
-    observer(frames.table.frames.back());
+    if (observer) observer(frames.table.frames.back());
   }
   return frames;
 }
@@ -103,18 +103,6 @@ std::vector<SubmapTrajectory> split_by_submap(
     return a.second.size() > b.second.size();
   });
   return parts;
-}
-
-std::vector<StampedPose> keyframe_poses(const Map& map, SubmapId submap) {
-  std::vector<StampedPose> poses;
-  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    if (keyframe.submap != submap) return;
-    poses.push_back({keyframe.timestamp_ns, keyframe.rig_from_world.inverse()});
-  });
-  std::sort(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) {
-    return a.timestamp_ns < b.timestamp_ns;
-  });
-  return poses;
 }
 
 UsageMeter::UsageMeter()

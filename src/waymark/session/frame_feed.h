@@ -41,9 +41,6 @@ using SubmapTrajectory = std::pair<SubmapId, std::vector<StampedPose>>;
 std::vector<SubmapTrajectory> split_by_submap(
     const std::vector<std::pair<SubmapId, StampedPose>>& frames);
 
-/// The keyframes of a sub-map, by time.
-std::vector<StampedPose> keyframe_poses(const Map& map, SubmapId submap);
-
 /// What was used since its construction.
 class UsageMeter {
  public:

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/exchange/export_scene.h"
 
 namespace waymark {
 namespace {
@@ -49,13 +50,6 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system) {
 
 }  // namespace
 
-SessionResults run_session(Input& input,
-                           System& system,
-                           const std::function<bool()>& should_stop,
-                           const FrameObserver& observer) {
-  return run_session(input, system, {should_stop, observer, nullptr, nullptr});
-}
-
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
   const auto feed = [&](const FrameInput& frame) {
@@ -80,7 +74,7 @@ void add_trajectories(const Map& map,
                       const std::vector<std::pair<SubmapId, StampedPose>>& poses,
                       SessionResults& results) {
   for (auto& [submap, trajectory] : split_by_submap(poses)) {
-    if (results.trajectories.empty()) results.keyframes = keyframe_poses(map, submap);
+    if (results.trajectories.empty()) results.keyframes = keyframe_trajectory(map, submap);
     results.trajectories.push_back(std::move(trajectory));
   }
   if (!results.trajectories.empty()) {
