@@ -14,7 +14,7 @@ namespace {
 
 /// A model of COLMAP's documentation ("Camera Models") in terms of ours: where each number comes
 /// from, as an index into its parameters, or kZero.
-struct ColmapModel {
+struct ColmapCameraModel {
   std::string_view name;
   std::size_t num_parameters;
   std::array<int, 4> intrinsics;  ///< fu fv pu pv.
@@ -24,8 +24,8 @@ struct ColmapModel {
 
 constexpr int kZero = -1;
 
-const std::vector<ColmapModel>& colmap_models() {
-  static const std::vector<ColmapModel> models = {
+const std::vector<ColmapCameraModel>& colmap_models() {
+  static const std::vector<ColmapCameraModel> models = {
       {"SIMPLE_PINHOLE", 3, {0, 0, 1, 2}, "none", {}},
       {"PINHOLE", 4, {0, 1, 2, 3}, "none", {}},
       {"SIMPLE_RADIAL", 4, {0, 0, 1, 2}, "radtan", {3, kZero, kZero, kZero}},
@@ -39,9 +39,9 @@ const std::vector<ColmapModel>& colmap_models() {
   return models;
 }
 
-const ColmapModel& find_model(std::string_view name, const std::string& where) {
+const ColmapCameraModel& find_model(std::string_view name, const std::string& where) {
   std::string known;
-  for (const ColmapModel& model : colmap_models()) {
+  for (const ColmapCameraModel& model : colmap_models()) {
     if (model.name == name) return model;
     known += (known.empty() ? "" : ", ") + std::string(model.name);
   }
@@ -61,7 +61,7 @@ int pixels(const RowReader& rows, std::size_t index) {
 CameraDescription read_camera(const RowReader& rows) {
   constexpr std::size_t kFirst = 4;  // CAMERA_ID MODEL WIDTH HEIGHT, then the parameters.
   rows.expect_at_least(kFirst, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS...");
-  const ColmapModel& model = find_model(rows.fields()[1], rows.where());
+  const ColmapCameraModel& model = find_model(rows.fields()[1], rows.where());
   const std::size_t count = rows.fields().size() - kFirst;
   if (count != model.num_parameters) {
     throw InputError(

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/optimize/ceres_solver.h"
+#include "waymark/optimize/test_ceres.h"
 
 #include <ceres/ceres.h>
 
@@ -10,7 +10,7 @@
 
 #include "waymark/optimize/residual.h"
 
-namespace waymark {
+namespace waymark::testing {
 
 namespace {
 
@@ -74,11 +74,11 @@ class ObservationCost : public ceres::SizedCostFunction<kSize, 7, 3> {
     const Rigid3 rig_from_world = pose_from(parameters[0]);
     const Eigen::Vector3d point_in_rig =
         rig_from_world * Eigen::Map<const Eigen::Vector3d>(parameters[1]);
-    const Sighting sighting = sight(cam_from_rig_ * point_in_rig);
+    const InverseRangePoint seen = in_inverse_range(cam_from_rig_ * point_in_rig);
     Eigen::Map<Eigen::Matrix<double, kSize, 1>> residual(residuals);
     Eigen::Matrix<double, kSize, 3> by_point_in_cam;
-    if (is_ahead(sighting, observation_.bearing)) {
-      fill(sighting, residual, by_point_in_cam);
+    if (is_ahead(seen, observation_.bearing)) {
+      fill(seen, residual, by_point_in_cam);
     } else {
       residual.setZero();
       if (kSize == 2) residual[0] = std::sqrt(kGrossSquaredResidual);
@@ -105,15 +105,15 @@ class ObservationCost : public ceres::SizedCostFunction<kSize, 7, 3> {
 
  private:
   template <class Residual, class Jacobian>
-  void fill(const Sighting& sighting, Residual& residual, Jacobian& by_point_in_cam) const {
+  void fill(const InverseRangePoint& seen, Residual& residual, Jacobian& by_point_in_cam) const {
     if constexpr (kSize == 2) {
       const Matrix23f& w = observation_.level_pixel_from_bearing;
-      residual = bearing_residual(sighting, observation_.bearing, w);
-      by_point_in_cam = bearing_residual_by_point(sighting, w);
+      residual = bearing_residual(seen, observation_.bearing, w);
+      by_point_in_cam = bearing_residual_by_point(seen, w);
     } else {
       const double sigma = observation_.inverse_range_sigma;
-      residual[0] = range_residual(sighting, observation_.inverse_range, sigma);
-      by_point_in_cam = range_residual_by_point(sighting, sigma);
+      residual[0] = range_residual(seen, observation_.inverse_range, sigma);
+      by_point_in_cam = range_residual_by_point(seen, sigma);
     }
   }
 
@@ -220,4 +220,4 @@ BundleRound minimize_with_ceres(BundleProblem& problem,
   return {};
 }
 
-}  // namespace waymark
+}  // namespace waymark::testing

@@ -5,10 +5,9 @@
 #include <cstdint>
 #include <span>
 
-#include "waymark/optimize/bundle.h"
 #include "waymark/optimize/schur_solver.h"
 
-namespace waymark {
+namespace waymark::testing {
 
 /// The same problem, loss and result as minimize_with_schur by Ceres: the independent opinion.
 /// One thread and contiguous blocks, which makes Ceres repeatable.
@@ -16,4 +15,4 @@ BundleRound minimize_with_ceres(BundleProblem& problem,
                                 std::span<const std::uint8_t> is_used,
                                 const BundleOptions& options);
 
-}  // namespace waymark
+}  // namespace waymark::testing

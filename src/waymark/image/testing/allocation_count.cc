@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/image/allocation_count.h"
+#include "waymark/image/testing/allocation_count.h"
 
 #include <atomic>
 #include <cstdlib>

@@ -10,7 +10,7 @@
 #include "waymark/base/check.h"
 #include "waymark/camera/tangent.h"
 #include "waymark/image/pyramid.h"
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 namespace waymark {
 namespace {
