@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/loop/revisit_verifier.h"
+#include "waymark/loop/evidence.h"
 
 #include <algorithm>
 
-#include "waymark/mapping/associate.h"
+#include "waymark/loop/find.h"
 
 namespace waymark {
 namespace {
@@ -22,10 +22,10 @@ constexpr double kSightingRadiusPx = 4.0;
 constexpr std::size_t kNumSurroundings = 8;
 /// Landmarks that so many keyframes saw are expected to be seen again.
 constexpr std::size_t kMinObservers = 3;
-/// A keyframe near the query is a witness if it finds so many landmarks, and such a share.
-constexpr std::size_t kMaxWitnesses = 5;
-constexpr std::size_t kMinFoundByWitness = 25;
-constexpr double kMinShareOfWitness = 0.1;
+/// A keyframe near the query confirms if it finds so many landmarks, and such a share.
+constexpr std::size_t kMaxConfirming = 5;
+constexpr std::size_t kMinFoundToConfirm = 25;
+constexpr double kMinShareToConfirm = 0.1;
 
 bool is_scale_free(const Map& map, KeyframeId a, KeyframeId b) {
   const auto is_metric = [&](KeyframeId id) {
@@ -48,12 +48,6 @@ void add_view(const Map& map,
   side.level_pixel_from_bearing.push_back(keyframe.features->level_pixel_from_bearing[feature]);
 }
 
-std::vector<KeyframeId> with_surroundings(const Map& map, KeyframeId id) {
-  std::vector<KeyframeId> ids = strongest_neighbours(map, id, kNumSurroundings);
-  ids.push_back(id);
-  return ids;
-}
-
 Sim3 rig_from_cam(const Keyframe& keyframe) {
   return Sim3(keyframe.rig->cameras[0].cam_from_rig.inverse());
 }
@@ -65,12 +59,12 @@ Rigid3 pose_in_other_world(const Sim3& rig_from_other, const Rigid3& other_from_
          other_from_world;
 }
 
-RevisitVerifier::RevisitVerifier(std::shared_ptr<const Rig> rig, std::uint64_t seed)
+EvidenceCollector::EvidenceCollector(std::shared_ptr<const Rig> rig, std::uint64_t seed)
     : seed_(seed), projection_(std::move(rig)) {}
 
-std::optional<RevisitEvidence> RevisitVerifier::examine(const Map& map,
-                                                        KeyframeId query,
-                                                        KeyframeId match) {
+std::optional<RevisitEvidence> EvidenceCollector::collect(const Map& map,
+                                                          KeyframeId query,
+                                                          KeyframeId match) {
   RevisitEvidence evidence;
   evidence.revisit.query = query;
   evidence.revisit.match = match;
@@ -79,9 +73,9 @@ std::optional<RevisitEvidence> RevisitVerifier::examine(const Map& map,
   return evidence;
 }
 
-LandmarkMatches RevisitVerifier::match_by_appearance(const Map& map,
-                                                     KeyframeId query,
-                                                     KeyframeId match) {
+LandmarkMatches EvidenceCollector::match_by_appearance(const Map& map,
+                                                       KeyframeId query,
+                                                       KeyframeId match) {
   const Keyframe& in_query = map.keyframes().at(query);
   const Keyframe& in_match = map.keyframes().at(match);
   std::vector<std::uint32_t> known;
@@ -98,7 +92,7 @@ LandmarkMatches RevisitVerifier::match_by_appearance(const Map& map,
   return matches;
 }
 
-std::optional<SimilarityEstimate> RevisitVerifier::estimate(const Map& map, Revisit& revisit) {
+std::optional<SimilarityEstimate> EvidenceCollector::estimate(const Map& map, Revisit& revisit) {
   const Keyframe& in_query = map.keyframes().at(revisit.query);
   const Keyframe& in_match = map.keyframes().at(revisit.match);
   const auto set_similarity = [&](const Sim3& query_cam_from_match_cam) {
@@ -128,7 +122,7 @@ std::optional<SimilarityEstimate> RevisitVerifier::estimate(const Map& map, Revi
   return found;
 }
 
-LandmarkMatches RevisitVerifier::match_by_projection(const Map& map, Revisit& revisit) {
+LandmarkMatches EvidenceCollector::match_by_projection(const Map& map, Revisit& revisit) {
   const Keyframe& in_query = map.keyframes().at(revisit.query);
   const Keyframe& in_match = map.keyframes().at(revisit.match);
   std::vector<std::uint32_t> features_of_match;
@@ -158,10 +152,10 @@ LandmarkMatches RevisitVerifier::match_by_projection(const Map& map, Revisit& re
   return matches;
 }
 
-Sightings RevisitVerifier::look_for(const Map& map,
-                                    std::span<const KeyframeId> sources,
-                                    KeyframeId target,
-                                    const Rigid3& target_from_world) {
+Sightings EvidenceCollector::look_for(const Map& map,
+                                      std::span<const KeyframeId> sources,
+                                      KeyframeId target,
+                                      const Rigid3& target_from_world) {
   std::vector<LandmarkId> ids;
   for (KeyframeId source : sources) {
     const auto& seen = map.keyframes().at(source).landmarks;
@@ -188,27 +182,28 @@ Sightings RevisitVerifier::look_for(const Map& map,
   return {found.num_matches, static_cast<std::size_t>(num_visible)};
 }
 
-void RevisitVerifier::count_sightings(const Map& map, RevisitEvidence& evidence) {
+void EvidenceCollector::count_sightings(const Map& map, RevisitEvidence& evidence) {
   const Revisit& revisit = evidence.revisit;
   const Rigid3 query_from_world = map.keyframes().at(revisit.query).rig_from_world;
   const Rigid3 match_from_world = map.keyframes().at(revisit.match).rig_from_world;
-  const std::vector<KeyframeId> around_match = with_surroundings(map, revisit.match);
+  const std::vector<KeyframeId> around_match =
+      with_neighbours(map, revisit.match, kNumSurroundings);
   evidence.in_query = look_for(map,
                                around_match,
                                revisit.query,
                                pose_in_other_world(revisit.query_from_match, match_from_world));
   evidence.in_match =
       look_for(map,
-               with_surroundings(map, revisit.query),
+               with_neighbours(map, revisit.query, kNumSurroundings),
                revisit.match,
                pose_in_other_world(revisit.query_from_match.inverse(), query_from_world));
-  for (KeyframeId id : strongest_neighbours(map, revisit.query, kMaxWitnesses)) {
+  for (KeyframeId id : strongest_neighbours(map, revisit.query, kMaxConfirming)) {
     const Rigid3 id_from_query = map.keyframes().at(id).rig_from_world * query_from_world.inverse();
     const Sim3 id_from_match = Sim3(id_from_query) * revisit.query_from_match;
     const Sightings sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
-    evidence.num_witnesses +=
-        sightings.num_found >= kMinFoundByWitness && sightings.share() >= kMinShareOfWitness;
+    evidence.num_confirming +=
+        sightings.num_found >= kMinFoundToConfirm && sightings.share() >= kMinShareToConfirm;
   }
 }
 

@@ -1,18 +1,24 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/loop/spread_drift.h"
+#include "waymark/loop/close.h"
 
 #include <algorithm>
 #include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/loop/drift.h"
+#include "waymark/loop/find.h"
+#include "waymark/map/align.h"
+#include "waymark/mapping/fuse.h"
 #include "waymark/optimize/pose_graph.h"
 
 namespace waymark {
 namespace {
 
-/// Keyframes that share so many landmarks are linked.
+/// Keyframes on either side in which landmarks are fused.
+constexpr std::size_t kNumNeighbours = 10;
+/// Keyframes that share so many landmarks have an edge of the pose graph (Mur-Artal et al. 2015,
+/// III.D).
 constexpr std::uint32_t kMinShared = 100;
 /// Standard deviations of what the map says of two keyframes that are linked; that of the
 /// translation is in parts of the depth of what is seen.
@@ -83,6 +89,7 @@ class SubmapGraph {
     return depth > 0.0 ? depth : 1.0;
   }
 
+  /// Every pair once: where both a child and strong covisibility link two, the child does.
   void add_edges_of_map(KeyframeId id) {
     const KeyframeId parent = map_.keyframes().at(id).parent;
     if (parent.is_valid()) add_as_mapped(parent, id);
@@ -106,6 +113,26 @@ class SubmapGraph {
   PoseGraph graph_;
 };
 
+/// Moves the younger sub-map to the older, which it belongs to from then on.
+void join_submaps(Map& map, PlaceIndex& places, const Revisit& revisit) {
+  const Keyframe& query = map.keyframes().at(revisit.query);
+  const Keyframe& match = map.keyframes().at(revisit.match);
+  const SubmapId of_query = query.submap;
+  const SubmapId of_match = match.submap;
+  const Sim3 query_from_world_of_match = revisit.query_from_match * Sim3(match.rig_from_world);
+  const Sim3 of_query_from_of_match =
+      Sim3(query.rig_from_world.inverse()) * query_from_world_of_match;
+  if (of_match < of_query) {
+    transform_submap(map, of_query, of_query_from_of_match.inverse());
+    map.join_submaps(revisit.query, revisit.match);
+    places.join(of_query, of_match);
+  } else {
+    transform_submap(map, of_match, of_query_from_of_match);
+    map.join_submaps(revisit.match, revisit.query);
+    places.join(of_match, of_query);
+  }
+}
+
 }  // namespace
 
 MapCorrection spread_drift(const Map& map, const LoopEdge& loop) {
@@ -114,6 +141,36 @@ MapCorrection spread_drift(const Map& map, const LoopEdge& loop) {
   // The drift may be many standard deviations: a robust edge would not close it.
   graph.add_loop(loop, false);
   return graph.solve();
+}
+
+bool close_revisit(Map& map,
+                   PlaceIndex& places,
+                   const Revisit& revisit,
+                   ProjectionMatcher& matcher,
+                   DirtyLandmarks& dirty) {
+  const auto& keyframes = map.keyframes();
+  const bool is_join = keyframes.at(revisit.query).submap != keyframes.at(revisit.match).submap;
+  const LoopEdge edge{revisit.match, revisit.query, revisit.query_from_match};
+  const auto of_query = with_neighbours(map, revisit.query, kNumNeighbours);
+  const auto of_match = with_neighbours(map, revisit.match, kNumNeighbours);
+  if (is_join) {
+    map.add_loop_edge(edge);
+    join_submaps(map, places, revisit);
+  } else {
+    const MapCorrection correction = spread_drift(map, edge);
+    map.add_loop_edge(edge);
+    apply_correction(map, correction);
+  }
+  for (const Revisit::Pair& pair : revisit.pairs) {
+    const LandmarkId seen_by_query = map.resolve(pair.of_query);
+    const LandmarkId seen_by_match = map.resolve(pair.of_match);
+    if (seen_by_query.is_valid() && seen_by_match.is_valid() && seen_by_query != seen_by_match) {
+      merge(map, seen_by_query, seen_by_match, dirty);
+    }
+  }
+  for (KeyframeId id : of_query) fuse_into(map, of_match, id, matcher, dirty);
+  for (KeyframeId id : of_match) fuse_into(map, of_query, id, matcher, dirty);
+  return is_join;
 }
 
 }  // namespace waymark

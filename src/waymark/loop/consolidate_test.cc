@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/loop/overlaps.h"
+#include "waymark/loop/consolidate.h"
 
 #include <gtest/gtest.h>
 

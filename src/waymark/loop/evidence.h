@@ -33,18 +33,19 @@ struct RevisitEvidence {
   Sightings in_query;  ///< Landmarks around the match in the query.
   Sightings in_match;  ///< Landmarks around the query in the match.
   /// Other keyframes near the query that see the place, too, where this revisit puts it.
-  std::size_t num_witnesses = 0;
+  std::size_t num_confirming = 0;
 };
 
-/// Checks by geometry whether two keyframes show the same place: what they see alike must fit one
-/// similarity (a rigid motion where both sub-maps are metric), as Strasdat et al. (2010) do, and
-/// that must explain what else the two and their neighbours see. Keeps its buffers.
-class RevisitVerifier {
+/// Collects by geometry what speaks for two keyframes showing the same place: how much of what they
+/// see alike fits one similarity (a rigid motion where both sub-maps are metric), as Strasdat et
+/// al. (2010) do, and how much of what else the two and their neighbours see that explains. Keeps
+/// its buffers.
+class EvidenceCollector {
  public:
-  RevisitVerifier(std::shared_ptr<const Rig> rig, std::uint64_t seed);
+  EvidenceCollector(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
   /// Nothing if no similarity fits enough matches to be looked into. Repeatable by bits.
-  std::optional<RevisitEvidence> examine(const Map& map, KeyframeId query, KeyframeId match);
+  std::optional<RevisitEvidence> collect(const Map& map, KeyframeId query, KeyframeId match);
 
  private:
   LandmarkMatches match_by_appearance(const Map& map, KeyframeId query, KeyframeId match);

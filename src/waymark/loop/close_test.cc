@@ -1,25 +1,26 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/loop/loop_closing.h"
+#include "waymark/loop/close.h"
 
 #include <gtest/gtest.h>
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
-#include "waymark/loop/loop_finder.h"
-#include "waymark/loop/spread_drift.h"
+#include "waymark/loop/find.h"
 #include "waymark/loop/test_loop.h"
+#include "waymark/loop/verify.h"
 
 namespace waymark {
 namespace {
 
 /// Walks on until a place is recognised; the scene's last keyframe is the query.
 Revisit walk_until_found(LoopScene& scene, int from_step) {
-  LoopFinder finder(scene.rig, 1);
+  RevisitVerifier verifier(scene.rig, 1);
   for (int step = from_step;; ++step) {
     const KeyframeId id = scene.add_keyframe(step);
     if (step < from_step + 4) continue;
-    if (const auto revisit = finder.find(scene.map, scene.places, id)) return *revisit;
+    const auto alike = find_alike(scene.map, scene.places, id);
+    if (const auto revisit = verifier.verify_alike(scene.map, id, alike)) return *revisit;
   }
 }
 
@@ -62,7 +63,7 @@ class LoopClosingTest : public ::testing::Test {
  protected:
   void close(LoopScene& scene, const Revisit& revisit) {
     ProjectionMatcher matcher(scene.rig);
-    close_loop(scene.map, revisit, matcher, dirty_);
+    EXPECT_FALSE(close_revisit(scene.map, scene.places, revisit, matcher, dirty_));
     ASSERT_EQ(scene.map.broken_invariants(), "");
   }
 
@@ -128,8 +129,8 @@ TEST_F(LoopClosingTest, FusesWhatIsSeenFromBothSides) {
   ASSERT_EQ(scene.map.loop_edges().size(), 1u);
   EXPECT_TRUE(scene.map.has_loop_edge(revisit.query));
   // The place is not found again: the map knows now.
-  LoopFinder finder(scene.rig, 1);
-  EXPECT_FALSE(finder.find(scene.map, scene.places, revisit.query));
+  const auto alike = find_alike(scene.map, scene.places, revisit.query);
+  EXPECT_FALSE(RevisitVerifier(scene.rig, 1).verify_alike(scene.map, revisit.query, alike));
 }
 
 TEST_F(LoopClosingTest, KeepsOldLoopsClosed) {
@@ -163,7 +164,7 @@ TEST(JoinSubmapsTest, MovesTheYoungerToTheOlder) {
     DirtyLandmarks dirty;
     const Map& map = scene.map;
     const std::size_t num_landmarks = map.landmarks().size();
-    join_submaps(scene.map, scene.places, revisit, matcher, dirty);
+    EXPECT_TRUE(close_revisit(scene.map, scene.places, revisit, matcher, dirty));
     EXPECT_EQ(map.broken_invariants(), "");
     EXPECT_EQ(map.resolve(SubmapId{1}), SubmapId{0});
     map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
