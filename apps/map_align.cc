@@ -13,10 +13,10 @@
 
 #include "map_tasks.h"
 #include "waymark/base/check.h"
-#include "waymark/io/export_scene.h"
-#include "waymark/io/map_file.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/export_scene.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {

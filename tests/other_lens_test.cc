@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "recorded_run.h"
-#include "session_options.h"
 #include "waymark/base/median.h"
 #include "waymark/base/rng.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/alignment.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/session/session_options.h"
 #include "waymark/simulate/sequence.h"
 #include "waymark/system/localizer.h"
 

@@ -9,8 +9,8 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/sim3.h"
-#include "waymark/io/trajectory.h"
 
 namespace waymark {
 

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "waymark/image/allocation_count.h"
+#include "waymark/image/testing/allocation_count.h"
 
 namespace waymark {
 namespace {

@@ -5,13 +5,12 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
-#include "waymark/image/allocation_count.h"
 #include "waymark/image/image_testing.h"
+#include "waymark/image/testing/allocation_count.h"
 
 namespace waymark {
 namespace {
@@ -124,8 +123,8 @@ TEST(FeatureExtractor, LocatesToFractionsOfAPixel) {
 
 TEST(FeatureExtractor, HonoursMasks) {
   const PaddedImage image = testing::make_texture(400, 300, 1);
-  Image mask(400, 300);  // The left half is covered.
-  for (int y = 0; y < 300; ++y) std::fill_n(mask.row(y) + 200, 200, std::uint8_t{255});
+  Image mask(400, 300);
+  for (int y = 0; y < 300; ++y) std::fill(mask.row(y) + 200, mask.row(y) + 400, 255);
   FeatureExtractor extractor({.count = 500});
   const Extracted features = extract(extractor, image, mask.view());
   EXPECT_EQ(features.keypoints.size(), 500u);
@@ -143,7 +142,7 @@ TEST(FeatureExtractor, FindsNothingWhereThereIsNothing) {
   for (int size : {1, 2, 20, 39}) {
     EXPECT_LE(extract(extractor, testing::make_noise(size, size, 1)).keypoints.size(), 1u);
   }
-  const Image mask(400, 300);  // Zero: everything is covered.
+  const Image mask(400, 300);  // All 0.
   EXPECT_TRUE(extract(extractor, testing::make_noise(400, 300, 1), mask.view()).keypoints.empty());
 }
 

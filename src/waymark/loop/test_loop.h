@@ -11,7 +11,7 @@
 #include "waymark/mapping/associate.h"
 #include "waymark/match/test_scene.h"
 #include "waymark/place/place_index.h"
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 namespace waymark {
 

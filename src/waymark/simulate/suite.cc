@@ -4,7 +4,6 @@
 
 #include <numbers>
 
-#include "waymark/base/check.h"
 #include "waymark/geometry/so3.h"
 
 namespace waymark {
@@ -137,15 +136,6 @@ std::vector<SuiteEntry> simulated_suite() {
        "mono",
        "exposure jumps by 1/6 and 3, two seconds dark and noisy"},
   };
-}
-
-SuiteEntry find_suite_entry(const std::string& name) {
-  std::string known;
-  for (const SuiteEntry& entry : simulated_suite()) {
-    if (entry.spec.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + entry.spec.name;
-  }
-  throw InputError("sequence '" + name + "'", "unknown, expected one of " + known);
 }
 
 }  // namespace waymark

@@ -9,7 +9,7 @@
 
 #include "waymark/map/map.h"
 #include "waymark/match/test_scene.h"
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 namespace waymark {
 

@@ -281,6 +281,8 @@ void Tracker::count_sightings(const ProjectionMatches& matches) {
   for (std::size_t i = 0; i < is_taken_.size(); ++i) {  // Primary features only.
     if (landmarks_[i].is_valid()) sightings_.push_back({landmarks_[i], 0, 1});
   }
+  constexpr std::size_t kMany = 100'000;  // At rest no keyframe takes them.
+  if (sightings_.size() > kMany) sightings_ = take_sightings();
 }
 
 TrackOutcome Tracker::accept(const Frame& frame, const LocatedFrame& located) {
