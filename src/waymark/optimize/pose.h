@@ -50,7 +50,6 @@ struct PoseEstimate {
   /// Standard deviation of a residual component as the inliers show it; leans on noise_px when
   /// there are few of them.
   double noise_measured_px = 0.0;
-  double mean_residual_px = 0.0;  ///< Mean length of the inliers' residuals.
   int num_iterations = 0;
 };
 
