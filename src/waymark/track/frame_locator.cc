@@ -4,19 +4,6 @@
 
 namespace waymark {
 
-void append_observation(const Features& features,
-                        std::uint32_t feature,
-                        const Eigen::Vector3d& point_in_world,
-                        PoseObservations& observations) {
-  observations.point_in_world.push_back(point_in_world);
-  observations.bearing.push_back(features.bearings[feature]);
-  observations.level_pixel_from_bearing.push_back(features.level_pixel_from_bearing[feature]);
-  observations.camera.push_back(features.keypoints[feature].camera);
-  const MeasuredRange measured = features.measured_range(feature);
-  observations.inverse_range.push_back(measured.inverse);
-  observations.inverse_range_sigma.push_back(measured.inverse_sigma);
-}
-
 LocatedFrame FrameLocator::locate(const Features& features,
                                   const Map& map,
                                   const Rigid3& initial_rig_from_world,
@@ -51,7 +38,7 @@ void FrameLocator::collect(const Features& features,
     const Eigen::Vector3d& position = map.landmarks().at(landmarks[feature]).position_in_world;
     for (const std::uint32_t seer : {feature, features.partner[feature]}) {
       if (seer == kNoFeature) continue;
-      append_observation(features, seer, position, observations_);
+      observations_.add(position, features.measurement(seer));
       feature_of_observation_.push_back(seer);
     }
   }

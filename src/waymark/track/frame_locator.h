@@ -10,12 +10,6 @@
 
 namespace waymark {
 
-/// Adds what a feature measures of a point with a known position.
-void append_observation(const Features& features,
-                        std::uint32_t feature,
-                        const Eigen::Vector3d& point_in_world,
-                        PoseObservations& observations);
-
 /// The pose that follows from which landmark each feature of a frame shows.
 struct LocatedFrame {
   Rigid3 rig_from_world;

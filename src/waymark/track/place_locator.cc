@@ -170,8 +170,7 @@ std::optional<Rigid3> PlaceLocator::find_consensus(const Features& features,
   feature_of_observation_.clear();
   for (std::uint32_t i = 0; i < features.num_primary; ++i) {
     if (!landmarks[i].is_valid()) continue;
-    append_observation(
-        features, i, map.landmarks().at(landmarks[i]).position_in_world, observations_);
+    observations_.add(map.landmarks().at(landmarks[i]).position_in_world, features.measurement(i));
     feature_of_observation_.push_back(i);
   }
   RansacOptions ransac_options;
