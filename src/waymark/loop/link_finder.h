@@ -30,7 +30,6 @@ class LinkFinder {
 
   const std::shared_ptr<const Rig> rig_;
   PlaceLocator locator_;
-  std::vector<LandmarkId> seen_;
 };
 
 }  // namespace waymark

@@ -49,8 +49,8 @@ Settings small_settings() {
   return settings;
 }
 
-FrameInput input_of(const SimulatedFrame& frame) {
-  FrameInput input;
+FrameImages input_of(const SimulatedFrame& frame) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images[0].view();
   input.depth = frame.depth.view();
@@ -193,7 +193,7 @@ TEST(System, TimeStampsMustIncrease) {
 TEST(System, ImagesMustHaveTheSizeOfTheCalibration) {
   System system(small_rig(), small_settings(), Timing::kInline);
   const Image small(160, 120);
-  FrameInput input = input_of(frames()[0]);
+  FrameImages input = input_of(frames()[0]);
   input.image0 = small.view();
   EXPECT_THROW(system.feed(input), InputError);
   input.image0 = {};
@@ -205,7 +205,7 @@ TEST(System, AnImageWithoutFeaturesIsLostAndTheNextIsFoundAgain) {
   System system(small_rig(), small_settings(), Timing::kLockstep);
   for (int i = 0; i < 3; ++i) system.feed(input_of(frames()[static_cast<std::size_t>(i)]));
   const Image black(320, 240);
-  FrameInput blind = input_of(frames()[3]);
+  FrameImages blind = input_of(frames()[3]);
   blind.image0 = black.view();
   const TrackingResult lost = system.feed(blind);
   EXPECT_EQ(lost.state, FrameState::kLost);
@@ -274,7 +274,7 @@ TEST(System, TakesNoRangesIntoAMapWithoutScale) {
   map.add_submap(false);
   System system(small_rig(), small_settings(), Timing::kInline, map.freeze());
   EXPECT_THROW(system.feed(input_of(frames()[0])), InputError);
-  FrameInput grey = input_of(frames()[0]);
+  FrameImages grey = input_of(frames()[0]);
   grey.depth = {};
   EXPECT_EQ(system.feed(grey).state, FrameState::kLost);
 }
