@@ -12,7 +12,7 @@
 #include "commands.h"
 #include "map_tasks.h"
 #include "waymark/base/check.h"
-#include "waymark/io/map_file.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {

@@ -8,19 +8,19 @@
 #include <optional>
 #include <string>
 
-#include "autosave.h"
 #include "choice_option.h"
 #include "commands.h"
-#include "image_keeper.h"
 #include "input_command.h"
 #include "interrupt.h"
 #include "live_control.h"
-#include "live_input.h"
-#include "paced_input.h"
 #include "reporter.h"
-#include "session.h"
-#include "session_options.h"
-#include "waymark/io/atomic_file.h"
+#include "waymark/base/atomic_file.h"
+#include "waymark/session/autosave.h"
+#include "waymark/session/image_keeper.h"
+#include "waymark/session/live_input.h"
+#include "waymark/session/paced_input.h"
+#include "waymark/session/session.h"
+#include "waymark/session/session_options.h"
 
 namespace waymark {
 namespace {

@@ -15,7 +15,7 @@
 
 #include "choice_option.h"
 #include "waymark/base/frame_state.h"
-#include "waymark/io/decode.h"
+#include "waymark/input/decode.h"
 
 namespace waymark {
 

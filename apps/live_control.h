@@ -5,9 +5,9 @@
 #include <atomic>
 #include <string>
 
-#include "autosave.h"
-#include "frame_feed.h"
-#include "image_keeper.h"
+#include "waymark/session/autosave.h"
+#include "waymark/session/frame_feed.h"
+#include "waymark/session/image_keeper.h"
 #include "waymark/system/system.h"
 #include "waymark/view/publisher.h"
 #include "waymark/view/viewer.h"

@@ -13,10 +13,10 @@
 
 #include "map_tasks.h"
 #include "waymark/base/check.h"
-#include "waymark/io/export_scene.h"
-#include "waymark/io/map_file.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/export_scene.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {
@@ -82,13 +82,13 @@ Map scale(Map map, const AlignOptions& options) {
 }
 
 /// What was read, in the form that the fit takes.
-struct Trajectory {
+struct TrajectoryColumns {
   std::vector<std::int64_t> timestamps_ns;
   std::vector<Rigid3> poses;
 };
 
-Trajectory read(const std::filesystem::path& path) {
-  Trajectory trajectory;
+TrajectoryColumns read(const std::filesystem::path& path) {
+  TrajectoryColumns trajectory;
   for (const StampedPose& pose : read_trajectory(path)) {
     trajectory.timestamps_ns.push_back(pose.timestamp_ns);
     trajectory.poses.push_back(pose.world_from_camera);
@@ -97,7 +97,7 @@ Trajectory read(const std::filesystem::path& path) {
 }
 
 Map fit(Map map, const AlignOptions& options) {
-  const Trajectory trajectory = read(options.trajectory);
+  const TrajectoryColumns trajectory = read(options.trajectory);
   std::string report;
   int num_aligned = 0;
   for (const SubmapId submap : submaps_by_size(map)) {

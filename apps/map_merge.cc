@@ -8,8 +8,8 @@
 #include <string>
 
 #include "map_tasks.h"
-#include "waymark/io/map_file.h"
 #include "waymark/loop/map_merger.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {

@@ -14,16 +14,16 @@ set(roots
   image/color.h # colour to grey
   image/depth_units.h # depth from metres
   image/image.h
-  io/decode.h # images
-  io/export_colmap.h
-  io/export_nerfstudio.h
-  io/export_ply.h
-  io/input.h # data sets, folders, video files and devices
-  io/listing.h
-  io/map_file.h
-  io/mask.h
-  io/results.h
-  io/trajectory.h
+  input/decode.h # images
+  exchange/export_colmap.h
+  exchange/export_nerfstudio.h
+  exchange/export_ply.h
+  input/input.h # data sets, folders, video files and devices
+  input/listing.h
+  mapfile/map_file.h
+  input/mask.h
+  exchange/results.h
+  exchange/trajectory.h
   map/map.h
   simulate/sequence.h # rendered sequences with their truth, to test with
   system/localizer.h

@@ -17,7 +17,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
 #include "waymark/system/system.h"
 
 namespace {

@@ -15,8 +15,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/map_file.h"
+#include "waymark/input/decode.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/system/localizer.h"
 
 namespace {

@@ -15,8 +15,8 @@
 
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/listing.h"
+#include "waymark/input/decode.h"
+#include "waymark/input/listing.h"
 #include "waymark/system/system.h"
 
 namespace {

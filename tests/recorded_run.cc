@@ -4,8 +4,8 @@
 
 #include <cstdlib>
 
-#include "session_options.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
+#include "waymark/session/session_options.h"
 
 namespace waymark {
 

@@ -10,7 +10,7 @@
 
 #include "waymark/image/color.h"
 #include "waymark/image/depth.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
 #include "waymark/system/system.h"
 
 namespace waymark::python {

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "waymark/evaluate/segments.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/sim3.h"
-#include "waymark/io/trajectory.h"
 
 namespace waymark {
 

@@ -20,8 +20,9 @@ namespace {
 
 inline constexpr int kColumns = 32;  // 31 of the disc and one of no weight.
 
-// Half the width of the disc at each distance from its middle row: the radius rounded as in
-// cv::ORB, so that angles agree with those of other ORB features.
+// Half the width of the disc at each distance from its middle row: the circle rounded in one octant
+// and mirrored in the others. The values are those of OpenCV's orb.cpp, (c) 2009 Willow Garage,
+// Inc., BSD-3-Clause as in brief_pattern.h, so that angles agree with those of other ORB features.
 inline constexpr std::array<int, kOrientationRadius + 1> kHalfWidths{
     15, 15, 15, 15, 14, 14, 14, 13, 13, 12, 11, 10, 9, 8, 6, 3};
 

@@ -27,10 +27,7 @@ struct BundleProblem {
   std::vector<BundleObservation> observations;  ///< Sorted by point.
 };
 
-enum class BundleSolver { kSchur, kCeres };
-
 struct BundleOptions {
-  BundleSolver solver = BundleSolver::kSchur;
   /// Each round minimises with Huber's loss over the observations that passed the gate after the
   /// round before (the first: over all), then every observation meets the gate again.
   int num_rounds = 2;

@@ -7,55 +7,10 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
-#include "waymark/simulate/sequence.h"
+#include "waymark/system/test_sequence.h"
 
 namespace waymark {
 namespace {
-
-constexpr int kNumFrames = 25;
-
-SequenceSpec small_spec() {
-  CameraDescription camera;
-  camera.camera_model = "pinhole";
-  camera.intrinsics = {210.0, 210.0, 159.5, 119.5};
-  camera.width_px = 320;
-  camera.height_px = 240;
-  SequenceSpec spec;
-  spec.name = "small";
-  spec.motion = "slide";
-  spec.seed = 3;
-  spec.num_frames = kNumFrames;
-  spec.chain = rgbd_chain(camera, 1000.0);
-  return spec;
-}
-
-/// Rendered once for all tests.
-const std::vector<SimulatedFrame>& frames() {
-  static const std::vector<SimulatedFrame> rendered = [] {
-    SimulatedSequence sequence(small_spec());
-    std::vector<SimulatedFrame> result;
-    for (int i = 0; i < kNumFrames; ++i) result.push_back(sequence.frame(i));
-    return result;
-  }();
-  return rendered;
-}
-
-Rig small_rig() { return SimulatedSequence(small_spec()).rig(); }
-
-Settings small_settings() {
-  Settings settings;
-  settings.features.count = 500;
-  settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
-  return settings;
-}
-
-FrameImages input_of(const SimulatedFrame& frame) {
-  FrameImages input;
-  input.timestamp_ns = frame.timestamp_ns;
-  input.image0 = frame.images[0].view();
-  input.depth = frame.depth.view();
-  return input;
-}
 
 struct Played {
   std::vector<TrackingResult> results;

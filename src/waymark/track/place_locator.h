@@ -35,7 +35,7 @@ struct PlaceAttempt {
 
 /// Finds out whether features show the surroundings of a keyframe, and from where, without a
 /// prediction: match by appearance, RANSAC on three bearings, guided matching, refinement (as in
-/// Mur-Artal et al. 2015, V.D). The features may come from another camera model than the
+/// Mur-Artal et al. 2015, V.C). The features may come from another camera model than the
 /// keyframe's. Keeps its buffers.
 class PlaceLocator {
  public:

@@ -15,6 +15,11 @@ class SightingCounter {
  public:
   void count_visible(LandmarkId landmark) { sightings_.push_back({landmark, 1, 0}); }
   void count_found(LandmarkId landmark) { sightings_.push_back({landmark, 0, 1}); }
+  /// Keeps what is counted short: at rest no keyframe takes it.
+  void end_frame() {
+    constexpr std::size_t kMany = 100'000;
+    if (sightings_.size() > kMany) sightings_ = take();
+  }
   void clear() { sightings_.clear(); }
 
   /// The counts since the last take(), ascending by landmark.

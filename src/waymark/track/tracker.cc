@@ -167,6 +167,7 @@ void Tracker::count_sightings(const Features& features, const LocatedFrame& loca
   for (std::size_t i = 0; i < features.num_primary; ++i) {
     if (located.landmarks[i].is_valid()) sightings_.count_found(located.landmarks[i]);
   }
+  sightings_.end_frame();
 }
 
 bool Tracker::is_keyframe(const Frame& frame, const LocatedFrame& located) const {
