@@ -94,7 +94,7 @@ SessionResults map_input(
   hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
-    hooks.on_result = [live](const FrameInput& frame, const TrackingResult& result) {
+    hooks.on_result = [live](const FrameImages& frame, const TrackingResult& result) {
       live->show(frame, result);
     };
     hooks.on_input_end = [live] { live->finishing(); };

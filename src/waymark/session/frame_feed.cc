@@ -43,19 +43,14 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
-  record.state = result.state;
-  record.reason = result.reason;
-  record.num_matches = result.num_matches;
-  record.num_inliers = result.num_inliers;
-  record.num_candidates = result.num_candidates;
+  static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
-  if (result.submap.is_valid()) record.submap = result.submap.value;
   record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());
   return record;
 }
 
-FrameInput borrow(const InputFrame& frame) {
-  FrameInput input;
+FrameImages borrow(const InputFrame& frame) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images.at(0).view();
   if (frame.images.size() > 1) input.image1 = frame.images[1].view();
@@ -67,12 +62,12 @@ FrameInput borrow(const InputFrame& frame) {
 }  // namespace
 
 void forget_session(FedFrames& frames) {
-  for (const std::size_t row : frames.fed) frames.table.frames[row].submap.reset();
+  for (const std::size_t row : frames.fed) frames.table.frames[row].submap = SubmapId{};
   frames.fed.clear();
 }
 
 FedFrames feed_all(Input& input,
-                   const std::function<TrackingResult(const FrameInput&)>& feed,
+                   const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer) {
   FedFrames frames;

@@ -31,7 +31,7 @@ void forget_session(FedFrames& frames);
 /// Feeds an input until it ends or should_stop() says so. Frames with a fault are not fed, but have
 /// their row.
 FedFrames feed_all(Input& input,
-                   const std::function<TrackingResult(const FrameInput&)>& feed,
+                   const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer);
 

@@ -21,7 +21,7 @@ void update_states(const System& system, FedFrames& frames) {
     if (states[i] == FrameState::kFilled) record.reason = FrameReason::kNone;
   }
   for (const TrajectoryFrame& frame : system.trajectory()) {
-    frames.table.frames[frames.fed.at(frame.frame.value)].submap = frame.submap.value;
+    frames.table.frames[frames.fed.at(frame.frame.value)].submap = frame.submap;
   }
 }
 
@@ -52,7 +52,7 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system) {
 
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
-  const auto feed = [&](const FrameInput& frame) {
+  const auto feed = [&](const FrameImages& frame) {
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
     return result;

@@ -31,7 +31,7 @@ struct SessionHooks {
   std::function<bool()> should_stop;  ///< Asked before each frame.
   FrameObserver observer;
   /// Hears of each frame that was fed.
-  std::function<void(const FrameInput&, const TrackingResult&)> on_result;
+  std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
 };
 

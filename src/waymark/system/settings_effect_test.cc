@@ -56,7 +56,7 @@ Session play(const std::vector<std::string>& assignments, Sensor sensor = Sensor
   System system(small_rig(), settings_with(assignments), Timing::kInline);
   Session session;
   for (const SimulatedFrame& frame : frames()) {
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     if (sensor == Sensor::kMono) input.depth = {};
     session.results.push_back(system.feed(input));
     session.maps.push_back(system.map());
@@ -130,7 +130,7 @@ TEST(SettingsEffect, MinRangeBaselinesLeavesOutWhatIsNear) {
   const SimulatedFrame frame = sequence.frame(0);
   const auto num_ranges = [&](const std::string& assignment) {
     System system(sequence.rig(), settings_with({assignment}), Timing::kInline);
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     input.depth = {};
     input.image1 = frame.images[1].view();
     system.feed(input);
@@ -267,7 +267,7 @@ Reunion play_reunion(const std::vector<std::string>& assignments) {
   const Image right = columns(150, 320), left = columns(0, 140);
   System first(small_rig(), settings, Timing::kInline);
   for (const SimulatedFrame& frame : frames()) {
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     input.mask = right.view();
     first.feed(input);
   }
@@ -277,7 +277,7 @@ Reunion play_reunion(const std::vector<std::string>& assignments) {
   std::vector<int> due;
   Reunion reunion;
   for (int i = 0; i < kNumFrames + 10; ++i) {
-    FrameInput input = input_of(frames()[static_cast<std::size_t>(std::min(i, 18))]);
+    FrameImages input = input_of(frames()[static_cast<std::size_t>(std::min(i, 18))]);
     input.timestamp_ns = 50'000'000 * std::int64_t{i};
     if (i < 12) input.mask = left.view();
     const TrackingResult result = second.feed(input);
