@@ -78,7 +78,7 @@ TEST(FeedAll, ForgetsWhichMapFramesOfBeforeAResetWereIn) {
       nullptr);
   EXPECT_THAT(fed.fed, ElementsAre(4, 5));
   for (std::size_t i = 0; i < 6; ++i) {
-    EXPECT_EQ(fed.table.frames[i].submap.has_value(), i >= 4) << i;
+    EXPECT_EQ(fed.table.frames[i].submap.is_valid(), i >= 4) << i;
     EXPECT_EQ(fed.table.frames[i].state, FrameState::kTracked);
   }
 }

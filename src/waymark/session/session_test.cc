@@ -92,7 +92,7 @@ TEST(RunSession, GoesFromInputToResults) {
   EXPECT_EQ(results.summary.num_trajectory_lines, kNumFrames - 1);
   EXPECT_GE(results.keyframes.size(), 3u);
   EXPECT_EQ(results.keyframes.size(), system.map()->keyframes().size());
-  EXPECT_FALSE(results.table.frames[10].submap);
+  EXPECT_FALSE(results.table.frames[10].submap.is_valid());
   EXPECT_GT(results.summary.wall_s, 0.0);
 
   const testing::TemporaryFolder folder;
