@@ -12,7 +12,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/foreign_calibration.h"
+#include "waymark/input/foreign_calibration.h"
 #include "waymark/simulate/dataset.h"
 #include "waymark/system/settings.h"
 

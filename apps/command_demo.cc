@@ -14,7 +14,7 @@
 #include "choice_option.h"
 #include "commands.h"
 #include "interrupt.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
 
 namespace waymark {
 namespace {

@@ -10,11 +10,11 @@
 
 #include "choice_option.h"
 #include "commands.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/evaluate/evaluation.h"
 #include "waymark/evaluate/plot.h"
 #include "waymark/evaluate/report.h"
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
 
 namespace waymark {
 namespace {

@@ -11,14 +11,13 @@
 
 #include "choice_option.h"
 #include "commands.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/export_colmap.h"
-#include "waymark/io/export_nerfstudio.h"
-#include "waymark/io/export_ply.h"
-#include "waymark/io/export_scene.h"
-#include "waymark/io/export_split.h"
-#include "waymark/io/map_file.h"
+#include "waymark/exchange/export_scene.h"
+#include "waymark/exchange/export_split.h"
+#include "waymark/exchange/exports.h"
+#include "waymark/map/parts.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {

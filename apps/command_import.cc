@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "commands.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
+#include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/map_file.h"
-#include "waymark/io/openvslam_map.h"
-#include "waymark/io/openvslam_settings.h"
-#include "waymark/io/text.h"
+#include "waymark/exchange/openvslam_map.h"
+#include "waymark/exchange/openvslam_settings.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/simulate/dataset.h"
 
 namespace waymark {

@@ -9,9 +9,9 @@
 #include "commands.h"
 #include "input_command.h"
 #include "interrupt.h"
-#include "localization.h"
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/map_file.h"
+#include "waymark/base/atomic_file.h"
+#include "waymark/mapfile/map_file.h"
+#include "waymark/session/localization.h"
 
 namespace waymark {
 namespace {

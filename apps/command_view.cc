@@ -14,9 +14,9 @@
 
 #include "commands.h"
 #include "interrupt.h"
-#include "session_options.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/map_file.h"
+#include "waymark/input/decode.h"
+#include "waymark/mapfile/map_file.h"
+#include "waymark/session/session_options.h"
 #include "waymark/view/viewer.h"
 
 namespace waymark {

@@ -5,10 +5,10 @@
 #include <filesystem>
 #include <functional>
 
-#include "frame_feed.h"
 #include "reporter.h"
-#include "session_options.h"
-#include "waymark/io/results.h"
+#include "waymark/exchange/results.h"
+#include "waymark/session/frame_feed.h"
+#include "waymark/session/session_options.h"
 
 namespace CLI {
 class App;

@@ -8,8 +8,8 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/io/atomic_file.h"
 
 namespace waymark {
 namespace {

@@ -6,7 +6,7 @@
 #include <string>
 
 #include "waymark/camera/camchain.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
 
 namespace waymark {
 

@@ -8,7 +8,7 @@
 #include <exception>
 
 #include "repeated_map.h"
-#include "waymark/io/map_file.h"
+#include "waymark/mapfile/map_file.h"
 
 int main(int argc, char** argv) {
   if (argc != 4) {

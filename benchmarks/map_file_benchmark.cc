@@ -15,8 +15,8 @@
 #include <string>
 
 #include "repeated_map.h"
-#include "waymark/io/map_file.h"
-#include "waymark/io/text.h"
+#include "waymark/base/text.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/place/place_index.h"
 
 namespace {

@@ -4,6 +4,8 @@
 
 #include "waymark/optimize/bundle.h"
 #include "waymark/optimize/pose.h"
+#include "waymark/optimize/schur_solver.h"
+#include "waymark/optimize/test_ceres.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {
@@ -36,33 +38,35 @@ BENCHMARK(optimize_pose_of_frame)
     ->Args({300, 20, 5})
     ->Unit(benchmark::kMicrosecond);
 
-/// A local window: 12 free and 20 fixed poses, 2500 points, 10000 observations, 5 iterations.
-/// Arguments: solver (0 own, 1 Ceres), cameras.
-void adjust_local_bundle(benchmark::State& state) {
-  const auto scene =
-      testing::make_bundle_scene({.num_poses = 32,
-                                  .num_fixed = 20,
-                                  .num_points = 2500,
-                                  .num_cameras = static_cast<std::size_t>(state.range(1)),
-                                  .share_of_outliers = 0.03},
-                                 1);
-  BundleOptions options;
-  options.solver = state.range(0) == 0 ? BundleSolver::kSchur : BundleSolver::kCeres;
-  options.num_rounds = 1;
-  options.max_iterations_per_round = 5;
-  options.relative_cost_tolerance = 0.0;
-  BundleResult result;
+/// One round of five iterations. Arguments: solver (0 own, 1 Ceres), and what the scene takes.
+void adjust(benchmark::State& state, const testing::BundleScene& scene) {
+  const auto minimize = state.range(0) == 0 ? minimize_with_schur : testing::minimize_with_ceres;
+  const BundleOptions options = {.max_iterations_per_round = 5, .relative_cost_tolerance = 0.0};
+  const std::vector<std::uint8_t> is_used(scene.problem.observations.size(), 1);
+  BundleRound result;
   for (auto _ : state) {
     state.PauseTiming();
     BundleProblem problem = scene.problem;
     problem.rigs.assign(problem.rig_from_world.size(), &scene.rig);
     state.ResumeTiming();
-    result = adjust_bundle(problem, options);
+    result = minimize(problem, is_used, options);
     benchmark::DoNotOptimize(problem.points.data());
   }
   state.counters["observations"] = static_cast<double>(scene.problem.observations.size());
   state.counters["cost"] = result.final_cost;
   state.counters["iterations"] = result.num_iterations;
+}
+
+/// A local window: 12 free and 20 fixed poses, 2500 points, 10000 observations. Second argument:
+/// cameras.
+void adjust_local_bundle(benchmark::State& state) {
+  adjust(state,
+         testing::make_bundle_scene({.num_poses = 32,
+                                     .num_fixed = 20,
+                                     .num_points = 2500,
+                                     .num_cameras = static_cast<std::size_t>(state.range(1)),
+                                     .share_of_outliers = 0.03},
+                                    1));
 }
 BENCHMARK(adjust_local_bundle)
     ->Args({0, 1})
@@ -71,21 +75,12 @@ BENCHMARK(adjust_local_bundle)
     ->Args({1, 2})
     ->Unit(benchmark::kMillisecond);
 
-/// Many free poses: the reduced system dominates. Arguments: solver, poses.
+/// Many free poses: the reduced system dominates. Second argument: poses.
 void adjust_global_bundle(benchmark::State& state) {
   const auto num_poses = static_cast<std::size_t>(state.range(1));
-  const auto scene = testing::make_bundle_scene(
-      {.num_poses = num_poses, .num_points = 60 * num_poses, .views_per_point = 5}, 1);
-  BundleOptions options;
-  options.solver = state.range(0) == 0 ? BundleSolver::kSchur : BundleSolver::kCeres;
-  options.num_rounds = 1;
-  options.max_iterations_per_round = 5;
-  options.relative_cost_tolerance = 0.0;
-  for (auto _ : state) {
-    BundleProblem problem = scene.problem;
-    problem.rigs.assign(problem.rig_from_world.size(), &scene.rig);
-    benchmark::DoNotOptimize(adjust_bundle(problem, options).final_cost);
-  }
+  adjust(state,
+         testing::make_bundle_scene(
+             {.num_poses = num_poses, .num_points = 60 * num_poses, .views_per_point = 5}, 1));
 }
 BENCHMARK(adjust_global_bundle)
     ->Args({0, 50})

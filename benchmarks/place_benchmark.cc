@@ -2,9 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // How well and how fast places are found again:
-//   waymark_place_benchmark DATA_DIR recall|growth [DESIGN...]
-// DATA_DIR holds the looped sequences below, each with camchain.yaml and groundtruth.txt; designs
-// are index (default), vocabulary, exhaustive.
+//   waymark_place_benchmark DATA_DIR recall|growth
+// DATA_DIR holds the looped sequences below, each with camchain.yaml and groundtruth.txt.
 //
 // recall: part of the queries that have a keyframe within 1 m and 30 degrees, at least 30 keyframes
 // away in time, of which such a one is the first, among the first 5, among the first 10 candidates.
@@ -25,14 +24,12 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <memory>
 #include <numbers>
-#include <stdexcept>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "place_designs.h"
 #include "recorded_places.h"
 #include "waymark/base/rng.h"
 #include "waymark/place/place_index.h"
@@ -40,7 +37,7 @@
 namespace {
 
 using waymark::Descriptor;
-using waymark::PlaceDesign;
+using waymark::PlaceIndex;
 using waymark::RecordedPlace;
 using Places = std::vector<RecordedPlace>;
 
@@ -91,13 +88,22 @@ struct Recall {
   }
 };
 
-/// One sequence among all that a design holds.
+/// One sequence among all that an index holds.
 struct Held {
   const Places* places = nullptr;
-  std::size_t begin = 0;  ///< Number of its first keyframe in the design.
+  std::size_t begin = 0;  ///< Number of its first keyframe in the index.
 };
 
-void ask(const PlaceDesign& design,
+/// Keyframes are numbered in the order they are added.
+void add(PlaceIndex& index, std::span<const Descriptor> descriptors) {
+  index.add({static_cast<std::uint32_t>(index.size())}, waymark::SubmapId{0}, descriptors);
+}
+
+void add_all(PlaceIndex& index, const Places& places) {
+  for (const RecordedPlace& place : places) add(index, place.descriptors);
+}
+
+void ask(const PlaceIndex& index,
          const Held& held,
          const RecordedPlace& query,
          std::size_t hidden_begin,
@@ -111,41 +117,36 @@ void ask(const PlaceDesign& design,
   }
   if (!has_answer) return;
   ++recall.num_queries;
+  const auto is_hidden = [&](const waymark::PlaceRow& row) {
+    return row.keyframe.value >= hidden_begin && row.keyframe.value < hidden_end;
+  };
   const double start = thread_time_ms();
-  const std::vector<std::size_t> found =
-      design.find(query.descriptors, kNumCandidates, hidden_begin, hidden_end);
+  const std::vector<waymark::PlaceCandidate> found =
+      index.find(query.descriptors, {.max_candidates = kNumCandidates, .is_excluded = is_hidden});
   recall.times_ms.push_back(thread_time_ms() - start);
   for (std::size_t i = 0; i < found.size(); ++i) {
-    const bool is_held = found[i] >= held.begin && found[i] < held.begin + places.size();
-    if (!is_held || !is_same_place(query, places[found[i] - held.begin])) continue;
+    const std::size_t row = found[i].keyframe.value;
+    const bool is_held = row >= held.begin && row < held.begin + places.size();
+    if (!is_held || !is_same_place(query, places[row - held.begin])) continue;
     ++recall.first_at[i];
     return;
   }
 }
 
-Recall ask_itself(const PlaceDesign& design, const Held& held) {
+Recall ask_itself(const PlaceIndex& index, const Held& held) {
   Recall recall;
   for (std::size_t i = 0; i < held.places->size(); ++i) {
     const std::size_t row = held.begin + i;
     const std::size_t hidden_begin = row - std::min(row, kMinKeyframesAway - 1);
-    ask(design, held, (*held.places)[i], hidden_begin, row + kMinKeyframesAway, recall);
+    ask(index, held, (*held.places)[i], hidden_begin, row + kMinKeyframesAway, recall);
   }
   return recall;
 }
 
-Recall ask_all(const PlaceDesign& design, const Held& held, const Places& queries) {
+Recall ask_all(const PlaceIndex& index, const Held& held, const Places& queries) {
   Recall recall;
-  for (const RecordedPlace& query : queries) ask(design, held, query, 0, 0, recall);
+  for (const RecordedPlace& query : queries) ask(index, held, query, 0, 0, recall);
   return recall;
-}
-
-std::unique_ptr<PlaceDesign> make_design(const std::string& name) {
-  if (name == "index") return waymark::make_place_index();
-  if (name == "vocabulary") return waymark::make_vocabulary_tree(SIZE_MAX);
-  if (name == "early-vocabulary") return waymark::make_vocabulary_tree(50);
-  if (name == "exhaustive") return waymark::make_exhaustive_search();
-  throw std::runtime_error(
-      name + ": unknown design, expected index, vocabulary, early-vocabulary or exhaustive");
 }
 
 void print_recall(const std::string& name, const char* held, const Recall& recall) {
@@ -160,27 +161,18 @@ void print_recall(const std::string& name, const char* held, const Recall& recal
   std::fflush(stdout);
 }
 
-void add_all(PlaceDesign& design, const Places& places) {
-  for (const RecordedPlace& place : places) design.add(place.descriptors);
-}
-
-void measure_recall(const std::vector<Places>& sequences,
-                    const Places& queries,
-                    const std::string& name) {
-  std::printf("%s\n", name.c_str());
-  const std::unique_ptr<PlaceDesign> all = make_design(name);
-  for (const Places& places : sequences) add_all(*all, places);
-  all->finish();
+void measure_recall(const std::vector<Places>& sequences, const Places& queries) {
+  PlaceIndex all;
+  for (const Places& places : sequences) add_all(all, places);
   std::size_t begin = 0;
   for (std::size_t i = 0; i < sequences.size(); ++i) {
-    const std::unique_ptr<PlaceDesign> alone = make_design(name);
-    add_all(*alone, sequences[i]);
-    alone->finish();
-    print_recall(kLooped[i].name, "alone", ask_itself(*alone, {&sequences[i], 0}));
-    print_recall(kLooped[i].name, "all", ask_itself(*all, {&sequences[i], begin}));
+    PlaceIndex alone;
+    add_all(alone, sequences[i]);
+    print_recall(kLooped[i].name, "alone", ask_itself(alone, {&sequences[i], 0}));
+    print_recall(kLooped[i].name, "all", ask_itself(all, {&sequences[i], begin}));
     if (i == 0) {
-      print_recall(kQueries, "alone", ask_all(*alone, {&sequences[i], 0}, queries));
-      print_recall(kQueries, "all", ask_all(*all, {&sequences[i], 0}, queries));
+      print_recall(kQueries, "alone", ask_all(alone, {&sequences[i], 0}, queries));
+      print_recall(kQueries, "all", ask_all(all, {&sequences[i], 0}, queries));
     }
     begin += sequences[i].size();
   }
@@ -212,31 +204,27 @@ std::array<std::size_t, 256> random_order(waymark::Rng& rng) {
   return order;
 }
 
-/// What the library's index costs besides its answers.
-struct Upkeep {
-  double add_median_ms = 0.0;
-  double add_max_ms = 0.0;
-  double copy_us = 0.0;
-  double kilobytes_per_keyframe = 0.0;
-  std::size_t num_segments = 0;
-};
-
-Upkeep measure_upkeep(const std::vector<std::vector<Descriptor>>& keyframes) {
-  waymark::PlaceIndex index;
-  std::vector<double> times;
+/// Prints what the index costs besides its answers.
+PlaceIndex build(const std::vector<std::vector<Descriptor>>& keyframes) {
+  PlaceIndex index;
+  std::vector<double> times_ms;
   for (const std::vector<Descriptor>& descriptors : keyframes) {
     const double start = thread_time_ms();
-    index.add({static_cast<std::uint32_t>(index.size())}, waymark::SubmapId{0}, descriptors);
-    times.push_back(thread_time_ms() - start);
+    add(index, descriptors);
+    times_ms.push_back(thread_time_ms() - start);
   }
   const double start = thread_time_ms();
-  const waymark::PlaceIndex copy = index;
+  const PlaceIndex copy = index;
   const double copy_us = (thread_time_ms() - start) * 1e3;
-  return {quantile(times, 0.5),
-          quantile(times, 1.0),
-          copy_us,
-          static_cast<double>(copy.num_bytes()) / 1e3 / static_cast<double>(copy.size()),
-          copy.num_segments()};
+  std::printf(
+      "  %5zu keyframes, %2zu segments, %.1f kB each, add %.2f ms, at most %.1f, copy %.1f us",
+      copy.size(),
+      copy.num_segments(),
+      static_cast<double>(copy.num_bytes()) / 1e3 / static_cast<double>(copy.size()),
+      quantile(times_ms, 0.5),
+      quantile(times_ms, 1.0),
+      copy_us);
+  return index;
 }
 
 /// The sequences once, then again and again, changed each time.
@@ -290,36 +278,20 @@ Places impoverish(const Places& queries) {
   return poor;
 }
 
-void measure_growth(const std::vector<Places>& sequences,
-                    const Places& queries,
-                    const std::string& name) {
+void measure_growth(const std::vector<Places>& sequences, const Places& queries) {
   const Places poor = impoverish(queries);
   for (const bool is_elsewhere : {false, true}) {
-    std::printf("%s, %s\n", name.c_str(), is_elsewhere ? "elsewhere" : "revisited");
+    std::printf("%s\n", is_elsewhere ? "elsewhere" : "revisited");
     for (const std::size_t count : {500, 1000, 2000, 3000, 4000, 5000, 8000}) {
-      const std::unique_ptr<PlaceDesign> design = make_design(name);
-      const auto keyframes = grow(sequences, count, is_elsewhere);
-      for (const auto& descriptors : keyframes) design->add(descriptors);
-      design->finish();
+      const PlaceIndex index = build(grow(sequences, count, is_elsewhere));
       const Places truth =
           is_elsewhere ? repeat({sequences[0]}, sequences[0].size()) : repeat(sequences, count);
-      const Recall recall = ask_all(*design, {&truth, 0}, queries);
-      std::printf("  %5zu keyframes  %7.2f ms, p95 %7.2f  recall %.3f, poor %.3f",
-                  count,
+      const Recall recall = ask_all(index, {&truth, 0}, queries);
+      std::printf("  query %.2f ms, p95 %.2f  recall %.3f, poor %.3f\n",
                   quantile(recall.times_ms, 0.5),
                   quantile(recall.times_ms, 0.95),
                   recall.within(10),
-                  ask_all(*design, {&truth, 0}, poor).within(10));
-      if (name == "index") {
-        const Upkeep upkeep = measure_upkeep(keyframes);
-        std::printf("  %2zu segments, %.1f kB each, add %.2f ms, at most %.1f, copy %.1f us",
-                    upkeep.num_segments,
-                    upkeep.kilobytes_per_keyframe,
-                    upkeep.add_median_ms,
-                    upkeep.add_max_ms,
-                    upkeep.copy_us);
-      }
-      std::printf("\n");
+                  ask_all(index, {&truth, 0}, poor).within(10));
       std::fflush(stdout);
     }
   }
@@ -330,21 +302,17 @@ void measure_growth(const std::vector<Places>& sequences,
 int main(int argc, char** argv) {
   const std::string task = argc > 2 ? argv[2] : "";
   if (task != "recall" && task != "growth") {
-    std::fprintf(stderr, "usage: waymark_place_benchmark DATA_DIR recall|growth [DESIGN...]\n");
+    std::fprintf(stderr, "usage: waymark_place_benchmark DATA_DIR recall|growth\n");
     return 2;
   }
   try {
-    std::vector<std::string> designs(argv + 3, argv + argc);
-    if (designs.empty()) designs = {"index"};
     const std::filesystem::path data = argv[1];
     std::vector<Places> sequences;
     for (const Sequence& sequence : kLooped) {
       sequences.push_back(waymark::read_places(data / sequence.name, sequence.every));
     }
     const Places queries = waymark::read_places(data / kQueries, 1);
-    for (const std::string& design : designs) {
-      (task == "recall" ? measure_recall : measure_growth)(sequences, queries, design);
-    }
+    (task == "recall" ? measure_recall : measure_growth)(sequences, queries);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "waymark_place_benchmark: %s\n", error.what());
     return 1;

@@ -8,9 +8,9 @@
 
 #include "waymark/base/config.h"
 #include "waymark/evaluate/association.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/image/frame_builder.h"
-#include "waymark/io/input.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/input/input.h"
 
 namespace waymark {
 namespace {

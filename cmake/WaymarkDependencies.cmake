@@ -2,15 +2,19 @@
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
 find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs videoio calib3d features2d)
-find_package(Ceres 2.1 REQUIRED)
 find_package(Boost 1.74 REQUIRED) # Headers of Asio and Beast.
 find_package(yaml-cpp REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_path(MSGPACK_INCLUDE_DIR msgpack.hpp REQUIRED) # Its CMake package has another name in each distribution.
+if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_FUZZERS)
+  find_path(MSGPACK_INCLUDE_DIR msgpack.hpp REQUIRED) # Its CMake package has another name in each distribution.
+endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
+if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_BENCHMARKS)
+  find_package(Ceres 2.1 REQUIRED) # To compare with.
+endif()
 if(WAYMARK_BUILD_TESTS)
   find_package(GTest REQUIRED)
   include(GoogleTest)

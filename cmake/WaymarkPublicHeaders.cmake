@@ -11,20 +11,16 @@ set(roots
   camera/rig.h
   camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
   evaluate/evaluation.h
-  image/color.h # colour to grey
-  image/depth_units.h # depth from metres
+  exchange/exports.h # COLMAP, nerfstudio, PLY
+  exchange/results.h
+  exchange/trajectory.h
+  image/convert.h # colour to grey, depth from metres
   image/image.h
-  io/decode.h # images
-  io/export_colmap.h
-  io/export_nerfstudio.h
-  io/export_ply.h
-  io/input.h # data sets, folders, video files and devices
-  io/listing.h
-  io/map_file.h
-  io/mask.h
-  io/results.h
-  io/trajectory.h
+  input/decode.h # images
+  input/input.h # data sets, folders, video files and devices
+  input/listing.h
   map/map.h
+  mapfile/map_file.h
   simulate/sequence.h # rendered sequences with their truth, to test with
   system/localizer.h
   system/settings.h

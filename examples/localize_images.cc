@@ -15,8 +15,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/io/decode.h"
-#include "waymark/io/map_file.h"
+#include "waymark/input/decode.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/system/localizer.h"
 
 namespace {
@@ -59,7 +59,7 @@ int localize(const char* map, const char* camchain, std::span<char*> images) {
   for (const char* path : images) {
     const std::optional<Image> image = read_grey_image(path);
     if (!image) throw InputError(path, "is missing or no image, expected png, jpg or the like");
-    FrameInput frame;
+    FrameImages frame;
     frame.image0 = image->view();
     // For a stream track() is better, which looks near the frame before first.
     const TrackingResult result = localizer.locate(frame);

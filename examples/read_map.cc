@@ -11,9 +11,9 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/io/export_ply.h"
-#include "waymark/io/export_scene.h"
-#include "waymark/io/map_file.h"
+#include "waymark/exchange/export_scene.h"
+#include "waymark/exchange/exports.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace {
 

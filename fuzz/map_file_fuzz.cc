@@ -9,8 +9,8 @@
 #include <string_view>
 
 #include "waymark/base/check.h"
-#include "waymark/io/map_file.h"
-#include "waymark/io/testing/map_checksums.h"
+#include "waymark/mapfile/map_file.h"
+#include "waymark/mapfile/testing/map_checksums.h"
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace waymark;

@@ -8,9 +8,9 @@
 #include <memory>
 #include <string>
 
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/map_file.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/map/testing/random_map.h"
+#include "waymark/mapfile/map_file.h"
 
 int main(int argc, char** argv) {
   using namespace waymark;

@@ -5,7 +5,7 @@
 #include <string_view>
 
 #include "waymark/base/check.h"
-#include "waymark/io/openvslam_map.h"
+#include "waymark/exchange/openvslam_map.h"
 
 /// Whatever the bytes are: a sound map, or an InputError.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {

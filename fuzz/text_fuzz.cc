@@ -11,9 +11,9 @@
 #include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/openvslam_settings.h"
 #include "waymark/image/frame_builder.h"
-#include "waymark/io/foreign_calibration.h"
-#include "waymark/io/openvslam_settings.h"
+#include "waymark/input/foreign_calibration.h"
 
 namespace {
 

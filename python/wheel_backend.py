@@ -61,6 +61,8 @@ def install(folder, prefix):
     files = {path.relative_to(package.parent).as_posix(): path.read_bytes()
              for path in sorted(package.iterdir()) if path.is_file()}
     files[f"waymark-{version()}.data/scripts/waymark"] = (prefix / "bin/waymark").read_bytes()
+    # Of what is compiled into both.
+    files[f"waymark-{version()}.dist-info/copyright"] = (pathlib.Path(folder) / "packaging/copyright").read_bytes()
     return files
 
 

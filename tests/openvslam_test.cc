@@ -12,12 +12,12 @@
 #include <vector>
 
 #include "waymark/base/median.h"
+#include "waymark/base/text.h"
 #include "waymark/evaluate/evaluation.h"
+#include "waymark/exchange/openvslam_map.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/image/frame_builder.h"
-#include "waymark/io/input.h"
-#include "waymark/io/openvslam_map.h"
-#include "waymark/io/text.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/input/input.h"
 #include "waymark/track/relocalizer.h"
 
 namespace waymark {

@@ -11,12 +11,12 @@
 #include <vector>
 
 #include "recorded_run.h"
-#include "session_options.h"
 #include "waymark/base/median.h"
 #include "waymark/base/rng.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/alignment.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/session/session_options.h"
 #include "waymark/simulate/sequence.h"
 #include "waymark/system/localizer.h"
 
@@ -126,7 +126,7 @@ std::shared_ptr<const Map> map_frames(const Rig& rig,
                                       const std::vector<AtriumFrame>& frames) {
   System system(rig, settings, Timing::kLockstep);
   for (const AtriumFrame& frame : frames) {
-    FrameInput input;
+    FrameImages input;
     input.timestamp_ns = frame.timestamp_ns;
     input.image0 = frame.image.view();
     system.feed(input);
@@ -167,12 +167,12 @@ class Score {
     ASSERT_FALSE(errors_m_.empty());
     const auto num_elsewhere = std::count_if(
         errors_m_.begin(), errors_m_.end(), [](double error_m) { return error_m > 0.5; });
-    testing::Test::RecordProperty("share", std::to_string(share));
-    testing::Test::RecordProperty("median_m",
-                                  std::to_string(median(std::vector<double>(errors_m_))));
-    testing::Test::RecordProperty("median_deg",
-                                  std::to_string(median(std::vector<double>(errors_deg_))));
-    testing::Test::RecordProperty("elsewhere", static_cast<int>(num_elsewhere));
+    ::testing::Test::RecordProperty("share", std::to_string(share));
+    ::testing::Test::RecordProperty("median_m",
+                                    std::to_string(median(std::vector<double>(errors_m_))));
+    ::testing::Test::RecordProperty("median_deg",
+                                    std::to_string(median(std::vector<double>(errors_deg_))));
+    ::testing::Test::RecordProperty("elsewhere", static_cast<int>(num_elsewhere));
     EXPECT_GE(share, min_share);
     EXPECT_LE(median(std::vector<double>(errors_m_)), 0.05);
     EXPECT_LE(median(std::vector<double>(errors_deg_)), 1.0);
@@ -185,8 +185,8 @@ class Score {
   std::vector<double> errors_deg_;
 };
 
-FrameInput input_of(const AtriumFrame& frame, const Image& image) {
-  FrameInput input;
+FrameImages input_of(const AtriumFrame& frame, const Image& image) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = image.view();
   return input;

@@ -110,6 +110,12 @@ class Package(unittest.TestCase):
         self.assertNotIn("-dev", field(self.packages["waymark"], "Depends"))
         self.assertEqual(dpkg("--verify"), "")
 
+    def test_nothing_of_ceres(self):
+        """Debian's Ceres brings parts of SuiteSparse that are under the GPL (docs/licenses.md)."""
+        self.assertIn("libopencv_core", run("ldd", self.program))
+        self.assertNotRegex(run("ldd", self.program), "(?i)ceres|suitesparse|cholmod|glog|gflags")
+        self.assertNotIn("libceres", field(self.packages["libwaymark-dev"], "Depends"))
+
     def test_every_command_is_in_manual_and_completion(self):
         listed = run(self.program, "--help").split("Subcommands:\n")[1].split("\n\n")[0]
         commands = [line.split()[0] for line in listed.split("\n")]

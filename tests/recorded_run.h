@@ -7,9 +7,9 @@
 #include <optional>
 #include <string>
 
-#include "session.h"
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
+#include "waymark/session/session.h"
 
 namespace waymark {
 

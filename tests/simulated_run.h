@@ -6,11 +6,11 @@
 #include <string>
 #include <vector>
 
-#include "session.h"
 #include "waymark/camera/rig.h"
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/io/input.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
+#include "waymark/input/input.h"
+#include "waymark/session/session.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/sequence.h"
 #include "waymark/system/settings.h"

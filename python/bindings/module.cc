@@ -8,7 +8,7 @@
 #include "bindings.h"
 #include "waymark/base/check.h"
 #include "waymark/base/id.h"
-#include "waymark/io/decode.h"
+#include "waymark/input/decode.h"
 
 namespace waymark::python {
 namespace {

@@ -8,7 +8,7 @@
 #include <string>
 
 #include "waymark/camera/camchain.h"
-#include "waymark/io/input.h"
+#include "waymark/input/input.h"
 #include "waymark/system/settings.h"
 
 namespace waymark::python {

@@ -7,6 +7,7 @@ import pathlib
 import subprocess
 import sys
 import unittest
+import zipfile
 
 from support import Test
 
@@ -26,6 +27,13 @@ class Wheel(Test):
                         "--config-settings", f"build-folder={os.environ['WAYMARK_BUILD']}")
         wheels = list(self.folder.glob("waymark-*.whl"))
         self.assertEqual(len(wheels), 1)
+        with zipfile.ZipFile(wheels[0]) as wheel:
+            name, = (name for name in wheel.namelist() if name.endswith(".dist-info/copyright"))
+            notices = wheel.read(name).decode()
+            self.assertEqual(wheel.read(name.replace("copyright", "LICENSE")), (ROOT / "LICENSE").read_bytes())
+        for holder in ("2009 Willow Garage", "(OpenCV,", "(Highway,", "(fmt,", "(yaml-cpp,", "(nlohmann-json,",
+                       "(CLI11,", "(pybind11,", "(Boost,", "(msgpack-cxx,", "(Eigen,", "three.js authors"):
+            self.assertIn(holder, notices)
         self.run_python(sys.executable, "-m", "venv", "--system-site-packages", "--without-pip",
                         self.folder / "venv")
         python = self.folder / "venv/bin/python"

@@ -16,36 +16,36 @@
 
 namespace waymark {
 
-/// The newest value (a frozen map) that each frame may see. A value that a frame caused becomes
-/// visible `latency_frames` frames later; in realtime as soon as it exists. One reader, one writer.
+/// The newest value (a frozen map) that each frame may see: each value is visible from a frame on,
+/// in realtime as soon as it exists. One reader, one writer.
 ///
 /// The reader announces with expect() that it sent off work; the writer answers each announcement
-/// with one publish(), in order. In lockstep the reader waits for what is due, hence sees at each
-/// frame what it would see without threads.
+/// with one publish() for the same frame, in order. In lockstep the reader waits for what is due,
+/// hence sees at each frame what it would see without threads.
 template <class T>
 class Feed {
  public:
   /// `initial` is visible until something else is.
-  Feed(Timing timing, std::uint32_t latency_frames, std::shared_ptr<const T> initial = nullptr)
-      : timing_(timing), latency_frames_(latency_frames), visible_(std::move(initial)) {}
+  explicit Feed(Timing timing, std::shared_ptr<const T> initial = nullptr)
+      : timing_(timing), visible_(std::move(initial)) {}
 
-  /// Reader: a value caused by this frame is on its way. Causes never descend.
-  void expect(FrameId cause) {
+  /// Reader: a value that is to be visible from this frame on is on its way. Frames never descend.
+  void expect(FrameId visible_from) {
     std::lock_guard lock(mutex_);
     if (timing_ == Timing::kRealtime) return;
-    WAYMARK_CHECK(expected_.empty() || expected_.back() <= cause);
-    expected_.push_back(cause);
+    WAYMARK_CHECK(expected_.empty() || expected_.back() <= visible_from);
+    expected_.push_back(visible_from);
   }
 
-  /// Writer: the value caused by this frame. Causes never descend.
-  void publish(FrameId cause, std::shared_ptr<const T> value) {
+  /// Writer: the value that is visible from this frame on. Frames never descend.
+  void publish(FrameId visible_from, std::shared_ptr<const T> value) {
     {
       std::lock_guard lock(mutex_);
-      WAYMARK_CHECK(cause.is_valid() && (!newest_.is_valid() || newest_ <= cause));
-      newest_ = cause;
+      WAYMARK_CHECK(visible_from.is_valid() && (!newest_.is_valid() || newest_ <= visible_from));
+      newest_ = visible_from;
       ++num_published_;
       if (timing_ == Timing::kRealtime) values_.clear();
-      values_.push_back({cause, std::move(value)});
+      values_.push_back({visible_from, std::move(value)});
     }
     arrival_.notify_all();
   }
@@ -79,7 +79,7 @@ class Feed {
       ++num_received_;
     }
     if (error_) std::rethrow_exception(error_);
-    while (!values_.empty() && is_due(values_.front().cause, frame)) {
+    while (!values_.empty() && is_due(values_.front().visible_from, frame)) {
       visible_ = std::move(values_.front().value);
       values_.pop_front();
     }
@@ -88,22 +88,20 @@ class Feed {
 
  private:
   struct Entry {
-    FrameId cause;
+    FrameId visible_from;
     std::shared_ptr<const T> value;
   };
 
-  bool is_due(FrameId cause, FrameId frame) const {
-    return timing_ == Timing::kRealtime ||
-           std::uint64_t{cause.value} + latency_frames_ <= frame.value;
+  bool is_due(FrameId visible_from, FrameId frame) const {
+    return timing_ == Timing::kRealtime || visible_from <= frame;
   }
 
   const Timing timing_;
-  const std::uint32_t latency_frames_;
   std::mutex mutex_;
   std::condition_variable arrival_;
   std::deque<Entry> values_;
   std::deque<FrameId> expected_;
-  FrameId newest_;  // Cause of the last published value.
+  FrameId newest_;  // From where on the last published value is visible.
   std::uint64_t num_published_ = 0;
   std::uint64_t num_received_ = 0;  // Announced, due and waited for.
   std::shared_ptr<const T> visible_;

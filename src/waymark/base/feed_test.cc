@@ -15,24 +15,24 @@ namespace {
 
 std::shared_ptr<const int> value(int v) { return std::make_shared<const int>(v); }
 
-TEST(Feed, ShowsValuesAfterTheLatency) {
+TEST(Feed, ShowsValuesFromTheirFrameOn) {
   for (const Timing timing : {Timing::kInline, Timing::kLockstep}) {
-    Feed<int> feed(timing, 4);
+    Feed<int> feed(timing);
     EXPECT_EQ(feed.for_frame(FrameId{0}), nullptr);
-    feed.expect(FrameId{1});
-    feed.publish(FrameId{1}, value(10));
+    feed.expect(FrameId{5});
+    feed.publish(FrameId{5}, value(10));
     EXPECT_EQ(feed.for_frame(FrameId{4}), nullptr);
     EXPECT_EQ(*feed.for_frame(FrameId{5}), 10);
-    feed.publish(FrameId{2}, value(20));
-    feed.publish(FrameId{3}, value(30));
-    feed.publish(FrameId{5}, value(50));
+    feed.publish(FrameId{6}, value(20));
+    feed.publish(FrameId{7}, value(30));
+    feed.publish(FrameId{9}, value(50));
     EXPECT_EQ(*feed.for_frame(FrameId{8}), 30);
     EXPECT_EQ(*feed.for_frame(FrameId{9}), 50);
   }
 }
 
 TEST(Feed, RealtimeShowsTheNewestAtOnceAndNeverWaits) {
-  Feed<int> feed(Timing::kRealtime, 4, value(0));
+  Feed<int> feed(Timing::kRealtime, value(0));
   feed.expect(FrameId{0});
   EXPECT_EQ(*feed.for_frame(FrameId{100}), 0);
   feed.publish(FrameId{1}, value(1));
@@ -42,14 +42,14 @@ TEST(Feed, RealtimeShowsTheNewestAtOnceAndNeverWaits) {
 
 // The initial value must not pass for what the first frame caused.
 TEST(Feed, InitialValueAnswersNoExpectation) {
-  Feed<int> feed(Timing::kInline, 0, value(-1));
+  Feed<int> feed(Timing::kInline, value(-1));
   EXPECT_EQ(*feed.for_frame(FrameId{0}), -1);
   feed.expect(FrameId{0});
   EXPECT_THROW(feed.for_frame(FrameId{0}), CheckError);
 }
 
-TEST(Feed, OneFrameMayCauseSeveralValues) {
-  Feed<int> feed(Timing::kLockstep, 1);
+TEST(Feed, SeveralValuesMayShowFromOneFrameOn) {
+  Feed<int> feed(Timing::kLockstep);
   feed.expect(FrameId{1});
   feed.expect(FrameId{1});
   feed.publish(FrameId{1}, value(1));
@@ -57,8 +57,8 @@ TEST(Feed, OneFrameMayCauseSeveralValues) {
   EXPECT_EQ(*feed.for_frame(FrameId{2}), 2) << "waits for both";
 }
 
-TEST(Feed, CausesNeverDescend) {
-  Feed<int> feed(Timing::kLockstep, 1);
+TEST(Feed, FramesNeverDescend) {
+  Feed<int> feed(Timing::kLockstep);
   feed.expect(FrameId{2});
   EXPECT_THROW(feed.expect(FrameId{1}), CheckError);
   feed.publish(FrameId{2}, value(2));
@@ -66,7 +66,7 @@ TEST(Feed, CausesNeverDescend) {
 }
 
 TEST(Feed, FailureReachesTheWaitingReader) {
-  Feed<int> feed(Timing::kLockstep, 1);
+  Feed<int> feed(Timing::kLockstep);
   feed.expect(FrameId{0});
   std::jthread writer([&] {
     feed.fail(std::make_exception_ptr(std::runtime_error("first")));
@@ -77,7 +77,7 @@ TEST(Feed, FailureReachesTheWaitingReader) {
 }
 
 TEST(Feed, ClosingFreesTheWaitingReader) {
-  Feed<int> feed(Timing::kLockstep, 1, value(-1));
+  Feed<int> feed(Timing::kLockstep, value(-1));
   feed.expect(FrameId{0});
   feed.expect(FrameId{1});
   std::jthread writer([&] {
@@ -87,19 +87,20 @@ TEST(Feed, ClosingFreesTheWaitingReader) {
   EXPECT_EQ(*feed.for_frame(FrameId{5}), 0);
 }
 
-/// What a reader sees over 400 frames of which every third sends work to the writer.
+/// What a reader sees over 400 frames of which every third sends work to the writer, the result of
+/// which is visible four frames later.
 std::vector<int> seen_over_frames(Timing timing) {
-  Feed<std::vector<int>> feed(timing, 4);
+  Feed<std::vector<int>> feed(timing);
   Mailbox<FrameId> inbox(8);
   std::vector<int> state;  // Of the writer.
-  const auto map_one = [&](FrameId cause) {
-    state.push_back(static_cast<int>(cause.value));
-    feed.publish(cause, std::make_shared<const std::vector<int>>(state));
+  const auto map_one = [&](FrameId frame) {
+    state.push_back(static_cast<int>(frame.value));
+    feed.publish(FrameId{frame.value + 4}, std::make_shared<const std::vector<int>>(state));
   };
   std::jthread writer;
   if (timing != Timing::kInline) {
     writer = std::jthread([&] {
-      while (const std::optional<FrameId> cause = inbox.pop()) map_one(*cause);
+      while (const std::optional<FrameId> frame = inbox.pop()) map_one(*frame);
       feed.close();
     });
   }
@@ -111,7 +112,7 @@ std::vector<int> seen_over_frames(Timing timing) {
       for (const int v : *visible) sum += v;
     seen.push_back(sum);
     if (i % 3 != 0) continue;
-    feed.expect(FrameId{i});
+    feed.expect(FrameId{i + 4});
     timing == Timing::kInline ? map_one(FrameId{i}) : static_cast<void>(inbox.push(FrameId{i}));
   }
   inbox.close();

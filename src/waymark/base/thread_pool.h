@@ -38,18 +38,6 @@ class ThreadPool {
     run(num_chunks(count, chunk_size), run_chunk);
   }
 
-  /// initial + the values of body(begin, end), added in the order of chunks: the same bits for any
-  /// number of threads.
-  template <class T, class Body>
-  T sum_chunks(std::size_t count, std::size_t chunk_size, T initial, Body&& body) {
-    std::vector<T> partial(num_chunks(count, chunk_size), initial);
-    for_chunks(count, chunk_size, [&](std::size_t begin, std::size_t end) {
-      partial[begin / chunk_size] = body(begin, end);
-    });
-    for (const T& part : partial) initial += part;
-    return initial;
-  }
-
  private:
   /// A loop body without ownership, hence without allocation.
   struct Task {

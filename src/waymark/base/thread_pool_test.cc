@@ -4,6 +4,7 @@
 
 #include <gmock/gmock.h>
 
+#include <numeric>
 #include <stdexcept>
 #include <string>
 
@@ -34,11 +35,11 @@ TEST(ThreadPool, SumsHaveTheSameBitsOnAnyNumberOfThreads) {
   for (double& term : terms) term = rng.normal() * 1e6;
   const auto sum_with = [&](unsigned num_threads) {
     ThreadPool pool(num_threads);
-    return pool.sum_chunks(terms.size(), 128, 0.0, [&](std::size_t begin, std::size_t end) {
-      double sum = 0.0;
-      for (std::size_t i = begin; i < end; ++i) sum += terms[i];
-      return sum;
+    std::vector<double> sums(terms.size() / 128 + 1);
+    pool.for_chunks(terms.size(), 128, [&](std::size_t begin, std::size_t end) {
+      for (std::size_t i = begin; i < end; ++i) sums[begin / 128] += terms[i];
     });
+    return std::accumulate(sums.begin(), sums.end(), 0.0);
   };
   const double expected = sum_with(1);
   EXPECT_NE(expected, 0.0);

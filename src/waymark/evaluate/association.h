@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
 
 namespace waymark {
 

@@ -12,7 +12,7 @@ namespace waymark {
 namespace {
 
 // Ascending coefficients.
-struct Polynomial {
+struct BoundedPolynomial {
   std::array<double, kMaxPolynomialDegree + 1> coefficients{};
   std::size_t degree = 0;
 
@@ -22,8 +22,8 @@ struct Polynomial {
     return sum;
   }
 
-  Polynomial derivative() const {
-    Polynomial result;
+  BoundedPolynomial derivative() const {
+    BoundedPolynomial result;
     result.degree = degree - 1;
     for (std::size_t i = 1; i <= degree; ++i) {
       result.coefficients[i - 1] = static_cast<double>(i) * coefficients[i];
@@ -34,8 +34,8 @@ struct Polynomial {
 
 // The root in [low, high], at whose ends the polynomial has different signs: Newton's method, with
 // bisection wherever its step leaves the bracket.
-double bracketed_root(const Polynomial& polynomial,
-                      const Polynomial& derivative,
+double bracketed_root(const BoundedPolynomial& polynomial,
+                      const BoundedPolynomial& derivative,
                       double low,
                       double high) {
   constexpr int kMaxIterations = 100;
@@ -55,10 +55,10 @@ double bracketed_root(const Polynomial& polynomial,
 }
 
 // Roots in [-1, 1] in ascending order.
-RealRoots roots_in_unit_interval(const Polynomial& polynomial) {
+RealRoots roots_in_unit_interval(const BoundedPolynomial& polynomial) {
   RealRoots roots;
   if (polynomial.degree == 0) return roots;
-  const Polynomial derivative = polynomial.derivative();
+  const BoundedPolynomial derivative = polynomial.derivative();
   const RealRoots turns = roots_in_unit_interval(derivative);
 
   double low = -1.0;
@@ -85,7 +85,7 @@ RealRoots roots_in_unit_interval(const Polynomial& polynomial) {
 
 RealRoots real_roots(std::span<const double> coefficients) {
   WAYMARK_CHECK(!coefficients.empty() && coefficients.size() <= kMaxPolynomialDegree + 1);
-  Polynomial polynomial;
+  BoundedPolynomial polynomial;
   polynomial.degree = coefficients.size() - 1;
   double largest = 0.0;
   for (const double coefficient : coefficients) {
@@ -97,7 +97,7 @@ RealRoots real_roots(std::span<const double> coefficients) {
   for (std::size_t i = 0; i < coefficients.size(); ++i) {
     polynomial.coefficients[i] = coefficients[i] / largest;
   }
-  Polynomial reversed = polynomial;
+  BoundedPolynomial reversed = polynomial;
   std::reverse(reversed.coefficients.begin(),
                reversed.coefficients.begin() + static_cast<std::ptrdiff_t>(polynomial.degree) + 1);
 

@@ -1,5 +1,30 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+//
+// The values of the table are those of OpenCV's modules/features2d/src/orb.cpp, which are under
+// this notice (BSD-3-Clause):
+//
+// Copyright (c) 2009, Willow Garage, Inc. All rights reserved.
+//
+// Redistribution and use in source and binary forms, with or without modification, are permitted
+// provided that the following conditions are met:
+//
+//  * Redistributions of source code must retain the above copyright notice, this list of conditions
+//    and the following disclaimer.
+//  * Redistributions in binary form must reproduce the above copyright notice, this list of
+//    conditions and the following disclaimer in the documentation and/or other materials provided
+//    with the distribution.
+//  * Neither the name of the Willow Garage nor the names of its contributors may be used to endorse
+//    or promote products derived from this software without specific prior written permission.
+//
+// THIS SOFTWARE IS PROVIDED BY THE COPYRIGHT HOLDERS AND CONTRIBUTORS "AS IS" AND ANY EXPRESS OR
+// IMPLIED WARRANTIES, INCLUDING, BUT NOT LIMITED TO, THE IMPLIED WARRANTIES OF MERCHANTABILITY AND
+// FITNESS FOR A PARTICULAR PURPOSE ARE DISCLAIMED. IN NO EVENT SHALL THE COPYRIGHT OWNER OR
+// CONTRIBUTORS BE LIABLE FOR ANY DIRECT, INDIRECT, INCIDENTAL, SPECIAL, EXEMPLARY, OR CONSEQUENTIAL
+// DAMAGES (INCLUDING, BUT NOT LIMITED TO, PROCUREMENT OF SUBSTITUTE GOODS OR SERVICES; LOSS OF USE,
+// DATA, OR PROFITS; OR BUSINESS INTERRUPTION) HOWEVER CAUSED AND ON ANY THEORY OF LIABILITY,
+// WHETHER IN CONTRACT, STRICT LIABILITY, OR TORT (INCLUDING NEGLIGENCE OR OTHERWISE) ARISING IN ANY
+// WAY OUT OF THE USE OF THIS SOFTWARE, EVEN IF ADVISED OF THE POSSIBILITY OF SUCH DAMAGE.
 #pragma once
 
 #include <array>
@@ -13,8 +38,8 @@ struct BriefTest {
 };
 
 /// The published sampling pattern of ORB, learned to be of large variance and little correlation
-/// (Rublee et al. 2011, section 4.3); the values are those of cv::ORB (OpenCV, Apache-2.0). Sharing
-/// them keeps descriptors comparable with those of other ORB features.
+/// (Rublee et al. 2011, section 4.3). Sharing the values of cv::ORB keeps descriptors comparable
+/// with those of other ORB features.
 // clang-format off
 inline constexpr std::array<BriefTest, 256> kBriefPattern{{
     {8, -3, 9, 5}, {4, 2, 7, -12}, {-11, 9, -8, 2}, {7, -12, 12, -13}, {2, -13, 2, 12},

@@ -41,7 +41,7 @@ struct Sample {
   double dy_px;
 };
 
-struct Neighbourhood {
+struct DepthSamples {
   std::array<Sample, kMaxSamples> samples;
   std::size_t count = 0;
 };
@@ -72,7 +72,7 @@ struct InverseRange {
 
 /// Keeps the samples in order, the nearest first, in the order of their coming among equals. So few
 /// are sorted fastest by insertion, which unlike std::stable_sort allocates nothing.
-void insert(const Sample& sample, Neighbourhood& around) {
+void insert(const Sample& sample, DepthSamples& around) {
   std::size_t at = around.count++;
   for (; at > 0 && around.samples[at - 1].inverse_range < sample.inverse_range; --at) {
     around.samples[at] = around.samples[at - 1];
@@ -81,11 +81,11 @@ void insert(const Sample& sample, Neighbourhood& around) {
 }
 
 /// Measured pixels around the keypoint, the nearest surface first.
-Neighbourhood look_around(DepthView depth,
-                          double factor,
-                          const Keypoint& keypoint,
-                          const ZPerRange& z) {
-  Neighbourhood around;
+DepthSamples look_around(DepthView depth,
+                         double factor,
+                         const Keypoint& keypoint,
+                         const ZPerRange& z) {
+  DepthSamples around;
   const int center_x = static_cast<int>(std::lround(keypoint.x_px));
   const int center_y = static_cast<int>(std::lround(keypoint.y_px));
   const int last_y = std::min(center_y + kRadiusPx, depth.height_px - 1);
@@ -104,7 +104,7 @@ Neighbourhood look_around(DepthView depth,
 }
 
 /// The samples of the nearest surface: from the nearest on, up to the first gap.
-std::span<const Sample> nearest_surface(const Neighbourhood& around) {
+std::span<const Sample> nearest_surface(const DepthSamples& around) {
   std::size_t begin = 0;
   for (std::size_t i = 1; i <= around.count; ++i) {
     const double nearer = around.samples[i - 1].inverse_range;
@@ -150,7 +150,7 @@ std::optional<InverseRange> measure(DepthView depth,
                                     double factor,
                                     const Keypoint& keypoint,
                                     const ZPerRange& z) {
-  const Neighbourhood around = look_around(depth, factor, keypoint, z);
+  const DepthSamples around = look_around(depth, factor, keypoint, z);
   const std::span<const Sample> surface = nearest_surface(around);
   if (surface.empty()) return std::nullopt;
   const InverseRange fitted = fit_surface(surface, 1.0 / factor, z.at_keypoint);

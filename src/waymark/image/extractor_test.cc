@@ -4,13 +4,14 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
-#include "waymark/image/allocation_count.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/mask.h"
+#include "waymark/image/testing/allocation_count.h"
 
 namespace waymark {
 namespace {
@@ -123,8 +124,8 @@ TEST(FeatureExtractor, LocatesToFractionsOfAPixel) {
 
 TEST(FeatureExtractor, HonoursMasks) {
   const PaddedImage image = testing::make_texture(400, 300, 1);
-  const MaskRectangle left_half{.left = 0.0, .right = 0.5, .top = 0.0, .bottom = 1.0};
-  const Image mask = mask_of_rectangles({&left_half, 1}, 400, 300);
+  Image mask(400, 300);
+  for (int y = 0; y < 300; ++y) std::fill(mask.row(y) + 200, mask.row(y) + 400, 255);
   FeatureExtractor extractor({.count = 500});
   const Extracted features = extract(extractor, image, mask.view());
   EXPECT_EQ(features.keypoints.size(), 500u);
@@ -142,8 +143,7 @@ TEST(FeatureExtractor, FindsNothingWhereThereIsNothing) {
   for (int size : {1, 2, 20, 39}) {
     EXPECT_LE(extract(extractor, testing::make_noise(size, size, 1)).keypoints.size(), 1u);
   }
-  const MaskRectangle all{.left = 0.0, .right = 1.0, .top = 0.0, .bottom = 1.0};
-  const Image mask = mask_of_rectangles({&all, 1}, 400, 300);
+  const Image mask(400, 300);  // All 0.
   EXPECT_TRUE(extract(extractor, testing::make_noise(400, 300, 1), mask.view()).keypoints.empty());
 }
 
@@ -152,27 +152,6 @@ TEST(FeatureExtractor, RejectsBadInput) {
   FeatureExtractor extractor({});
   EXPECT_THROW(extract(extractor, PaddedImage()), InputError);
   EXPECT_THROW(extract(extractor, image, Image(80, 100).view()), InputError);
-}
-
-TEST(Mask, CoversPixelsWhoseCentresAreWithin) {
-  const std::array<MaskRectangle, 2> parts{
-      MaskRectangle{.left = 0.25, .right = 0.5, .top = 0.0, .bottom = 0.5},
-      MaskRectangle{.left = 0.9, .right = 1.0, .top = 0.9, .bottom = 1.0}};
-  const Image mask = mask_of_rectangles(parts, 8, 4);
-  for (int y = 0; y < 4; ++y) {
-    for (int x = 0; x < 8; ++x) {
-      const bool is_covered = (x == 2 || x == 3) && y < 2;
-      EXPECT_EQ(mask.view().at(x, y), is_covered ? 0 : 255) << x << ", " << y;
-    }
-  }
-}
-
-TEST(Mask, RejectsRectanglesThatAreNone) {
-  for (const MaskRectangle& part : {MaskRectangle{.left = 0.6, .right = 0.5, .bottom = 1.0},
-                                    MaskRectangle{.right = 1.5, .bottom = 1.0},
-                                    MaskRectangle{.right = 1.0, .top = -0.1, .bottom = 1.0}}) {
-    EXPECT_THROW(mask_of_rectangles({&part, 1}, 10, 10), InputError);
-  }
 }
 
 }  // namespace

@@ -20,8 +20,9 @@ namespace {
 
 inline constexpr int kColumns = 32;  // 31 of the disc and one of no weight.
 
-// Half the width of the disc at each distance from its middle row: the radius rounded as in
-// cv::ORB, so that angles agree with those of other ORB features.
+// Half the width of the disc at each distance from its middle row: the circle rounded in one octant
+// and mirrored in the others. The values are those of OpenCV's orb.cpp, (c) 2009 Willow Garage,
+// Inc., BSD-3-Clause as in brief_pattern.h, so that angles agree with those of other ORB features.
 inline constexpr std::array<int, kOrientationRadius + 1> kHalfWidths{
     15, 15, 15, 15, 14, 14, 14, 13, 13, 12, 11, 10, 9, 8, 6, 3};
 
@@ -121,19 +122,6 @@ void orient(const PaddedImage& image,
             std::span<float> angles_rad) {
   WAYMARK_CHECK(angles_rad.size() == corners.size());
   HWY_DYNAMIC_DISPATCH(orient_all)(image, corners, angles_rad.data());
-}
-
-float orientation_reference(ImageView image, int x, int y) {
-  int moment_x = 0;
-  int moment_y = 0;
-  for (int v = -kOrientationRadius; v <= kOrientationRadius; ++v) {
-    const int half_width = kHalfWidths[static_cast<std::size_t>(std::abs(v))];
-    for (int u = -half_width; u <= half_width; ++u) {
-      moment_x += u * image.at(x + u, y + v);
-      moment_y += v * image.at(x + u, y + v);
-    }
-  }
-  return std::atan2(static_cast<float>(moment_y), static_cast<float>(moment_x));
 }
 
 }  // namespace waymark

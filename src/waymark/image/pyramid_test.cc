@@ -10,11 +10,12 @@
 #include "waymark/image/downscale.h"
 #include "waymark/image/gaussian.h"
 #include "waymark/image/image_testing.h"
+#include "waymark/image/test_references.h"
 
 namespace waymark {
 namespace {
 
-cv::Mat as_cv(const PaddedImage& image) {
+cv::Mat cv_view_of(const PaddedImage& image) {
   const ImageView view = image.view();
   return cv::Mat(view.height_px,
                  view.width_px,
@@ -40,7 +41,7 @@ TEST(Downscale, KernelIsEqualToReference) {
   for (const auto& [width, height] : {std::pair(752, 48), {241, 37}, {64, 6}, {13, 13}, {7, 2}}) {
     const PaddedImage image = testing::make_noise(width, height, 3);
     downscale(image, workspace, result);
-    downscale_reference(image, reference);
+    testing::downscale(image, reference);
     expect_equal(result, reference);
   }
 }
@@ -121,7 +122,7 @@ TEST(GaussianBlur, KernelIsEqualToReference) {
   for (const auto& [width, height] : {std::pair(320, 20), {37, 41}, {4, 4}}) {
     const PaddedImage image = testing::make_noise(width, height, 5);
     gaussian_blur(image, workspace, result);
-    gaussian_blur_reference(image, reference);
+    testing::gaussian_blur(image, reference);
     expect_equal(result, reference);
   }
 }
@@ -133,9 +134,9 @@ TEST(GaussianBlur, AgreesWithOpenCv) {
     PaddedImage ours;
     gaussian_blur(image, workspace, ours);
     cv::Mat theirs;
-    cv::GaussianBlur(as_cv(image), theirs, cv::Size(7, 7), 2.0, 2.0, cv::BORDER_REFLECT_101);
+    cv::GaussianBlur(cv_view_of(image), theirs, cv::Size(7, 7), 2.0, 2.0, cv::BORDER_REFLECT_101);
     cv::Mat difference;
-    cv::absdiff(as_cv(ours), theirs, difference);
+    cv::absdiff(cv_view_of(ours), theirs, difference);
     EXPECT_LE(cv::norm(difference, cv::NORM_INF), 1.0);
     EXPECT_LE(cv::countNonZero(difference), 0.01 * static_cast<double>(difference.total()));
   }

@@ -13,9 +13,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
-
 /// Walks on until a place is recognised; the scene's last keyframe is the query.
 Revisit walk_until_found(LoopScene& scene, int from_step) {
   RevisitVerifier verifier(scene.rig, 1);

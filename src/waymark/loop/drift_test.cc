@@ -9,8 +9,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
 
 TEST(DriftTest, ShortestWayGoesAlongTheGraph) {
   LoopScene scene(cloud_all_round(kNumPoints), false, Vector7d::Zero());

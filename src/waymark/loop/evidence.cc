@@ -43,9 +43,8 @@ void add_view(const Map& map,
               std::uint32_t feature,
               LandmarkMatches::Side& side) {
   const Landmark& landmark = map.landmarks().at(keyframe.landmarks[feature]);
-  side.point_in_cam.push_back(cam_from_world(keyframe) * landmark.position_in_world);
-  side.bearing.push_back(keyframe.features->bearings[feature]);
-  side.level_pixel_from_bearing.push_back(keyframe.features->level_pixel_from_bearing[feature]);
+  side.add(cam_from_world(keyframe) * landmark.position_in_world,
+           keyframe.features->measurement(feature));
 }
 
 Sim3 rig_from_cam(const Keyframe& keyframe) {

@@ -11,7 +11,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kRound = LoopScene::kStepsPerRound;
 
 /// A metric map with drift, one sub-map for each [first, end) of steps.
 LoopScene walk(const std::vector<std::pair<int, int>>& parts) {

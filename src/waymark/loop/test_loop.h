@@ -11,7 +11,7 @@
 #include "waymark/mapping/associate.h"
 #include "waymark/match/test_scene.h"
 #include "waymark/place/place_index.h"
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 namespace waymark {
 
@@ -147,5 +147,8 @@ class LoopScene {
   KeyframeId parent;
   std::map<std::uint32_t, KnownPoint> landmark_of_point;
 };
+
+constexpr int kNumPoints = 4000;
+constexpr int kRound = LoopScene::kStepsPerRound;
 
 }  // namespace waymark

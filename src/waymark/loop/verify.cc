@@ -148,13 +148,13 @@ std::optional<Revisit> RevisitVerifier::compare_beside(const Map& map,
                                                        KeyframeId match) {
   const Keyframe& in_query = map.keyframes().at(query);
   const auto place =
-      locator_.locate_near(*in_query.features, map, match, in_query.rig_from_world, seen_);
+      locator_.locate_near(*in_query.features, map, match, in_query.rig_from_world);
   if (!place) return std::nullopt;
   Revisit revisit;
   revisit.query = query;
   revisit.match = match;
   revisit.num_inliers = static_cast<std::size_t>(place->frame.num_inliers);
-  revisit.pairs = pair_up(in_query, seen_);
+  revisit.pairs = pair_up(in_query, place->frame.landmarks);
   const double scale =
       find_scale(map, in_query.rig_from_world, place->frame.rig_from_world, revisit.pairs);
   if (revisit.pairs.size() < kMinPairsBeside) return std::nullopt;

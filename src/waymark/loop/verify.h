@@ -42,7 +42,6 @@ class RevisitVerifier {
   const std::shared_ptr<const Rig> rig_;
   EvidenceCollector evidence_;
   PlaceLocator locator_;
-  std::vector<LandmarkId> seen_;
 };
 
 }  // namespace waymark

@@ -11,8 +11,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
 
 /// As the mapper looks for the place of a new keyframe.
 std::optional<Revisit> find_revisit(RevisitVerifier& verifier,

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/base/rng.h"
-
 namespace waymark {
 namespace {
 
@@ -19,94 +17,6 @@ Keyframe make_keyframe(std::size_t num_features, SubmapId submap, KeyframeId par
   keyframe.rig = std::make_shared<Rig>();
   keyframe.features = features;
   return keyframe;
-}
-
-template <class Id, class T>
-std::vector<Id> ids_of(const CowTable<Id, T>& table) {
-  std::vector<Id> ids;
-  table.for_each([&](Id id, const T&) { ids.push_back(id); });
-  return ids;
-}
-
-class RandomEdits {
- public:
-  explicit RandomEdits(Map& map) : map_(map), submap_(map.add_submap(false)) {
-    map_.add_keyframe(make_keyframe(40, submap_, {}));
-  }
-
-  void step() {
-    const auto keyframes = ids_of(map_.keyframes());
-    const auto landmarks = ids_of(map_.landmarks());
-    const KeyframeId keyframe = keyframes[rng_.below(static_cast<std::uint32_t>(keyframes.size()))];
-    const auto pick = [&] {
-      return landmarks[rng_.below(static_cast<std::uint32_t>(landmarks.size()))];
-    };
-    const std::uint32_t feature = rng_.below(40);
-    const LandmarkId seen = map_.keyframes().at(keyframe).landmarks[feature];
-    switch (rng_.below(12)) {
-      case 0:
-        map_.add_keyframe(make_keyframe(40, submap_, keyframe));
-        break;
-      case 1:
-        if (map_.keyframes().at(keyframe).parent.is_valid() && rng_.below(3) == 0) {
-          map_.erase_keyframe(keyframe);
-        }
-        break;
-      case 2:
-        if (!landmarks.empty()) map_.erase_landmark(pick());
-        break;
-      case 3:
-        if (seen.is_valid()) map_.forget(keyframe, feature);
-        break;
-      case 4:
-        if (landmarks.size() > 1) {
-          const LandmarkId a = pick();
-          const LandmarkId b = pick();
-          if (a != b) map_.merge_landmarks(a, b);
-        }
-        break;
-      case 5:
-      case 6: {
-        if (seen.is_valid()) break;
-        const LandmarkId id = map_.add_landmark(submap_, Eigen::Vector3d::Ones(), keyframe);
-        map_.observe(keyframe, feature, id);
-        break;
-      }
-      default:
-        if (!seen.is_valid() && !landmarks.empty()) map_.observe(keyframe, feature, pick());
-    }
-  }
-
- private:
-  Map& map_;
-  SubmapId submap_;
-  Rng rng_{1, 0};
-};
-
-TEST(Map, StaysSoundUnderRandomEdits) {
-  Map map;
-  RandomEdits edits(map);
-  for (int step = 0; step < 3000; ++step) {
-    edits.step();
-    ASSERT_EQ(map.broken_invariants(), "") << "after step " << step;
-  }
-  EXPECT_GT(map.landmarks().size(), 10u);
-}
-
-TEST(Map, FrozenCopiesNeverChange) {
-  Map map;
-  RandomEdits edits(map);
-  for (int step = 0; step < 300; ++step) edits.step();
-  const auto frozen = map.freeze();
-  std::vector<std::vector<Observation>> before;
-  frozen->landmarks().for_each(
-      [&](LandmarkId, const Landmark& landmark) { before.push_back(landmark.observations); });
-  for (int step = 0; step < 300; ++step) edits.step();
-  std::vector<std::vector<Observation>> after;
-  frozen->landmarks().for_each(
-      [&](LandmarkId, const Landmark& landmark) { after.push_back(landmark.observations); });
-  EXPECT_EQ(before, after);
-  EXPECT_EQ(frozen->broken_invariants(), "");
 }
 
 TEST(Map, ThawedMapsGoOnAndLeaveTheFrozenOneAlone) {

@@ -32,7 +32,7 @@ constexpr double kLargestLogFactor = 0.2;
 constexpr double kMaxSigma = 0.01;
 
 /// Keyframes, landmarks and their observations, with the pixels that the bearings came from.
-struct Scene {
+struct FocalProblem {
   BundleProblem problem;
   std::vector<Eigen::Vector2d> pixels;  ///< Per observation, of level 0.
   std::vector<float> level_scales;
@@ -41,7 +41,7 @@ struct Scene {
 void add_observations(const Map& map,
                       const Landmark& landmark,
                       const std::vector<KeyframeId>& keyframes,
-                      Scene& scene) {
+                      FocalProblem& scene) {
   std::vector<BundleObservation> seen;
   std::vector<Eigen::Vector2d> pixels;
   std::vector<float> level_scales;
@@ -73,14 +73,14 @@ void add_observations(const Map& map,
 
 /// The surroundings of the newest keyframe, as far as its rig saw them; its gauge is held by one
 /// pose only, since a wrong focal length also bends the motion between two.
-Scene collect(const Map& map, KeyframeId newest) {
+FocalProblem collect(const Map& map, KeyframeId newest) {
   std::vector<KeyframeId> keyframes = strongest_neighbours(map, newest, kNumKeyframes - 1);
   std::erase_if(keyframes, [&](KeyframeId id) {
     return map.keyframes().at(id).rig != map.keyframes().at(newest).rig;
   });
   keyframes.push_back(newest);
   std::sort(keyframes.begin(), keyframes.end());
-  Scene scene;
+  FocalProblem scene;
   std::vector<LandmarkId> landmarks;
   for (KeyframeId id : keyframes) {
     const Keyframe& keyframe = map.keyframes().at(id);
@@ -101,7 +101,7 @@ Scene collect(const Map& map, KeyframeId newest) {
 
 /// Bearings and their derivatives of a rig with another focal length; those of pixels that have
 /// none there have no weight.
-void measure_anew(const Rig& rig, double log_factor, Scene& scene) {
+void measure_anew(const Rig& rig, double log_factor, FocalProblem& scene) {
   for (std::size_t camera = 0; camera < rig.cameras.size(); ++camera) {
     const auto scaled = ScaledCamera::refocused(rig.cameras[camera].camera, std::exp(log_factor));
     TangentComputer computer;
@@ -117,7 +117,7 @@ void measure_anew(const Rig& rig, double log_factor, Scene& scene) {
   }
 }
 
-double least_cost(const Rig& rig, double log_factor, Scene scene) {
+double least_cost(const Rig& rig, double log_factor, FocalProblem scene) {
   measure_anew(rig, log_factor, scene);
   return adjust_bundle(scene.problem,
                        {.num_rounds = 1,
@@ -138,7 +138,7 @@ std::optional<FocalCheck> check_focal_length(const Map& map) {
   for (const RigCamera& camera : rig.cameras) {
     if (camera.camera->wrap_width_px() > 0.0) return std::nullopt;
   }
-  Scene scene = collect(map, newest);
+  FocalProblem scene = collect(map, newest);
   scene.problem.rigs.assign(scene.problem.rig_from_world.size(), &rig);
   if (scene.problem.points.size() < kMinLandmarks) return std::nullopt;
   const double num_unknowns = 6.0 * static_cast<double>(scene.problem.rig_from_world.size()) +

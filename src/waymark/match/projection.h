@@ -17,7 +17,8 @@ namespace waymark {
 struct ProjectionOptions {
   double radius_px = 4.0;  ///< Search radius in pixels of the landmark's expected level.
   AppearanceOptions appearance{.max_distance = 64, .max_ratio = 0.85};
-  double min_direction_cos = 0.5;  ///< Between the viewing direction and the known one.
+  /// Between the viewing direction and the known one (Mur-Artal et al. 2015, V.D).
+  double min_direction_cos = 0.5;
 };
 
 /// Result per landmark of the set searched for.

@@ -6,7 +6,7 @@
 
 #include "waymark/camera/perspective.h"
 #include "waymark/match/landmark_set.h"
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 namespace waymark {
 

@@ -8,7 +8,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
-#include "waymark/optimize/ceres_solver.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/schur_solver.h"
 
@@ -38,13 +37,13 @@ double squared_residual(const BundleProblem& problem, const BundleObservation& o
   const Rigid3& cam_from_rig =
       problem.rigs[observation.pose]->cameras[observation.camera].cam_from_rig;
   const Rigid3& rig_from_world = problem.rig_from_world[observation.pose];
-  const Sighting sighting =
-      sight(cam_from_rig * (rig_from_world * problem.points[observation.point]));
+  const InverseRangePoint seen =
+      in_inverse_range(cam_from_rig * (rig_from_world * problem.points[observation.point]));
   const double squared =
-      bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing)
+      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing)
           .squaredNorm();
   if (!std::isfinite(squared)) return squared;
-  return is_ahead(sighting, observation.bearing) ? squared : kGrossSquaredResidual;
+  return is_ahead(seen, observation.bearing) ? squared : kGrossSquaredResidual;
 }
 
 /// Standard deviation of a residual component as the used observations show it: the median length
@@ -93,9 +92,7 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   const double gate = options.gate_px * options.gate_px;
   for (int round = 0; round < options.num_rounds; ++round) {
     const BundleOptions round_options = narrowed(options, problem, is_used);
-    const BundleRound done = options.solver == BundleSolver::kSchur
-                                 ? minimize_with_schur(problem, is_used, round_options)
-                                 : minimize_with_ceres(problem, is_used, round_options);
+    const BundleRound done = minimize_with_schur(problem, is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;

@@ -8,6 +8,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
+#include "waymark/optimize/schur_solver.h"
+#include "waymark/optimize/test_ceres.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {
@@ -50,31 +52,28 @@ void expect_finite(const BundleProblem& problem, const BundleResult& result) {
   EXPECT_TRUE(std::isfinite(result.final_cost));
 }
 
-class Bundle : public ::testing::TestWithParam<BundleSolver> {};
-
-TEST_P(Bundle, FindsTheTruthWithoutNoise) {
+TEST(Bundle, FindsTheTruthWithoutNoise) {
   const BundleSceneOptions kinds[] = {{.noise_px = 0.0},
                                       {.num_fixed = 1, .num_cameras = 2, .noise_px = 0.0},
                                       {.num_fixed = 1, .noise_px = 0.0, .range_sigma = 1e-4}};
   for (const BundleSceneOptions& kind : kinds) {
     const BundleScene scene = make_bundle_scene(kind, 1);
     BundleProblem problem = problem_of(scene);
-    const BundleResult result = adjust_bundle(
-        problem,
-        {.solver = GetParam(), .max_iterations_per_round = 50, .relative_cost_tolerance = 1e-10});
+    const BundleResult result =
+        adjust_bundle(problem, {.max_iterations_per_round = 50, .relative_cost_tolerance = 1e-10});
     EXPECT_LT(worst_pose_error(problem, scene), 3e-3);
     EXPECT_LT(result.final_cost, 1e-2 * result.initial_cost);
     EXPECT_LT(median_point_error(problem, scene), 3e-3);
   }
 }
 
-TEST_P(Bundle, ConvergesDespiteOutliersAndNamesThem) {
+TEST(Bundle, ConvergesDespiteOutliersAndNamesThem) {
   for (const std::size_t num_cameras : {1u, 2u}) {
     const BundleScene scene = make_bundle_scene(
         {.num_cameras = num_cameras, .noise_px = 0.5, .share_of_outliers = 0.05}, num_cameras);
     BundleProblem problem = problem_of(scene);
-    const BundleResult result = adjust_bundle(
-        problem, {.solver = GetParam(), .num_rounds = 3, .max_iterations_per_round = 20});
+    const BundleResult result =
+        adjust_bundle(problem, {.num_rounds = 3, .max_iterations_per_round = 20});
     std::size_t num_wrong = 0;
     for (std::size_t i = 0; i < scene.is_outlier.size(); ++i) {
       num_wrong += scene.is_outlier[i] != result.is_outlier[i];
@@ -86,7 +85,7 @@ TEST_P(Bundle, ConvergesDespiteOutliersAndNamesThem) {
   }
 }
 
-TEST_P(Bundle, TakesPosesOfSeveralRigs) {
+TEST(Bundle, TakesPosesOfSeveralRigs) {
   const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.3}, 5);
   BundleProblem one = problem_of(scene);
   // The same cameras, but the origin of the rig of every other pose is elsewhere.
@@ -102,7 +101,7 @@ TEST_P(Bundle, TakesPosesOfSeveralRigs) {
     two.rigs[i] = &other;
     two.rig_from_world[i] = other_from_rig * two.rig_from_world[i];
   }
-  const BundleOptions options = {.solver = GetParam(), .max_iterations_per_round = 30};
+  const BundleOptions options = {.max_iterations_per_round = 30};
   const BundleResult result = adjust_bundle(one, options);
   EXPECT_NEAR(adjust_bundle(two, options).final_cost, result.final_cost, 0.01 * result.final_cost);
   for (std::size_t i = 1; i < two.rigs.size(); i += 2) {
@@ -122,13 +121,13 @@ void disturb(BundleProblem& problem) {
   }
 }
 
-TEST_P(Bundle, TheLossNarrowsWithTheNoise) {
+TEST(Bundle, TheLossNarrowsWithTheNoise) {
   const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.2}, 7);
   BundleProblem clean = problem_of(scene);
-  adjust_bundle(clean, {.solver = GetParam(), .max_iterations_per_round = 30});
+  adjust_bundle(clean, {.max_iterations_per_round = 30});
   BundleProblem disturbed = problem_of(scene);
   disturb(disturbed);
-  adjust_bundle(disturbed, {.solver = GetParam(), .max_iterations_per_round = 30});
+  adjust_bundle(disturbed, {.max_iterations_per_round = 30});
   // With a loss of 2 px they would pull as in least squares: 5 % * 1.5 px, a third of the noise.
   double drift = 0.0;
   for (std::size_t i = 0; i < clean.rig_from_world.size(); ++i) {
@@ -138,20 +137,20 @@ TEST_P(Bundle, TheLossNarrowsWithTheNoise) {
   EXPECT_LT(drift, 0.002);  // 0.0012; with a loss of 2 px 0.0032.
 }
 
-TEST_P(Bundle, TheLossIsNeverWiderThanStated) {
+TEST(Bundle, TheLossIsNeverWiderThanStated) {
   const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.2}, 7);
   BundleProblem following = problem_of(scene);
-  adjust_bundle(following, {.solver = GetParam(), .huber_px = 0.1});
+  adjust_bundle(following, {.huber_px = 0.1});
   BundleProblem stated = problem_of(scene);
-  adjust_bundle(stated, {.solver = GetParam(), .huber_px = 0.1, .follows_noise = false});
+  adjust_bundle(stated, {.huber_px = 0.1, .follows_noise = false});
   EXPECT_EQ(following.points, stated.points);
 }
 
-TEST_P(Bundle, FixedPosesStay) {
+TEST(Bundle, FixedPosesStay) {
   const BundleScene scene = make_bundle_scene({.num_fixed = 3}, 2);
   BundleProblem problem = problem_of(scene);
   problem.is_pose_fixed.back() = 1;
-  adjust_bundle(problem, {.solver = GetParam()});
+  adjust_bundle(problem, {});
   for (const std::size_t i : {std::size_t{0}, std::size_t{2}, scene.rig_from_world.size() - 1}) {
     EXPECT_EQ(problem.rig_from_world[i].translation, scene.problem.rig_from_world[i].translation);
     EXPECT_EQ(problem.rig_from_world[i].rotation.coeffs(),
@@ -159,12 +158,12 @@ TEST_P(Bundle, FixedPosesStay) {
   }
 }
 
-TEST_P(Bundle, SameInputSameBits) {
+TEST(Bundle, SameInputSameBits) {
   const BundleScene scene = make_bundle_scene({.num_cameras = 2, .share_of_outliers = 0.1}, 3);
   BundleProblem first = problem_of(scene);
   BundleProblem second = problem_of(scene);
-  const BundleResult first_result = adjust_bundle(first, {.solver = GetParam()});
-  const BundleResult second_result = adjust_bundle(second, {.solver = GetParam()});
+  const BundleResult first_result = adjust_bundle(first, {});
+  const BundleResult second_result = adjust_bundle(second, {});
   EXPECT_EQ(first.points, second.points);
   for (std::size_t i = 0; i < first.rig_from_world.size(); ++i) {
     EXPECT_EQ(first.rig_from_world[i].translation, second.rig_from_world[i].translation);
@@ -175,17 +174,17 @@ TEST_P(Bundle, SameInputSameBits) {
   EXPECT_EQ(first_result.is_outlier, second_result.is_outlier);
 }
 
-TEST_P(Bundle, FreeGaugeStaysNearTheStart) {
+TEST(Bundle, FreeGaugeStaysNearTheStart) {
   const BundleScene scene = make_bundle_scene({.num_fixed = 0, .noise_px = 0.3}, 4);
   BundleProblem problem = problem_of(scene);
-  const BundleResult result = adjust_bundle(problem, {.solver = GetParam()});
+  const BundleResult result = adjust_bundle(problem, {});
   expect_finite(problem, result);
   EXPECT_LT(result.final_cost, result.initial_cost);
   EXPECT_LT(worst_pose_error(problem, scene), 0.5);
 }
 
-TEST_P(Bundle, DegenerateInputStaysFinite) {
-  const BundleOptions options = {.solver = GetParam()};
+TEST(Bundle, DegenerateInputStaysFinite) {
+  const BundleOptions options;
   const BundleScene scene = make_bundle_scene({.num_points = 30}, 5);
   BundleProblem nothing = problem_of(scene);
   nothing.observations.clear();
@@ -218,7 +217,7 @@ TEST_P(Bundle, DegenerateInputStaysFinite) {
   EXPECT_TRUE(adjust_bundle(empty, options).is_outlier.empty());
 }
 
-TEST_P(Bundle, HostileObservationsAreOutliersAndPullNothing) {
+TEST(Bundle, HostileObservationsAreOutliersAndPullNothing) {
   const BundleScene scene = make_bundle_scene({.noise_px = 0.3, .range_sigma = 0.01}, 6);
   BundleProblem clean = problem_of(scene);
   BundleProblem dirty = clean;
@@ -230,8 +229,7 @@ TEST_P(Bundle, HostileObservationsAreOutliersAndPullNothing) {
   for (const std::size_t i : {25u, 17u, 9u, 0u}) {
     clean.observations.erase(clean.observations.begin() + i);
   }
-  const BundleOptions options = {
-      .solver = GetParam(), .max_iterations_per_round = 50, .relative_cost_tolerance = 1e-12};
+  const BundleOptions options = {.max_iterations_per_round = 50, .relative_cost_tolerance = 1e-12};
   adjust_bundle(clean, options);
   const BundleResult result = adjust_bundle(dirty, options);
   expect_finite(dirty, result);
@@ -241,24 +239,17 @@ TEST_P(Bundle, HostileObservationsAreOutliersAndPullNothing) {
   }
 }
 
-TEST_P(Bundle, BrokenPromisesAreNamed) {
+TEST(Bundle, BrokenPromisesAreNamed) {
   const BundleScene scene = make_bundle_scene({}, 7);
   BundleProblem unsorted = problem_of(scene);
   std::swap(unsorted.observations.front(), unsorted.observations.back());
-  EXPECT_THROW(adjust_bundle(unsorted, {.solver = GetParam()}), CheckError);
+  EXPECT_THROW(adjust_bundle(unsorted, {}), CheckError);
   BundleProblem foreign = problem_of(scene);
   foreign.observations.back().camera = 4;
-  EXPECT_THROW(adjust_bundle(foreign, {.solver = GetParam()}), CheckError);
+  EXPECT_THROW(adjust_bundle(foreign, {}), CheckError);
 }
 
-INSTANTIATE_TEST_SUITE_P(Solvers,
-                         Bundle,
-                         ::testing::Values(BundleSolver::kSchur, BundleSolver::kCeres),
-                         [](const auto& info) {
-                           return info.param == BundleSolver::kSchur ? "Schur" : "Ceres";
-                         });
-
-TEST(BundleSolvers, AgreeOnTheMinimum) {
+TEST(Bundle, AgreesWithCeresOnTheMinimum) {
   const BundleSceneOptions kinds[] = {
       {},
       {.num_cameras = 2, .share_of_outliers = 0.05},
@@ -267,15 +258,13 @@ TEST(BundleSolvers, AgreeOnTheMinimum) {
       {.num_fixed = 1, .num_cameras = 2, .share_of_outliers = 0.02, .range_sigma = 0.02}};
   for (std::uint64_t seed = 0; seed < 10; ++seed) {
     const BundleScene scene = make_bundle_scene(kinds[seed % 5], 10 + seed);
-    BundleOptions options;
-    options.num_rounds = 1;
-    options.max_iterations_per_round = 200;
-    options.relative_cost_tolerance = 1e-13;
+    const BundleOptions options = {.max_iterations_per_round = 200,
+                                   .relative_cost_tolerance = 1e-13};
     BundleProblem own = problem_of(scene);
     BundleProblem other = problem_of(scene);
-    const BundleResult own_result = adjust_bundle(own, options);
-    options.solver = BundleSolver::kCeres;
-    const BundleResult other_result = adjust_bundle(other, options);
+    const std::vector<std::uint8_t> is_used(own.observations.size(), 1);
+    const BundleRound own_result = minimize_with_schur(own, is_used, options);
+    const BundleRound other_result = testing::minimize_with_ceres(other, is_used, options);
     EXPECT_NEAR(own_result.initial_cost, other_result.initial_cost, 1e-9 * own_result.initial_cost);
     EXPECT_NEAR(own_result.final_cost, other_result.final_cost, 1e-6 * other_result.final_cost)
         << seed;

@@ -2,11 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/optimize/pose.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "waymark/base/median.h"
+#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/pose_arrays.h"
 #include "waymark/optimize/pose_kernel.h"
 
@@ -31,19 +31,11 @@ constexpr int kNumRounds = 2;
 /// squared noise. Its root is the step in units of the pose's own standard deviation.
 constexpr double kCoarseDecrease = 1e-2;
 constexpr double kFineDecrease = 1e-4;
-/// Prior information in 1/m^2 and 1/rad^2 that keeps the covariance finite.
-constexpr double kPriorInformation = 1e-6;
 /// Residual components that the assumed noise counts as when the noise is measured.
 constexpr double kNoisePriorStrength = 8.0;
 
-struct NormalEquations {
-  Matrix6d hessian = Matrix6d::Zero();
-  Vector6d gradient = Vector6d::Zero();
-  double cost = 0.0;
-};
-
-NormalEquations unpack(const PoseSums& sums) {
-  NormalEquations equations;
+NormalEquations<6> unpack(const PoseSums& sums) {
+  NormalEquations<6> equations;
   std::size_t k = 0;
   for (int a = 0; a < 6; ++a) {
     for (int b = a; b < 6; ++b) {
@@ -64,11 +56,11 @@ class PoseSolver {
   const Rigid3& rig_from_world() const { return rig_from_world_; }
   int num_iterations() const { return num_iterations_; }
 
-  NormalEquations linearize(const Rigid3& rig_from_world, const PoseRobust& robust) const {
-    NormalEquations total;
+  NormalEquations<6> linearize(const Rigid3& rig_from_world, const PoseRobust& robust) const {
+    NormalEquations<6> total;
     for (const PoseSegment& segment : arrays_.segments) {
       const Rigid3& cam_from_rig = rig_.cameras[segment.camera].cam_from_rig;
-      const NormalEquations part =
+      const NormalEquations<6> part =
           unpack(sum_normal_equations(arrays_, segment, cam_from_rig * rig_from_world, robust));
       const Matrix6d adjoint = cam_from_rig.adjoint();
       total.hessian.noalias() += adjoint.transpose() * part.hessian * adjoint;
@@ -78,35 +70,11 @@ class PoseSolver {
     return total;
   }
 
-  /// Levenberg-Marquardt with the damping of Madsen, Nielsen & Tingleff 2004, 3.2; returns the
-  /// equations at the pose reached.
-  NormalEquations minimize(const PoseRobust& robust, int max_iterations, double negligible) {
-    NormalEquations equations = linearize(rig_from_world_, robust);
-    double damping = 1e-6;
-    double growth = 2.0;
-    for (int iteration = 0; iteration < max_iterations; ++iteration) {
-      const Vector6d scale = equations.hessian.diagonal().array() + kPriorInformation;
-      Matrix6d damped = equations.hessian;
-      damped.diagonal() += damping * scale;
-      damped.diagonal().array() += kPriorInformation;
-      const Vector6d step = -damped.ldlt().solve(equations.gradient);
-      const double decrease = step.dot(damping * scale.cwiseProduct(step) - equations.gradient);
-      if (!(decrease > negligible * noise_px_ * noise_px_)) break;
-      ++num_iterations_;
-      const Rigid3 candidate = Rigid3::exp(step) * rig_from_world_;
-      const NormalEquations next = linearize(candidate, robust);
-      const double gain = (equations.cost - next.cost) / decrease;
-      if (gain > 0.0) {
-        rig_from_world_ = candidate;
-        equations = next;
-        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-        growth = 2.0;
-      } else {
-        damping *= growth;
-        growth *= 2.0;
-      }
-    }
-    return equations;
+  /// Returns the equations at the pose reached.
+  NormalEquations<6> minimize(const PoseRobust& robust, int max_iterations, double negligible) {
+    const auto at = [&](const Rigid3& pose) { return linearize(pose, robust); };
+    const double negligible_px2 = negligible * noise_px_ * noise_px_;
+    return minimize_over_pose(rig_from_world_, at, max_iterations, negligible_px2, num_iterations_);
   }
 
   /// The part of the Hessian at the pose reached that the bearings contribute.
@@ -158,22 +126,16 @@ class PoseSolver {
   int num_iterations_ = 0;
 };
 
-struct Spread {
-  double variance = 0.0;  ///< Of a residual component.
-  double mean = 0.0;      ///< Of the residuals' length.
-};
-
-/// The gate cuts off the tail of the residuals: for a squared length s = variance * chi2(2) below
-/// the gate, E[s] = 2 * variance - gate * q / (1 - q), q = exp(-gate / (2 * variance)); solved by
-/// fixed-point iteration. The assumed noise counts as kNoisePriorStrength components.
-Spread measure_spread(const Arrays& arrays, double gate, double assumed_variance) {
+/// Variance of a residual component. The gate cuts off the tail of the residuals: for a squared
+/// length s = variance * chi2(2) below the gate, E[s] = 2 * variance - gate * q / (1 - q), q =
+/// exp(-gate / (2 * variance)); solved by fixed-point iteration. The assumed noise counts as
+/// kNoisePriorStrength components.
+double measure_variance(const Arrays& arrays, double gate, double assumed_variance) {
   double sum = 0.0;
-  double sum_of_lengths = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < arrays.observation.size(); ++i) {
     if (arrays.observation[i] == UINT32_MAX || !arrays.is_inlier[arrays.observation[i]]) continue;
     sum += arrays.squared_residual[i];
-    sum_of_lengths += std::sqrt(arrays.squared_residual[i]);
     count += 1.0;
   }
   // The pose absorbs 6 components, as many as the observations have at most.
@@ -184,15 +146,7 @@ Spread measure_spread(const Arrays& arrays, double gate, double assumed_variance
     const double q = std::exp(-gate / (2.0 * std::min(variance, assumed_variance)));
     variance = (prior + sum + count * gate * q / (1.0 - q)) / num_components;
   }
-  return {variance, count > 0.0 ? sum_of_lengths / count : 0.0};
-}
-
-/// Inverse of the information; a weak prior keeps it finite where there is none.
-Matrix6d covariance_from(Matrix6d information) {
-  const double floor = 1e-12 * information.diagonal().maxCoeff();
-  information.diagonal().array() += std::max(kPriorInformation, floor);
-  const Matrix6d inverse = information.ldlt().solve(Matrix6d::Identity());
-  return 0.5 * (inverse + inverse.transpose());
+  return variance;
 }
 
 }  // namespace
@@ -221,17 +175,15 @@ PoseEstimate optimize_pose(const Rig& rig,
     classes = classify_pose_observations(observations, gate, arrays);
   }
   const double assumed_variance = options.noise_px * options.noise_px;
-  const Spread spread = measure_spread(arrays, gate, assumed_variance);
+  const double variance = measure_variance(arrays, gate, assumed_variance);
   const Matrix6d of_bearings = solver.has_ranges() ? solver.bearing_hessian(huber) : hessian;
-  const Matrix6d information =
-      of_bearings / spread.variance + (hessian - of_bearings) / assumed_variance;
+  const Matrix6d information = of_bearings / variance + (hessian - of_bearings) / assumed_variance;
   PoseEstimate estimate;
   estimate.rig_from_world = solver.rig_from_world();
   estimate.is_inlier = arrays.is_inlier;
   estimate.num_inliers = classes.num_inliers;
-  estimate.covariance = covariance_from(information);
-  estimate.noise_measured_px = std::sqrt(spread.variance);
-  estimate.mean_residual_px = spread.mean;
+  estimate.covariance = covariance_from<6>(information);
+  estimate.noise_measured_px = std::sqrt(variance);
   estimate.num_iterations = solver.num_iterations();
   return estimate;
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "waymark/image/allocation_count.h"
+#include "waymark/image/testing/allocation_count.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/optimize/test_scene.h"
 

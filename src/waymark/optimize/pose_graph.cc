@@ -8,6 +8,7 @@
 #include <span>
 
 #include "waymark/base/check.h"
+#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/pose_graph_system.h"
 #include "waymark/optimize/robust_loss.h"
 
@@ -20,7 +21,7 @@ constexpr double kNegligibleShare = 1e-10;
 constexpr double kNegligibleDecrease = 1e-12;
 /// Damping at which no step is left to try, and that which keeps a graph without fixed nodes from
 /// drifting along with rounding.
-constexpr double kMaxDamping = 1e16;
+constexpr double kMaxGraphDamping = 1e16;
 constexpr double kMinDamping = 1e-10;
 /// Deviation from 1 of the norm of a quaternion that is still taken for a rotation.
 constexpr double kMaxNormError = 1e-3;
@@ -83,17 +84,17 @@ class PoseGraphSolver {
     summary.num_unused_edges = graph_.edges.size() - edges_.size();
     double cost = cost_at(graph_.node_from_world);
     summary.initial_cost = summary.final_cost = 0.5 * cost;
-    double damping = 1e-6;
-    double growth = 2.0;
+    Damping damping(1e-6, kMinDamping);
     bool should_linearize = true;
     while (num_slots_ > 0 && summary.num_iterations < options_.max_iterations) {
       if (should_linearize) linearize();
       ++summary.num_iterations;
-      const double decrease = damping < kMaxDamping ? system_->solve(damping) : 0.0;
+      const double decrease =
+          damping.value() < kMaxGraphDamping ? system_->solve(damping.value()) : 0.0;
       should_linearize = false;
       if (std::isfinite(decrease)) {
         if (!(decrease > kNegligibleShare * cost + kNegligibleDecrease)) {
-          summary.is_converged = damping < 1.0;
+          summary.is_converged = damping.value() < 1.0;
           break;
         }
         const std::vector<Sim3> candidate = moved();
@@ -102,15 +103,12 @@ class PoseGraphSolver {
         if (gain > 0.0) {
           graph_.node_from_world = candidate;
           cost = next_cost;
-          damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-          damping = std::max(damping, kMinDamping);
-          growth = 2.0;
+          damping.accept(gain);
           should_linearize = true;
           continue;
         }
       }
-      damping *= growth;
-      growth *= 2.0;
+      damping.reject();
     }
     summary.final_cost = 0.5 * cost;
     return summary;

@@ -70,15 +70,15 @@ Reference sum_reference(const KernelInput& input, const PoseRobust& robust) {
     Matrix23f w;
     w.row(0) = take3(input.arrays, kW00, i).cast<float>().transpose();
     w.row(1) = take3(input.arrays, kW10, i).cast<float>().transpose();
-    const Sighting sighting = sight(point);
-    const bool ahead = is_ahead(sighting, bearing);
-    const Eigen::Vector2d residual = bearing_residual(sighting, bearing, w);
+    const InverseRangePoint seen = in_inverse_range(point);
+    const bool ahead = is_ahead(seen, bearing);
+    const Eigen::Vector2d residual = bearing_residual(seen, bearing, w);
     const double squared = ahead ? residual.squaredNorm() : kGrossSquaredResidual;
     const RobustValue value = robust.loss == PoseLoss::kHuber
                                   ? huber(squared, robust.scale_px)
                                   : geman_mcclure(squared, robust.scale_px);
     const double range_scale = fields[kInverseRangeScale][i];
-    const double range = (sighting.inverse_range - fields[kInverseRange][i]) * range_scale;
+    const double range = (seen.inverse_range - fields[kInverseRange][i]) * range_scale;
     const RobustValue range_value = geman_mcclure(range * range, robust.scale_px);
     const double weight = fields[kWeight][i];
     sum.cost += weight * (value.loss + range_value.loss);
@@ -86,11 +86,11 @@ Reference sum_reference(const KernelInput& input, const PoseRobust& robust) {
     Eigen::Matrix<double, 3, 6> by_point;
     by_point.leftCols<3>().setIdentity();
     by_point.rightCols<3>() = -skew(point);
-    const Eigen::Matrix<double, 2, 6> rows = bearing_residual_by_point(sighting, w) * by_point;
+    const Eigen::Matrix<double, 2, 6> rows = bearing_residual_by_point(seen, w) * by_point;
     sum.hessian += weight * value.weight * rows.transpose() * rows;
     sum.gradient += weight * value.weight * rows.transpose() * residual;
     const Eigen::Matrix<double, 1, 6> row =
-        range_residual_by_point(sighting, 1.0) * range_scale * by_point;
+        range_residual_by_point(seen, 1.0) * range_scale * by_point;
     sum.hessian += weight * range_value.weight * row.transpose() * row;
     sum.gradient += weight * range_value.weight * row.transpose() * range;
   }
@@ -139,13 +139,14 @@ TEST(PoseKernelResiduals, AreThoseOfTheScalarReference) {
   KernelInput input = make_input();
   compute_squared_residuals(input.arrays, input.segment, input.cam_from_world);
   for (std::size_t i = 0; i < 45; ++i) {
-    const Sighting sighting = sight(input.cam_from_world * take3(input.arrays, kPointX, i));
+    const InverseRangePoint seen =
+        in_inverse_range(input.cam_from_world * take3(input.arrays, kPointX, i));
     Matrix23f w;
     w.row(0) = take3(input.arrays, kW00, i).cast<float>().transpose();
     w.row(1) = take3(input.arrays, kW10, i).cast<float>().transpose();
     const Eigen::Vector3f bearing = take3(input.arrays, kBearingX, i).cast<float>();
-    const double expected = is_ahead(sighting, bearing)
-                                ? bearing_residual(sighting, bearing, w).squaredNorm()
+    const double expected = is_ahead(seen, bearing)
+                                ? bearing_residual(seen, bearing, w).squaredNorm()
                                 : kGrossSquaredResidual;
     EXPECT_NEAR(input.arrays.squared_residual[i], expected, 1e-9 * (1.0 + expected));
   }

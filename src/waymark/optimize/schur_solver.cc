@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/optimize/block_cholesky.h"
+#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
 #include "waymark/optimize/schur_plan.h"
@@ -24,15 +25,15 @@ constexpr double kMaxDamping = 1e12;
 constexpr double kMinDiagonal = 1e-6;
 constexpr double kMaxDiagonal = 1e32;
 
-/// Rotation matrices ready for use.
-struct Frame {
+/// A Rigid3 with its rotation as a matrix, ready to be applied often.
+struct RigidMatrix {
   Eigen::Matrix3d rotation;
   Eigen::Vector3d translation;
 };
 
-Frame frame_of(const Rigid3& pose) { return {pose.rotation_matrix(), pose.translation}; }
+RigidMatrix matrix_of(const Rigid3& pose) { return {pose.rotation_matrix(), pose.translation}; }
 
-inline Eigen::Vector3d apply(const Frame& b_from_a, const Eigen::Vector3d& point_in_a) {
+inline Eigen::Vector3d apply(const RigidMatrix& b_from_a, const Eigen::Vector3d& point_in_a) {
   Eigen::Vector3d point_in_b = b_from_a.translation;
   point_in_b.noalias() += b_from_a.rotation * point_in_a;
   return point_in_b;
@@ -41,7 +42,7 @@ inline Eigen::Vector3d apply(const Frame& b_from_a, const Eigen::Vector3d& point
 /// What the solver moves.
 struct State {
   std::vector<Rigid3> rig_from_world;
-  std::vector<Frame> frames;  // The same.
+  std::vector<RigidMatrix> matrices;  // The same.
   std::vector<Eigen::Vector3d> points;
 };
 
@@ -93,7 +94,7 @@ class SchurSolver {
         reduced_(plan_.num_slots, plan_.pattern) {
     state_.rig_from_world = problem.rig_from_world;
     state_.points = problem.points;
-    for (const Rigid3& pose : state_.rig_from_world) state_.frames.push_back(frame_of(pose));
+    for (const Rigid3& pose : state_.rig_from_world) state_.matrices.push_back(matrix_of(pose));
     list_cameras();
     candidate_ = state_;
     allocate();
@@ -104,7 +105,7 @@ class SchurSolver {
 
  private:
   void list_cameras();
-  const Frame& camera_of(const BundleObservation& observation) const {
+  const RigidMatrix& camera_of(const BundleObservation& observation) const {
     return cameras_[first_camera_[observation.pose] + observation.camera];
   }
   void allocate();
@@ -123,7 +124,7 @@ class SchurSolver {
   const BundleProblem& problem_;
   const BundleOptions& options_;
   const SchurPlan plan_;
-  std::vector<Frame> cameras_;             // Of each rig.
+  std::vector<RigidMatrix> cameras_;       // Of each rig.
   std::vector<std::size_t> first_camera_;  // Of the rig of each pose.
   State state_;
   State candidate_;
@@ -143,7 +144,7 @@ void SchurSolver::list_cameras() {
     if (at == listed.end()) {
       at = listed.insert(at, {rig, cameras_.size()});
       for (const RigCamera& camera : rig->cameras)
-        cameras_.push_back(frame_of(camera.cam_from_rig));
+        cameras_.push_back(matrix_of(camera.cam_from_rig));
     }
     first_camera_.push_back(at->second);
   }
@@ -172,18 +173,18 @@ double SchurSolver::cost(const State& state) const {
   for (const std::uint32_t i : plan_.observations) {
     const BundleObservation& observation = problem_.observations[i];
     const Eigen::Vector3d point_in_rig =
-        apply(state.frames[observation.pose], state.points[observation.point]);
-    const Sighting sighting = sight(apply(camera_of(observation), point_in_rig));
-    if (!is_ahead(sighting, observation.bearing)) {
+        apply(state.matrices[observation.pose], state.points[observation.point]);
+    const InverseRangePoint seen = in_inverse_range(apply(camera_of(observation), point_in_rig));
+    if (!is_ahead(seen, observation.bearing)) {
       sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
       continue;
     }
     const Eigen::Vector2d residual =
-        bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);
+        bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing);
     sum += huber(residual.squaredNorm(), options_.huber_px).loss;
     if (observation.inverse_range_sigma > 0.0f) {
       const double range =
-          range_residual(sighting, observation.inverse_range, observation.inverse_range_sigma);
+          range_residual(seen, observation.inverse_range, observation.inverse_range_sigma);
       sum += huber(range * range, options_.range_huber).loss;
     }
   }
@@ -198,7 +199,7 @@ void SchurSolver::accumulate(const Rows<kRows>& rows,
   using Rows3 = Eigen::Matrix<double, kRows, 3>;
   const BundleObservation& observation = problem_.observations[plan_.observations[k]];
   const Rows3 by_rig = rows.by_point_in_cam * camera_of(observation).rotation;
-  const Rows3 by_point = by_rig * state_.frames[observation.pose].rotation;
+  const Rows3 by_point = by_rig * state_.matrices[observation.pose].rotation;
   blocks_.points[entry].noalias() += by_point.transpose() * by_point;
   blocks_.point_gradient[entry].noalias() += by_point.transpose() * rows.residual;
   const std::uint32_t link = plan_.link_of_observation[k];
@@ -218,24 +219,23 @@ void SchurSolver::accumulate(const Rows<kRows>& rows,
 void SchurSolver::linearize_observation(std::size_t entry, std::size_t k) {
   const BundleObservation& observation = problem_.observations[plan_.observations[k]];
   const Eigen::Vector3d point_in_rig =
-      apply(state_.frames[observation.pose], state_.points[observation.point]);
-  const Sighting sighting = sight(apply(camera_of(observation), point_in_rig));
-  if (!is_ahead(sighting, observation.bearing)) return;
+      apply(state_.matrices[observation.pose], state_.points[observation.point]);
+  const InverseRangePoint seen = in_inverse_range(apply(camera_of(observation), point_in_rig));
+  if (!is_ahead(seen, observation.bearing)) return;
   const Eigen::Vector2d residual =
-      bearing_residual(sighting, observation.bearing, observation.level_pixel_from_bearing);
+      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing);
   const double root = std::sqrt(huber(residual.squaredNorm(), options_.huber_px).weight);
-  const Matrix23d by_point =
-      bearing_residual_by_point(sighting, observation.level_pixel_from_bearing);
+  const Matrix23d by_point = bearing_residual_by_point(seen, observation.level_pixel_from_bearing);
   if (!(observation.inverse_range_sigma > 0.0f)) {
     accumulate<2>({root * residual, root * by_point}, entry, k, point_in_rig);
     return;
   }
   const double sigma = observation.inverse_range_sigma;
-  const double range = range_residual(sighting, observation.inverse_range, sigma);
+  const double range = range_residual(seen, observation.inverse_range, sigma);
   const double range_root = std::sqrt(huber(range * range, options_.range_huber).weight);
   Rows<3> rows;
   rows.residual << root * residual, range_root * range;
-  rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(sighting, sigma);
+  rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(seen, sigma);
   accumulate<3>(rows, entry, k, point_in_rig);
 }
 
@@ -306,7 +306,7 @@ double SchurSolver::substitute_back(double damping) {
     const Vector6d step = -reduced_gradient_.segment<6>(static_cast<Eigen::Index>(6 * slot));
     promise(step, blocks_.pose_gradient[slot], blocks_.poses[slot].diagonal());
     candidate_.rig_from_world[pose] = Rigid3::exp(step) * state_.rig_from_world[pose];
-    candidate_.frames[pose] = frame_of(candidate_.rig_from_world[pose]);
+    candidate_.matrices[pose] = matrix_of(candidate_.rig_from_world[pose]);
   }
   for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
     Eigen::Vector3d gradient = blocks_.point_gradient[entry];
@@ -322,38 +322,35 @@ double SchurSolver::substitute_back(double damping) {
   return 0.5 * decrease;
 }
 
-/// Damping after Madsen, Nielsen & Tingleff 2004, 3.2, relative to the diagonal (Marquardt 1963).
 BundleRound SchurSolver::minimize() {
   BundleRound round;
   round.initial_cost = round.final_cost = cost(state_);
-  double damping = kInitialDamping;
-  double growth = 2.0;
+  Damping damping(kInitialDamping);
   bool is_linearized = false;
-  while (round.num_iterations < options_.max_iterations_per_round && damping < kMaxDamping) {
+  while (round.num_iterations < options_.max_iterations_per_round &&
+         damping.value() < kMaxDamping) {
     if (!is_linearized) linearize();
     is_linearized = true;
     ++round.num_iterations;
-    eliminate_points(damping);
+    eliminate_points(damping.value());
     double gain = -1.0;
     double candidate_cost = round.final_cost;
     if (reduced_.factorize()) {
       reduced_.solve_in_place(reduced_gradient_);
-      const double promised = substitute_back(damping);
+      const double promised = substitute_back(damping.value());
       if (!(promised > 1e-3 * options_.relative_cost_tolerance * round.final_cost)) break;
       candidate_cost = cost(candidate_);
       gain = (round.final_cost - candidate_cost) / promised;
     }
     if (!(gain > 0.0)) {
-      damping *= growth;
-      growth *= 2.0;
+      damping.reject();
       continue;
     }
     std::swap(state_, candidate_);
     const double decrease = round.final_cost - candidate_cost;
     round.final_cost = candidate_cost;
     if (decrease < options_.relative_cost_tolerance * candidate_cost) break;
-    damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-    growth = 2.0;
+    damping.accept(gain);
     is_linearized = false;
   }
   return round;

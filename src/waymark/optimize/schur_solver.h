@@ -9,8 +9,7 @@
 
 namespace waymark {
 
-/// One round of bundle adjustment: what both solvers take and give. Costs are half the robust
-/// sum over the used observations.
+/// One round of bundle adjustment. Costs are half the robust sum over the used observations.
 struct BundleRound {
   double initial_cost = 0.0;
   double final_cost = 0.0;

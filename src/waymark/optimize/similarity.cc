@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/optimize/similarity.h"
 
-#include <Eigen/Cholesky>
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,6 +10,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
+#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/robust_loss.h"
 
@@ -20,24 +20,22 @@ namespace {
 /// Fewer do not determine a similarity.
 constexpr std::size_t kMinMatches = 3;
 /// Scales of the losses in units of the noise.
-constexpr double kFinalScale = 3.0;
-constexpr double kHuberScale = 2.5;
+constexpr double kSimilarityFinalScale = 3.0;
+constexpr double kSimilarityHuberScale = 2.5;
 /// The scale shrinks by this factor from stage to stage.
-constexpr double kAnnealing = 0.5;
-constexpr int kIterationsPerStage = 3;
-constexpr int kIterationsPerRound = 10;
-constexpr int kNumRounds = 3;
+constexpr double kSimilarityAnnealing = 0.5;
+constexpr int kSimilarityIterationsPerStage = 3;
+constexpr int kSimilarityIterationsPerRound = 10;
+constexpr int kNumSimilarityRounds = 3;
 /// Iterations end when the next step would lower the cost by less than this, in units of the
 /// squared noise.
-constexpr double kNegligibleDecrease = 1e-6;
+constexpr double kNegligibleSimilarityDecrease = 1e-6;
 /// Noise of the logarithm of a ratio of ranges: as assumed until it is measured, and its bounds.
 constexpr double kAssumedRangeNoise = 0.1;
 constexpr double kMinRangeNoise = 0.002;
 constexpr double kMaxRangeNoise = 0.5;
 /// Standard deviation of a normal distribution by its median absolute deviation.
 constexpr double kSigmaFromMedian = 1.4826;
-/// Prior information that keeps the covariance finite.
-constexpr double kPriorInformation = 1e-6;
 
 using Indices = std::span<const std::uint32_t>;
 
@@ -51,20 +49,14 @@ struct Loss {
   }
 };
 
-struct NormalEquations {
-  Matrix7d hessian = Matrix7d::Zero();
-  Vector7d gradient = Vector7d::Zero();
-  double cost = 0.0;
-};
-
 /// The similarity of one set of matches.
 class SimilaritySolver {
  public:
   SimilaritySolver(const LandmarkMatches& matches, const SimilarityOptions& options)
       : matches_(matches), options_(options) {}
 
-  NormalEquations linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
-    NormalEquations equations;
+  NormalEquations<7> linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
+    NormalEquations<7> equations;
     for (const std::uint32_t index : indices) {
       const auto residual = similarity_residual(b_from_a, matches_, index);
       if (!residual) {
@@ -88,49 +80,22 @@ class SimilaritySolver {
     return equations;
   }
 
-  /// Levenberg-Marquardt with the damping of Madsen, Nielsen & Tingleff 2004, 3.2; returns the
-  /// equations at the similarity reached.
-  NormalEquations minimize(Sim3& b_from_a,
-                           Indices indices,
-                           const Loss& loss,
-                           int max_iterations) const {
-    const double negligible = kNegligibleDecrease * options_.noise_px * options_.noise_px;
-    NormalEquations equations = linearize(b_from_a, indices, loss);
-    double damping = 1e-6;
-    double growth = 2.0;
-    for (int iteration = 0; iteration < max_iterations; ++iteration) {
-      const Vector7d scale = equations.hessian.diagonal().array() + kPriorInformation;
-      Matrix7d damped = equations.hessian;
-      damped.diagonal() += damping * scale;
-      damped.diagonal().array() += kPriorInformation;
-      const Vector7d step = -damped.ldlt().solve(equations.gradient);
-      const double decrease = step.dot(damping * scale.cwiseProduct(step) - equations.gradient);
-      if (!(decrease > negligible) || !step.allFinite()) break;
-      const Sim3 candidate = Sim3::exp(step) * b_from_a;
-      const NormalEquations next = linearize(candidate, indices, loss);
-      const double gain = (equations.cost - next.cost) / decrease;
-      if (gain > 0.0) {
-        b_from_a = candidate;
-        equations = next;
-        damping *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-        growth = 2.0;
-      } else {
-        damping *= growth;
-        growth *= 2.0;
-      }
-    }
-    return equations;
+  void minimize(Sim3& b_from_a, Indices indices, const Loss& loss, int max_iterations) const {
+    const auto at = [&](const Sim3& similarity) { return linearize(similarity, indices, loss); };
+    const double negligible = kNegligibleSimilarityDecrease * options_.noise_px * options_.noise_px;
+    int num_iterations = 0;
+    minimize_over_pose(b_from_a, at, max_iterations, negligible, num_iterations);
   }
 
   /// Runs through Geman-McClure losses from the width of the residuals at hand to that of the
   /// noise.
   void anneal(Sim3& b_from_a, Indices indices) const {
-    const double final_scale = kFinalScale * options_.noise_px;
+    const double final_scale = kSimilarityFinalScale * options_.noise_px;
     double scale = std::max(final_scale, median_residual(b_from_a, indices));
-    for (; scale > final_scale; scale *= kAnnealing) {
-      minimize(b_from_a, indices, {geman_mcclure, scale}, kIterationsPerStage);
+    for (; scale > final_scale; scale *= kSimilarityAnnealing) {
+      minimize(b_from_a, indices, {geman_mcclure, scale}, kSimilarityIterationsPerStage);
     }
-    minimize(b_from_a, indices, {geman_mcclure, final_scale}, kIterationsPerRound);
+    minimize(b_from_a, indices, {geman_mcclure, final_scale}, kSimilarityIterationsPerRound);
   }
 
   std::vector<std::uint32_t> inliers(const Sim3& b_from_a) const {
@@ -161,7 +126,7 @@ class SimilaritySolver {
   /// In units of the bearings' noise, and under the same loss.
   void add_range(const SimilarityResidual& residual,
                  const Loss& loss,
-                 NormalEquations& equations) const {
+                 NormalEquations<7>& equations) const {
     const double factor = options_.noise_px / range_noise_;
     const double value = factor * residual.log_range_ratio;
     const Vector7d by_similarity = factor * residual.log_range_jacobian.transpose();
@@ -225,7 +190,7 @@ class SimilarityEstimator {
     constexpr int kMaxIterations = 3;
     if (nearby.size() <= kSampleSize) return std::nullopt;
     Sim3 b_from_a = model.b_from_a;
-    const Loss loss = {geman_mcclure, kFinalScale * options_.noise_px};
+    const Loss loss = {geman_mcclure, kSimilarityFinalScale * options_.noise_px};
     SimilaritySolver(matches_, options_).minimize(b_from_a, nearby, loss, kMaxIterations);
     return model_of(b_from_a);
   }
@@ -236,14 +201,6 @@ class SimilarityEstimator {
   const LandmarkMatches& matches_;
   const SimilarityOptions& options_;
 };
-
-Matrix7d covariance_from(Matrix7d information, bool is_scale_free) {
-  const double floor = 1e-12 * information.diagonal().maxCoeff();
-  information.diagonal().array() += std::max(kPriorInformation, floor);
-  Matrix7d inverse = information.ldlt().solve(Matrix7d::Identity());
-  if (!is_scale_free) inverse(6, 6) = 0.0;
-  return 0.5 * (inverse + inverse.transpose());
-}
 
 }  // namespace
 
@@ -259,18 +216,18 @@ SimilarityEstimate refine_similarity(const LandmarkMatches& matches,
                                      const Sim3& initial_b_from_a,
                                      const SimilarityOptions& options) {
   SimilaritySolver solver(matches, options);
-  const Loss huber_loss = {huber, kHuberScale * options.noise_px};
+  const Loss huber_loss = {huber, kSimilarityHuberScale * options.noise_px};
   SimilarityEstimate estimate;
   estimate.b_from_a = initial_b_from_a;
   std::vector<std::uint32_t> indices(matches.size());
   std::iota(indices.begin(), indices.end(), 0u);
   if (indices.size() >= kMinMatches) solver.anneal(estimate.b_from_a, indices);
   indices = solver.inliers(estimate.b_from_a);
-  for (int round = 0; round < kNumRounds && indices.size() >= kMinMatches; ++round) {
+  for (int round = 0; round < kNumSimilarityRounds && indices.size() >= kMinMatches; ++round) {
     if (options.is_scale_free) {
       estimate.range_noise = solver.measure_range_noise(estimate.b_from_a, indices);
     }
-    solver.minimize(estimate.b_from_a, indices, huber_loss, kIterationsPerRound);
+    solver.minimize(estimate.b_from_a, indices, huber_loss, kSimilarityIterationsPerRound);
     auto next = solver.inliers(estimate.b_from_a);
     const bool is_settled = next == indices;
     indices = std::move(next);
@@ -286,9 +243,9 @@ SimilarityEstimate refine_similarity(const LandmarkMatches& matches,
   if (!indices.empty()) {
     estimate.mean_squared_residual_px2 /= static_cast<double>(indices.size());
   }
-  const NormalEquations last = solver.linearize(estimate.b_from_a, indices, huber_loss);
-  estimate.covariance =
-      covariance_from(last.hessian / (options.noise_px * options.noise_px), options.is_scale_free);
+  const NormalEquations<7> last = solver.linearize(estimate.b_from_a, indices, huber_loss);
+  estimate.covariance = covariance_from<7>(last.hessian / (options.noise_px * options.noise_px));
+  if (!options.is_scale_free) estimate.covariance(6, 6) = 0.0;
   return estimate;
 }
 

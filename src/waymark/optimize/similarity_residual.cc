@@ -12,19 +12,19 @@ namespace {
 
 /// One camera's view of the other's landmark.
 struct SideView {
-  Sighting sighting;
+  InverseRangePoint seen;
   Eigen::Vector2d residual;
 };
 
 std::optional<SideView> view(const Eigen::Vector3d& point_in_cam,
                              const LandmarkMatches::Side& side,
                              std::size_t index) {
-  const Sighting sighting = sight(point_in_cam);
-  if (!is_ahead(sighting, side.bearing[index])) return std::nullopt;
+  const InverseRangePoint seen = in_inverse_range(point_in_cam);
+  if (!is_ahead(seen, side.bearing[index])) return std::nullopt;
   const Eigen::Vector2d residual =
-      bearing_residual(sighting, side.bearing[index], side.level_pixel_from_bearing[index]);
+      bearing_residual(seen, side.bearing[index], side.level_pixel_from_bearing[index]);
   if (!residual.allFinite()) return std::nullopt;
-  return SideView{sighting, residual};
+  return SideView{seen, residual};
 }
 
 /// Of a point by a left perturbation that acts on it: rho + phi x p + sigma p.
@@ -48,15 +48,15 @@ std::optional<SimilarityResidual> similarity_residual(const Sim3& b_from_a,
   SimilarityResidual result;
   result.value << in_b->residual, in_a->residual;
   result.jacobian.topRows<2>() =
-      bearing_residual_by_point(in_b->sighting, matches.b.level_pixel_from_bearing[index]) *
+      bearing_residual_by_point(in_b->seen, matches.b.level_pixel_from_bearing[index]) *
       point_by_perturbation(point_in_b);
   // (exp(xi) S)^-1 p = S^-1 (exp(-xi) p).
   const Matrix23d by_point_in_b =
-      bearing_residual_by_point(in_a->sighting, matches.a.level_pixel_from_bearing[index]) *
+      bearing_residual_by_point(in_a->seen, matches.a.level_pixel_from_bearing[index]) *
       (a_from_b.scale * a_from_b.rotation.toRotationMatrix());
   result.jacobian.bottomRows<2>() = -by_point_in_b * point_by_perturbation(from_b);
-  result.log_range_ratio = -std::log(from_b.norm() * in_b->sighting.inverse_range);
-  result.log_range_jacobian = in_b->sighting.inverse_range * in_b->sighting.direction.transpose() *
+  result.log_range_ratio = -std::log(from_b.norm() * in_b->seen.inverse_range);
+  result.log_range_jacobian = in_b->seen.inverse_range * in_b->seen.direction.transpose() *
                               point_by_perturbation(point_in_b);
   if (!std::isfinite(result.log_range_ratio)) return std::nullopt;
   return result;

@@ -77,40 +77,17 @@ void Canvas::draw_line(const Eigen::Vector2d& from_m,
            kShift);
 }
 
-namespace {
-
-/// Texels [x0, x1) x [y0, y1) of an area, at least one each way unless outside of the image.
-struct TexelRange {
-  int x0, y0, x1, y1;
-};
-
-TexelRange texels_of(const Area& area_m, const Image& image, double texel_m) {
-  const auto low = [&](double value) {
-    return static_cast<int>(std::floor(value / texel_m + 0.5));
-  };
-  const int x0 = low(area_m.min.x());
-  const int y0 = low(area_m.min.y());
-  return {std::clamp(x0, 0, image.width_px),
-          std::clamp(y0, 0, image.height_px),
-          std::clamp(std::max(low(area_m.max.x()), x0 + 1), 0, image.width_px),
-          std::clamp(std::max(low(area_m.max.y()), y0 + 1), 0, image.height_px)};
-}
-
-}  // namespace
-
 void Canvas::fill_area(const Area& area_m, int grey) {
-  const TexelRange range = texels_of(area_m, image_, texel_m_);
-  for (int y = range.y0; y < range.y1; ++y) {
-    std::fill(
-        image_.row(y) + range.x0, image_.row(y) + std::max(range.x0, range.x1), to_grey(grey));
-  }
-}
-
-void Canvas::shift_area(const Area& area_m, int change) {
-  const TexelRange range = texels_of(area_m, image_, texel_m_);
-  for (int y = range.y0; y < range.y1; ++y) {
-    std::uint8_t* row = image_.row(y);
-    for (int x = range.x0; x < range.x1; ++x) row[x] = to_grey(row[x] + change);
+  const auto texel = [&](double value) {
+    return static_cast<int>(std::floor(value / texel_m_ + 0.5));
+  };
+  // At least one each way.
+  const int x0 = texel(area_m.min.x()), y0 = texel(area_m.min.y());
+  const int x1 = std::min(std::max(texel(area_m.max.x()), x0 + 1), image_.width_px);
+  const int y1 = std::min(std::max(texel(area_m.max.y()), y0 + 1), image_.height_px);
+  for (int y = std::max(y0, 0); y < y1; ++y) {
+    if (x1 > x0)
+      std::fill(image_.row(y) + std::max(x0, 0), image_.row(y) + std::max(x1, 0), to_grey(grey));
   }
 }
 

@@ -31,8 +31,6 @@ class Canvas {
                  const Eigen::Vector2d& to_m,
                  double width_m,
                  int grey);
-  /// Adds change to the texels of the area.
-  void shift_area(const Area& area_m, int change);
 
   int grey_at(const Eigen::Vector2d& point_m) const;
   double texel_m() const { return texel_m_; }

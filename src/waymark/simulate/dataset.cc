@@ -8,9 +8,9 @@
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
 
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/io/atomic_file.h"
-#include "waymark/io/trajectory.h"
+#include "waymark/exchange/trajectory.h"
 
 namespace waymark {
 namespace {

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/io/testing/temporary_folder.h"
+#include "waymark/base/testing/temporary_folder.h"
 
 namespace waymark {
 namespace {

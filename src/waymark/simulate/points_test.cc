@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/points.h"
+#include "waymark/simulate/testing/points.h"
 
 #include <gtest/gtest.h>
 

@@ -4,13 +4,12 @@
 
 #include <numbers>
 
-#include "waymark/base/check.h"
 #include "waymark/geometry/so3.h"
 
 namespace waymark {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 constexpr double kDepthFactor = 5000.0;
 
 CameraDescription pinhole(int width_px, int height_px, double focal_px) {
@@ -36,7 +35,7 @@ CameraDescription distorted(int index) {
 
 /// Cameras side by side, camera 1 to the right, turned by a rotation vector in degrees.
 Rigid3 beside(double baseline_m, const Eigen::Vector3d& turn_deg) {
-  const Eigen::Quaterniond cam1_from_cam0 = so3_exp(-kRadPerDeg * turn_deg);
+  const Eigen::Quaterniond cam1_from_cam0 = so3_exp(-kRadPerDegree * turn_deg);
   return {cam1_from_cam0, -(cam1_from_cam0 * Eigen::Vector3d(baseline_m, 0.0, 0.0))};
 }
 
@@ -137,15 +136,6 @@ std::vector<SuiteEntry> simulated_suite() {
        "mono",
        "exposure jumps by 1/6 and 3, two seconds dark and noisy"},
   };
-}
-
-SuiteEntry find_suite_entry(const std::string& name) {
-  std::string known;
-  for (const SuiteEntry& entry : simulated_suite()) {
-    if (entry.spec.name == name) return entry;
-    known += (known.empty() ? "" : ", ") + entry.spec.name;
-  }
-  throw InputError("sequence '" + name + "'", "unknown, expected one of " + known);
 }
 
 }  // namespace waymark

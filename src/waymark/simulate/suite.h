@@ -19,7 +19,4 @@ struct SuiteEntry {
 /// Ten fixed sequences. They are a yardstick: they never change for the sake of a result.
 std::vector<SuiteEntry> simulated_suite();
 
-/// The entry of that name; throws InputError for an unknown one.
-SuiteEntry find_suite_entry(const std::string& name);
-
 }  // namespace waymark

@@ -13,7 +13,7 @@ constexpr std::size_t kInboxCapacity = 8;
 }  // namespace
 
 MapWorker::MapWorker(Timing timing, Work work)
-    : timing_(timing), work_(std::move(work)), feed_(timing, 0), inbox_(kInboxCapacity) {
+    : timing_(timing), work_(std::move(work)), feed_(timing), inbox_(kInboxCapacity) {
   if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run(); });
 }
 

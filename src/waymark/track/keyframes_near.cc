@@ -11,7 +11,7 @@ namespace {
 
 /// Of so many nearest keyframes, those that see what the rig should see are wanted.
 constexpr std::size_t kNumNearest = 40;
-/// What was seen from elsewhere does not look alike from here.
+/// What was seen from elsewhere does not look alike from here (Mur-Artal et al. 2015, V.D).
 constexpr double kMinDirectionCos = 0.5;
 
 std::vector<KeyframeId> nearest(const Map& map, SubmapId submap, const Eigen::Vector3d& centre) {

@@ -1,0 +1,68 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <array>
+#include <cstdint>
+#include <map>
+#include <string>
+#include <vector>
+
+#include "waymark/camera/description.h"
+#include "waymark/exchange/trajectory.h"
+#include "waymark/map/map.h"
+#include "waymark/mapfile/map_file.h"
+
+namespace waymark {
+
+/// Camera 0 of the keyframes of a sub-map in the world, by time.
+std::vector<StampedPose> keyframe_trajectory(const Map& map, SubmapId submap);
+
+inline constexpr std::uint32_t kNoPoint = UINT32_MAX;  ///< In place of the index of a point: none.
+
+/// What camera 0 of a keyframe saw, or a part of it.
+struct ExportView {
+  std::string name;        ///< Of its image file.
+  std::string mask_name;   ///< Of the mask that belongs to it; empty if everything is seen.
+  KeyframeId keyframe;     ///< Whose it is.
+  std::size_t camera = 0;  ///< Index in ExportScene::cameras.
+  Rigid3 cam_from_world;   ///< In metres (map units where the scale is free).
+  std::vector<Eigen::Vector2d> pixels;  ///< Of its features.
+  std::vector<std::uint32_t> points;    ///< Per feature the index in ExportScene::points, or none.
+};
+
+/// A view that sees a point.
+struct ExportSighting {
+  std::uint32_t view = 0;     ///< Index in ExportScene::views.
+  std::uint32_t feature = 0;  ///< Index in its pixels.
+};
+
+/// A landmark.
+struct ExportPoint {
+  LandmarkId landmark;  ///< Which one of the map.
+  /// In metres (map units where the scale is free).
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
+  std::array<std::uint8_t, 3> color = {128, 128, 128};  ///< Red, green, blue.
+  double error_px = 0.0;                                ///< Mean reprojection error.
+  std::vector<ExportSighting> sightings;                ///< Two at least.
+};
+
+/// A sub-map as other programs know maps: cameras, views with features, points with tracks.
+struct ExportScene {
+  std::vector<CameraDescription> cameras;  ///< Of the views; equal ones once.
+  std::vector<ExportView> views;           ///< By id of the keyframe.
+  std::vector<ExportPoint> points;         ///< By id of the landmark.
+};
+
+/// A sub-map in these terms. Sightings that are off by more than kMaxExportErrorPx are left out,
+/// and points that are then seen by fewer than two views. Points are coloured as the images show
+/// them where there are images (broken ones count as none), else grey. InputError for cameras that
+/// carry no description.
+ExportScene make_export_scene(const Map& map, SubmapId submap, const KeyframeImages& images = {});
+
+/// Features far up the pyramid may be off by more of the image's pixels than tools for dense
+/// reconstruction expect: 4 px is where COLMAP draws the line, too (its filter_max_reproj_error).
+inline constexpr double kMaxExportErrorPx = 4.0;
+
+}  // namespace waymark

@@ -1,0 +1,318 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/exchange/export_split.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <utility>
+
+#include "waymark/base/atomic_file.h"
+#include "waymark/base/check.h"
+#include "waymark/camera/perspective.h"
+#include "waymark/camera/pixel_angles.h"
+#include "waymark/input/decode.h"
+
+namespace waymark {
+namespace {
+
+constexpr double kOffAxisRad = 55.0 * std::numbers::pi / 180.0;
+constexpr int kMinSizePx = 64;
+constexpr int kMaxPartSizePx = 4096;
+
+Eigen::Quaterniond turn(double angle_rad, const Eigen::Vector3d& axis) {
+  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis));
+}
+
+/// How the parts stand in the camera.
+std::vector<Eigen::Quaterniond> parts_from_camera(bool is_whole_sphere, int num_views) {
+  constexpr double kPi = std::numbers::pi;
+  const bool is_cube = is_whole_sphere && num_views == 6;
+  const int num_ring = is_cube ? 4 : is_whole_sphere ? num_views : num_views - 1;
+  std::vector<Eigen::Quaterniond> camera_from_part;
+  if (!is_whole_sphere) camera_from_part.push_back(Eigen::Quaterniond::Identity());
+  for (int i = 0; i < num_ring; ++i) {
+    const double angle = 2.0 * kPi * i / num_ring;
+    camera_from_part.push_back(is_whole_sphere
+                                   ? turn(angle, Eigen::Vector3d::UnitY())
+                                   : turn(kOffAxisRad, {-std::sin(angle), std::cos(angle), 0.0}));
+  }
+  if (is_cube) {
+    camera_from_part.push_back(turn(0.5 * kPi, Eigen::Vector3d::UnitX()));
+    camera_from_part.push_back(turn(-0.5 * kPi, Eigen::Vector3d::UnitX()));
+  }
+  for (Eigen::Quaterniond& rotation : camera_from_part) rotation = rotation.conjugate();
+  return camera_from_part;
+}
+
+PerspectiveModel perspective_of(const SplitPart& part) {
+  const double focal_px = 0.5 * part.size_px;  // 45 degrees from the centre to the rim.
+  const double center_px = 0.5 * (part.size_px - 1);
+  return {{focal_px, focal_px}, {center_px, center_px}};
+}
+
+CameraDescription describe(const SplitPart& part) {
+  const PerspectiveModel model = perspective_of(part);
+  CameraDescription description;
+  description.camera_model = "pinhole";
+  description.intrinsics = {
+      model.focal_px().x(), model.focal_px().y(), model.center_px().x(), model.center_px().y()};
+  description.width_px = description.height_px = part.size_px;
+  return description;
+}
+
+/// Where the pixels of a part lie in the wide image.
+struct Lookup {
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<std::uint8_t> is_visible;
+};
+
+Lookup make_lookup(const SplitPart& part) {
+  const PerspectiveModel model = perspective_of(part);
+  const Eigen::Quaterniond camera_from_part = part.part_from_camera.conjugate();
+  std::vector<Eigen::Vector3d> bearings;
+  for (int y = 0; y < part.size_px; ++y) {
+    for (int x = 0; x < part.size_px; ++x) {
+      bearings.push_back(camera_from_part * *model.unproject(Eigen::Vector2d(x, y)));
+    }
+  }
+  Lookup lookup{std::vector<Eigen::Vector2d>(bearings.size()),
+                std::vector<std::uint8_t>(bearings.size())};
+  part.camera->project(bearings, lookup.pixels, lookup.is_visible);
+  return lookup;
+}
+
+std::vector<SplitPart> parts_of(std::shared_ptr<const Camera> camera, int num_views) {
+  const int size_px = std::clamp(static_cast<int>(std::lround(2.0 / central_pixel_angle(*camera))),
+                                 kMinSizePx,
+                                 kMaxPartSizePx);
+  std::vector<SplitPart> parts;
+  for (const Eigen::Quaterniond& rotation :
+       parts_from_camera(camera->wrap_width_px() > 0.0, num_views)) {
+    SplitPart part{camera, rotation, size_px};
+    const std::vector<std::uint8_t> is_visible = make_lookup(part).is_visible;
+    part.sees_all = std::find(is_visible.begin(), is_visible.end(), 0) == is_visible.end();
+    parts.push_back(std::move(part));
+  }
+  return parts;
+}
+
+bool is_perspective(const CameraDescription& camera) {
+  return camera.camera_model == "pinhole" && camera.distortion_model != "equidistant";
+}
+
+class Splitter {
+ public:
+  Splitter(const ExportScene& scene, int num_views, const CameraRegistry& registry)
+      : scene_(scene) {
+    for (const CameraDescription& camera : scene.cameras) {
+      std::vector<SplitPart> parts;
+      if (!is_perspective(camera)) parts = parts_of(registry.make_camera(camera), num_views);
+      first_camera_.push_back(result_.scene.cameras.size());
+      result_.scene.cameras.push_back(parts.empty() ? camera : describe(parts.front()));
+      parts_.push_back(std::move(parts));
+    }
+  }
+
+  SplitScene split();
+
+ private:
+  void keep(const ExportView& view);
+  void add_part(const ExportView& view,
+                const std::vector<Eigen::Vector3d>& bearings,
+                const std::vector<std::uint8_t>& has_bearing,
+                std::size_t part);
+  void finish_points();
+
+  const ExportScene& scene_;
+  std::vector<std::vector<SplitPart>> parts_;  // Per camera; none where it is perspective.
+  std::vector<std::size_t> first_camera_;
+  SplitScene result_;
+};
+
+SplitScene Splitter::split() {
+  for (const ExportView& view : scene_.views) {
+    const std::vector<SplitPart>& parts = parts_[view.camera];
+    if (parts.empty()) {
+      keep(view);
+      continue;
+    }
+    std::vector<Eigen::Vector3d> bearings(view.pixels.size());
+    std::vector<std::uint8_t> has_bearing(view.pixels.size());
+    parts.front().camera->unproject(view.pixels, bearings, has_bearing);
+    for (std::size_t i = 0; i < parts.size(); ++i) add_part(view, bearings, has_bearing, i);
+  }
+  finish_points();
+  return std::move(result_);
+}
+
+void Splitter::keep(const ExportView& view) {
+  result_.scene.views.push_back(view);
+  result_.scene.views.back().camera = first_camera_[view.camera];
+  result_.parts.emplace_back();
+}
+
+void Splitter::add_part(const ExportView& view,
+                        const std::vector<Eigen::Vector3d>& bearings,
+                        const std::vector<std::uint8_t>& has_bearing,
+                        std::size_t part) {
+  const SplitPart& split = parts_[view.camera][part];
+  const PerspectiveModel model = perspective_of(split);
+  ExportView added;
+  added.name = fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
+  if (!split.sees_all) added.mask_name = added.name + ".png";
+  added.keyframe = view.keyframe;
+  added.camera = first_camera_[view.camera];
+  added.cam_from_world =
+      Rigid3(split.part_from_camera, Eigen::Vector3d::Zero()) * view.cam_from_world;
+  const double end_px = split.size_px - 0.5;
+  for (std::size_t i = 0; i < bearings.size(); ++i) {
+    if (!has_bearing[i]) continue;
+    const std::optional<Eigen::Vector2d> pixel =
+        model.project(split.part_from_camera * bearings[i]);
+    if (!pixel || pixel->minCoeff() < -0.5 || !(pixel->maxCoeff() < end_px)) continue;
+    added.pixels.push_back(*pixel);
+    added.points.push_back(view.points[i]);
+  }
+  result_.scene.views.push_back(std::move(added));
+  result_.parts.emplace_back(split);
+}
+
+/// Points with the sightings of the parts; those that no part sees twice go.
+void Splitter::finish_points() {
+  ExportScene& scene = result_.scene;
+  std::vector<ExportPoint> points = scene_.points;
+  for (ExportPoint& point : points) point.sightings.clear();
+  for (std::uint32_t v = 0; v < scene.views.size(); ++v) {
+    for (std::uint32_t i = 0; i < scene.views[v].points.size(); ++i) {
+      const std::uint32_t point = scene.views[v].points[i];
+      if (point != kNoPoint) points[point].sightings.push_back({v, i});
+    }
+  }
+  std::vector<std::uint32_t> new_index(points.size(), kNoPoint);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    if (points[i].sightings.size() < 2) continue;
+    new_index[i] = static_cast<std::uint32_t>(scene.points.size());
+    scene.points.push_back(std::move(points[i]));
+  }
+  for (ExportView& view : scene.views) {
+    for (std::uint32_t& point : view.points) {
+      if (point != kNoPoint) point = new_index[point];
+    }
+  }
+}
+
+/// Between the four pixels around; columns go on at the other side where they repeat.
+Rgb sample(const ColorImage& image, const Eigen::Vector2d& pixel, bool wraps) {
+  const double left = std::floor(pixel.x()), top = std::floor(pixel.y());
+  const double right_part = pixel.x() - left, lower_part = pixel.y() - top;
+  const auto column = [&](int x) {
+    if (wraps) return (x + image.width_px) % image.width_px;
+    return std::clamp(x, 0, image.width_px - 1);
+  };
+  const auto row = [&](int y) { return image.row(std::clamp(y, 0, image.height_px - 1)); };
+  const int x0 = column(static_cast<int>(left)), x1 = column(static_cast<int>(left) + 1);
+  const Rgb* upper = row(static_cast<int>(top));
+  const Rgb* lower = row(static_cast<int>(top) + 1);
+  Rgb result;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double above = upper[x0][c] + right_part * (upper[x1][c] - upper[x0][c]);
+    const double below = lower[x0][c] + right_part * (lower[x1][c] - lower[x0][c]);
+    result[c] = static_cast<std::uint8_t>(std::lround(above + lower_part * (below - above)));
+  }
+  return result;
+}
+
+ColorImage render(const SplitPart& part, const Lookup& lookup, const ColorImage& image) {
+  ColorImage rendered(part.size_px, part.size_px);
+  const bool wraps = part.camera->wrap_width_px() > 0.0;
+  for (std::size_t i = 0; i < lookup.pixels.size(); ++i) {
+    if (lookup.is_visible[i]) rendered.values[i] = sample(image, lookup.pixels[i], wraps);
+  }
+  return rendered;
+}
+
+Image mask_of(const SplitPart& part, const Lookup& lookup) {
+  Image mask(part.size_px, part.size_px);
+  for (std::size_t i = 0; i < lookup.is_visible.size(); ++i) {
+    mask.values[i] = lookup.is_visible[i] ? 255 : 0;
+  }
+  return mask;
+}
+
+bool is_same_part(const SplitPart& a, const SplitPart& b) {
+  return a.camera == b.camera && a.part_from_camera.coeffs() == b.part_from_camera.coeffs();
+}
+
+/// Writes the views that are one part of one camera.
+class PartWriter {
+ public:
+  PartWriter(const std::filesystem::path& images_folder,
+             const std::filesystem::path& masks_folder,
+             const SplitPart& part)
+      : images_folder_(images_folder),
+        masks_folder_(masks_folder),
+        part_(part),
+        lookup_(make_lookup(part)) {
+    if (part.sees_all) return;
+    mask_ = encode_png(mask_of(part, lookup_));
+    make_output_folder(masks_folder_);
+  }
+
+  const SplitPart& part() const { return part_; }
+
+  void write(const ExportView& view, const std::string& jpeg) const {
+    const std::optional<ColorImage> image = decode_color_image(jpeg);
+    if (!image || image->width_px != part_.camera->width_px() ||
+        image->height_px != part_.camera->height_px()) {
+      return;
+    }
+    write_file_atomically(images_folder_ / view.name, encode_jpeg(render(part_, lookup_, *image)));
+    if (!mask_.empty()) write_file_atomically(masks_folder_ / view.mask_name, mask_);
+  }
+
+ private:
+  const std::filesystem::path& images_folder_;
+  const std::filesystem::path& masks_folder_;
+  SplitPart part_;
+  Lookup lookup_;
+  std::string mask_;
+};
+
+}  // namespace
+
+SplitScene split_scene(const ExportScene& scene, int num_views, const CameraRegistry& registry) {
+  WAYMARK_CHECK(num_views >= kMinSplitViews && num_views <= kMaxSplitViews);
+  return Splitter(scene, num_views, registry).split();
+}
+
+Image split_mask(const SplitPart& part) { return mask_of(part, make_lookup(part)); }
+
+void write_split_images(const std::filesystem::path& images_folder,
+                        const std::filesystem::path& masks_folder,
+                        const SplitScene& split,
+                        const KeyframeImages& images) {
+  make_output_folder(images_folder);
+  std::vector<PartWriter> writers;
+  for (std::size_t v = 0; v < split.scene.views.size(); ++v) {
+    const ExportView& view = split.scene.views[v];
+    const auto found = images.find(view.keyframe);
+    if (found == images.end()) continue;
+    if (!split.parts[v]) {
+      write_file_atomically(images_folder / view.name, *found->second);
+      continue;
+    }
+    auto writer = std::find_if(writers.begin(), writers.end(), [&](const PartWriter& other) {
+      return is_same_part(other.part(), *split.parts[v]);
+    });
+    if (writer == writers.end()) {
+      writers.emplace_back(images_folder, masks_folder, *split.parts[v]);
+      writer = writers.end() - 1;
+    }
+    writer->write(view, *found->second);
+  }
+}
+
+}  // namespace waymark

@@ -1,0 +1,41 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "waymark/camera/camchain.h"
+#include "waymark/input/input.h"
+
+namespace waymark {
+
+/// A camera as files of OpenVSLAM and stella_vslam describe it, map files (.msg) and settings
+/// alike.
+struct OpenvslamCamera {
+  std::string where;  ///< Begins error messages.
+  std::string name;
+  std::string model;  ///< perspective, fisheye, equirectangular or radial_division.
+  std::string setup;  ///< monocular, stereo or RGBD.
+  /// cols, rows, fx, fy, cx, cy, k1, ... as far as they are there.
+  std::map<std::string, double, std::less<>> numbers;
+
+  std::optional<double> find(std::string_view key) const;
+  /// InputError where it is missing.
+  double require(std::string_view key) const;
+};
+
+/// Models and set-ups are written "RadialDivision", "radial_division" and the like: letters and
+/// digits in lower case.
+std::string normalized_name(std::string_view name);
+
+/// InputError unless it is one of monocular, stereo, RGBD.
+Setup openvslam_setup(const OpenvslamCamera& camera);
+
+/// The camera in our words. Of a stereo pair, which is rectified, camera 1 is the same camera
+/// focal_x_baseline / fx to the right. InputError for what is missing or accepted by no model.
+CameraChain openvslam_camchain(const OpenvslamCamera& camera);
+
+}  // namespace waymark

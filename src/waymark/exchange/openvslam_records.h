@@ -1,0 +1,62 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/exchange/openvslam_camera.h"
+#include "waymark/image/features.h"
+
+namespace waymark {
+
+/// Levels of the image pyramid that key points come from.
+struct OpenvslamPyramid {
+  double scale_factor = 1.2;
+  std::int64_t num_levels = 8;
+};
+
+struct OpenvslamKeyframe {
+  double timestamp_s = 0.0;
+  std::string camera;
+  std::optional<std::string> orb_params;  ///< Name of a pyramid; older files have its own instead.
+  OpenvslamPyramid pyramid;
+  Eigen::Quaterniond rotation_cw = Eigen::Quaterniond::Identity();  ///< As written.
+  Eigen::Vector3d translation_cw = Eigen::Vector3d::Zero();
+  /// In the pixels of a pinhole camera with the focal lengths and the centre of the camera and no
+  /// distortion; of an equirectangular camera in its own pixels. The level is that of the pyramid.
+  std::vector<Keypoint> keypoints;
+  std::vector<float> right_columns_px;  ///< Negative: none. Empty in mono.
+  std::vector<float> depths_m;          ///< Along z, negative: none. Empty in mono.
+  std::vector<Descriptor> descriptors;
+  std::vector<std::int64_t> landmarks;  ///< Negative: none.
+  std::int64_t parent = -1;             ///< Negative: none.
+  std::vector<std::int64_t> loop_edges;
+};
+
+struct OpenvslamLandmark {
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
+  std::int64_t reference = -1;
+  std::int64_t num_visible = 0;
+  std::int64_t num_found = 0;
+};
+
+/// A map file of OpenVSLAM or stella_vslam (.msg) as it stands, each value checked on its own.
+struct OpenvslamRecords {
+  std::map<std::string, OpenvslamCamera> cameras;
+  std::map<std::string, OpenvslamPyramid> pyramids;  ///< By name; empty in older files.
+  std::map<std::int64_t, OpenvslamKeyframe> keyframes;
+  std::map<std::int64_t, OpenvslamLandmark> landmarks;
+};
+
+/// Reads both the keys of stella_vslam and those of OpenVSLAM of 2019 and 2020. Throws InputError
+/// for whatever is missing, malformed or beyond all bounds; name is what errors call the file.
+OpenvslamRecords read_openvslam_records(std::string_view bytes, const std::string& name);
+
+}  // namespace waymark

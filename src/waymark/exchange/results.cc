@@ -1,0 +1,164 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/exchange/results.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <iterator>
+#include <nlohmann/json.hpp>
+#include <numeric>
+
+#include "waymark/base/atomic_file.h"
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+/// Figures with 4 decimals, which is plenty and keeps the files readable.
+double rounded(double value) { return std::isfinite(value) ? std::round(value * 1e4) / 1e4 : 0.0; }
+
+Json to_json(const TimeStatistics& times, bool has_max) {
+  Json json = {{"mean", rounded(times.mean)},
+               {"median", rounded(times.median)},
+               {"p95", rounded(times.p95)}};
+  if (has_max) json["max"] = rounded(times.max);
+  return json;
+}
+
+void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
+  json["frames"] = counts.frames;
+  json["tracked"] = counts.tracked;
+  json["filled"] = counts.filled;
+  json["unreadable"] = counts.unreadable;
+  json["dropped"] = counts.dropped;
+  json["coverage"] =
+      counts.frames == 0
+          ? 0.0
+          : rounded(static_cast<double>(num_trajectory_lines) / static_cast<double>(counts.frames));
+  json["initialized_at"] = counts.initialized_at ? Json(*counts.initialized_at) : Json(nullptr);
+  json["lost_count"] = counts.lost_count;
+}
+
+}  // namespace
+
+TimeStatistics summarize_times(std::vector<double> samples_ms) {
+  if (samples_ms.empty()) return {};
+  std::sort(samples_ms.begin(), samples_ms.end());
+  const std::size_t n = samples_ms.size();
+  const std::size_t rank95 = (95 * n + 99) / 100;  // ceil(0.95 n)
+  TimeStatistics times;
+  times.mean = std::accumulate(samples_ms.begin(), samples_ms.end(), 0.0) / static_cast<double>(n);
+  times.median = 0.5 * (samples_ms[(n - 1) / 2] + samples_ms[n / 2]);
+  times.p95 = samples_ms[rank95 - 1];
+  times.max = samples_ms.back();
+  return times;
+}
+
+FrameCounts count_frames(std::span<const FrameRecord> frames) {
+  FrameCounts counts;
+  counts.frames = frames.size();
+  FrameState before = FrameState::kInitializing;
+  for (const FrameRecord& frame : frames) {
+    const bool is_filled = frame.state == FrameState::kFilled;
+    const bool is_tracked = frame.state == FrameState::kTracked;
+    counts.filled += is_filled ? 1 : 0;
+    counts.tracked += is_filled || is_tracked ? 1 : 0;
+    counts.unreadable += frame.state == FrameState::kUnreadable ? 1 : 0;
+    counts.dropped += frame.state == FrameState::kDropped ? 1 : 0;
+    if (is_tracked && !counts.initialized_at) counts.initialized_at = frame.index;
+    // A frame without an image says nothing: lost, unreadable, lost is one loss.
+    if (frame.state == FrameState::kUnreadable || frame.state == FrameState::kDropped) continue;
+    if (frame.state == FrameState::kLost && before != FrameState::kLost) ++counts.lost_count;
+    before = frame.state;
+  }
+  return counts;
+}
+
+std::vector<std::pair<std::string, TimeStatistics>> summarize_stages(const FrameTable& table) {
+  std::vector<std::pair<std::string, TimeStatistics>> stages;
+  for (std::size_t i = 0; i < table.stages.size(); ++i) {
+    std::vector<double> samples_ms;
+    for (const FrameRecord& frame : table.frames) {
+      if (!frame.stage_ms.empty()) samples_ms.push_back(frame.stage_ms.at(i));
+    }
+    stages.emplace_back(table.stages[i], summarize_times(std::move(samples_ms)));
+  }
+  return stages;
+}
+
+std::string format_frames_csv(const FrameTable& table) {
+  std::string text = "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap";
+  for (const std::string& stage : table.stages) text += fmt::format(",{}_ms", stage);
+  text += '\n';
+  for (const FrameRecord& frame : table.frames) {
+    auto out = std::back_inserter(text);
+    fmt::format_to(out,
+                   "{},{},{},{},",
+                   frame.index,
+                   frame.timestamp_ns,
+                   to_string(frame.state),
+                   to_string(frame.reason));
+    fmt::format_to(
+        out, "{},{},{},", frame.num_matches, frame.num_inliers, frame.is_keyframe ? 1 : 0);
+    if (frame.submap.is_valid()) fmt::format_to(out, "{}", frame.submap.value);
+    WAYMARK_CHECK(frame.stage_ms.empty() || frame.stage_ms.size() == table.stages.size());
+    for (std::size_t i = 0; i < table.stages.size(); ++i) {
+      fmt::format_to(out, ",{:.4f}", frame.stage_ms.empty() ? 0.0 : frame.stage_ms[i]);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string format_summary_json(const RunSummary& summary) {
+  Json json;
+  append_counts(json, summary.counts, summary.num_trajectory_lines);
+  if (summary.localized) json["localized"] = *summary.localized;
+  json["keyframes"] = summary.keyframes;
+  json["landmarks"] = summary.landmarks;
+  json["submaps"] = summary.submaps;
+  json["loops"] = summary.loops;
+  json["relocalizations"] = summary.relocalizations;
+  json["wall_s"] = rounded(summary.wall_s);
+  json["cpu_s"] = rounded(summary.cpu_s);
+  json["peak_rss_mb"] = rounded(summary.peak_rss_mb);
+  json["tracking_ms"] = to_json(summary.tracking_ms, true);
+  json["mapping_ms"] = to_json(summary.mapping_ms, true);
+  Json stages = Json::object();
+  for (const auto& [name, times] : summary.stages_ms) stages[name] = to_json(times, false);
+  json["stages_ms"] = stages;
+  json["setup"] = summary.setup;
+  json["timing"] = summary.timing;
+  json["seed"] = summary.seed;
+  json["version"] = summary.version;
+  return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table) {
+  write_file_atomically(folder / "frames.csv", format_frames_csv(table));
+}
+
+void write_summary_json(const std::filesystem::path& folder, const RunSummary& summary) {
+  write_file_atomically(folder / "summary.json", format_summary_json(summary));
+}
+
+void write_trajectories(const std::filesystem::path& folder,
+                        std::span<const std::vector<StampedPose>> trajectories) {
+  const auto path_of = [&folder](std::size_t i) {
+    return folder / (i == 0 ? std::string("trajectory.txt") : fmt::format("trajectory_{}.txt", i));
+  };
+  write_trajectory(path_of(0),
+                   trajectories.empty() ? std::vector<StampedPose>() : trajectories[0],
+                   TrajectoryFormat::kTum);
+  std::size_t i = 1;
+  for (; i < trajectories.size(); ++i)
+    write_trajectory(path_of(i), trajectories[i], TrajectoryFormat::kTum);
+  std::error_code error;
+  while (std::filesystem::remove(path_of(i), error)) ++i;
+}
+
+}  // namespace waymark

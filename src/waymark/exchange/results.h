@@ -1,0 +1,101 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "waymark/base/frame_state.h"
+#include "waymark/exchange/trajectory.h"
+
+namespace waymark {
+
+/// One row of frames.csv.
+struct FrameRecord : FrameStatus {
+  std::size_t index = 0;          ///< In the whole INPUT.
+  std::int64_t timestamp_ns = 0;  ///< Of the input.
+  bool is_keyframe = false;       ///< Whether it was sent to the map.
+  /// In the order of the table's stages; empty for a frame that was not processed.
+  std::vector<double> stage_ms;
+};
+
+/// frames.csv: a row per input frame.
+struct FrameTable {
+  std::vector<std::string> stages;  ///< Columns "STAGE_ms".
+  std::vector<FrameRecord> frames;  ///< In the order of the input.
+};
+
+/// Of times in milliseconds.
+struct TimeStatistics {
+  double mean = 0.0;    ///< Arithmetic mean.
+  double median = 0.0;  ///< See summarize_times().
+  double p95 = 0.0;     ///< See summarize_times().
+  double max = 0.0;     ///< The largest.
+};
+
+/// Statistics of samples; all 0 without samples. The median of an even number is the mean of the
+/// middle two, p95 the smallest sample that 95 % do not exceed.
+TimeStatistics summarize_times(std::vector<double> samples_ms);
+
+/// What follows from the rows of a FrameTable alone.
+struct FrameCounts {
+  std::size_t frames = 0;                     ///< All rows.
+  std::size_t tracked = 0;                    ///< With a pose in any sub-map, filled ones included.
+  std::size_t filled = 0;                     ///< Those that got their pose after the fact.
+  std::size_t unreadable = 0;                 ///< Those whose images could not be used.
+  std::size_t dropped = 0;                    ///< Those that came too late.
+  std::optional<std::size_t> initialized_at;  ///< Index of the first frame tracked.
+  std::size_t lost_count = 0;                 ///< Transitions to lost.
+};
+
+/// Counts the rows, which are in the order of the input.
+FrameCounts count_frames(std::span<const FrameRecord> frames);
+
+/// summary.json.
+struct RunSummary {
+  FrameCounts counts;                    ///< Of the rows of frames.csv.
+  std::size_t num_trajectory_lines = 0;  ///< Of trajectory.txt; gives the coverage.
+  std::size_t keyframes = 0;             ///< Of the map at the end.
+  std::size_t landmarks = 0;             ///< Of the map at the end.
+  std::size_t submaps = 0;               ///< Those that were not joined.
+  std::size_t loops = 0;                 ///< Closed in the session.
+  std::size_t relocalizations = 0;       ///< Of the session.
+  double wall_s = 0.0;                   ///< From start to end.
+  double cpu_s = 0.0;                    ///< Of all threads.
+  double peak_rss_mb = 0.0;              ///< Largest memory in use, in units of 2^20 bytes.
+  TimeStatistics tracking_ms;            ///< Per frame.
+  TimeStatistics mapping_ms;             ///< Per keyframe.
+  std::vector<std::pair<std::string, TimeStatistics>> stages_ms;  ///< By name of the stage.
+  std::string setup;                                              ///< "mono", "stereo" or "rgbd".
+  std::string timing;                    ///< "inline", "lockstep" or "realtime".
+  std::uint64_t seed = 0;                ///< Of the settings.
+  std::string version;                   ///< Of the program.
+  std::optional<std::size_t> localized;  ///< Of localize only.
+};
+
+/// Statistics per stage over all rows, in the order of the table.
+std::vector<std::pair<std::string, TimeStatistics>> summarize_stages(const FrameTable& table);
+
+/// The text of frames.csv: a line of names, a line per frame.
+std::string format_frames_csv(const FrameTable& table);
+/// The text of summary.json.
+std::string format_summary_json(const RunSummary& summary);
+
+/// Writes frames.csv into the folder; throws OutputError.
+void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table);
+/// Writes summary.json into the folder; throws OutputError.
+void write_summary_json(const std::filesystem::path& folder, const RunSummary& summary);
+
+/// Writes trajectory.txt (TUM) for the first trajectory, trajectory_1.txt ... for the others, and
+/// removes those of an earlier run that are left over. The caller orders them by size.
+void write_trajectories(const std::filesystem::path& folder,
+                        std::span<const std::vector<StampedPose>> trajectories);
+
+}  // namespace waymark

@@ -1,0 +1,139 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/exchange/results.h"
+
+#include <gmock/gmock.h>
+
+#include <nlohmann/json.hpp>
+
+#include "waymark/base/check.h"
+#include "waymark/base/testing/temporary_folder.h"
+#include "waymark/base/text.h"
+
+namespace waymark {
+namespace {
+
+using testing::TemporaryFolder;
+
+FrameRecord make_record(std::size_t index,
+                        FrameState state,
+                        FrameReason reason = FrameReason::kNone) {
+  FrameRecord record;
+  record.index = index;
+  record.timestamp_ns = static_cast<std::int64_t>(index) * 1000;
+  record.state = state;
+  record.reason = reason;
+  return record;
+}
+
+FrameTable make_table() {
+  FrameTable table;
+  table.stages = {"features", "wait"};
+  table.frames = {make_record(10, FrameState::kInitializing, FrameReason::kTooLittleParallax),
+                  make_record(11, FrameState::kFilled),
+                  make_record(12, FrameState::kTracked),
+                  make_record(13, FrameState::kLost, FrameReason::kTooFewMatches),
+                  make_record(14, FrameState::kUnreadable, FrameReason::kUnreadableImage),
+                  make_record(15, FrameState::kLost, FrameReason::kNoCandidate),
+                  make_record(16, FrameState::kTracked),
+                  make_record(17, FrameState::kLost, FrameReason::kNotVerified),
+                  make_record(18, FrameState::kDropped, FrameReason::kLate)};
+  table.frames[2].num_matches = 120;
+  table.frames[2].num_inliers = 90;
+  table.frames[2].is_keyframe = true;
+  table.frames[2].submap = SubmapId{3};
+  table.frames[2].stage_ms = {4.5, 0.25};
+  table.frames[6].stage_ms = {5.5, 0.75};
+  return table;
+}
+
+TEST(Results, CountsFollowFromTheRows) {
+  const FrameCounts counts = count_frames(make_table().frames);
+  EXPECT_EQ(counts.frames, 9u);
+  EXPECT_EQ(counts.tracked, 3u);
+  EXPECT_EQ(counts.filled, 1u);
+  EXPECT_EQ(counts.unreadable, 1u);
+  EXPECT_EQ(counts.dropped, 1u);
+  EXPECT_EQ(counts.initialized_at, std::size_t{12});
+  EXPECT_EQ(counts.lost_count, 2u);  // The unreadable frame does not split the first loss.
+  EXPECT_FALSE(count_frames({}).initialized_at);
+}
+
+TEST(Results, StatisticsOfTimes) {
+  std::vector<double> samples;
+  for (int i = 100; i >= 1; --i) samples.push_back(i);
+  const TimeStatistics times = summarize_times(samples);
+  EXPECT_DOUBLE_EQ(times.mean, 50.5);
+  EXPECT_DOUBLE_EQ(times.median, 50.5);
+  EXPECT_DOUBLE_EQ(times.p95, 95.0);
+  EXPECT_DOUBLE_EQ(times.max, 100.0);
+  EXPECT_DOUBLE_EQ(summarize_times({7.0}).p95, 7.0);
+  EXPECT_DOUBLE_EQ(summarize_times({}).max, 0.0);
+}
+
+TEST(Results, FramesCsvHasARowPerFrame) {
+  FrameTable table = make_table();
+  const std::string text = format_frames_csv(table);
+  EXPECT_THAT(
+      text,
+      ::testing::StartsWith(
+          "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap,features_ms,wait_ms\n"
+          "10,10000,initializing,too_little_parallax,0,0,0,,0.0000,0.0000\n"));
+  EXPECT_THAT(text, ::testing::HasSubstr("\n12,12000,tracked,none,120,90,1,3,4.5000,0.2500\n"));
+  EXPECT_THAT(text, ::testing::HasSubstr("\n14,14000,unreadable,unreadable_image,"));
+  EXPECT_THAT(text, ::testing::HasSubstr("\n18,18000,dropped,late,"));
+  EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 10);
+  table.frames[0].stage_ms = {1.0};
+  EXPECT_THROW(format_frames_csv(table), CheckError);
+}
+
+TEST(Results, SummaryHasTheDocumentedKeys) {
+  RunSummary summary;
+  summary.counts = count_frames(make_table().frames);
+  summary.num_trajectory_lines = 3;
+  summary.stages_ms = summarize_stages(make_table());
+  summary.tracking_ms = {1.0, 2.0, 3.0, 4.0};
+  summary.setup = "mono";
+  summary.timing = "lockstep";
+  summary.version = "0.1.0";
+  const nlohmann::json json = nlohmann::json::parse(format_summary_json(summary));
+  for (const char* key :
+       {"frames",          "tracked",    "filled",    "unreadable",  "dropped",     "coverage",
+        "initialized_at",  "lost_count", "keyframes", "landmarks",   "submaps",     "loops",
+        "relocalizations", "wall_s",     "cpu_s",     "peak_rss_mb", "tracking_ms", "mapping_ms",
+        "stages_ms",       "setup",      "timing",    "seed",        "version"}) {
+    EXPECT_TRUE(json.contains(key)) << key;
+  }
+  EXPECT_FALSE(json.contains("localized"));
+  EXPECT_EQ(json["coverage"], 0.3333);
+  EXPECT_EQ(json["initialized_at"], 12);
+  EXPECT_EQ(json["tracking_ms"]["p95"], 3.0);
+  EXPECT_EQ(json["tracking_ms"]["max"], 4.0);
+  EXPECT_EQ(json["stages_ms"]["features"]["mean"], 5.0);
+  EXPECT_EQ(json["stages_ms"]["wait"]["median"], 0.5);
+  summary.counts = {};
+  summary.localized = 5;
+  const nlohmann::json empty = nlohmann::json::parse(format_summary_json(summary));
+  EXPECT_TRUE(empty["initialized_at"].is_null());
+  EXPECT_EQ(empty["coverage"], 0.0);
+  EXPECT_EQ(empty["localized"], 5);
+}
+
+TEST(Results, TrajectoriesOfAnEarlierRunGo) {
+  const TemporaryFolder folder;
+  const std::vector<StampedPose> poses(2);
+  std::vector<std::vector<StampedPose>> trajectories(4, poses);
+  write_trajectories(folder.path(), trajectories);
+  EXPECT_TRUE(std::filesystem::exists(folder / "trajectory_3.txt"));
+  trajectories.resize(2);
+  write_trajectories(folder.path(), trajectories);
+  EXPECT_TRUE(std::filesystem::exists(folder / "trajectory_1.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "trajectory_2.txt"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "trajectory_3.txt"));
+  write_trajectories(folder.path(), {});
+  EXPECT_EQ(read_text_file(folder / "trajectory.txt", "a trajectory"), "");
+  EXPECT_THROW(write_trajectories(folder / "none", trajectories), OutputError);
+}
+
+}  // namespace
+}  // namespace waymark

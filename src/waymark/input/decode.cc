@@ -1,0 +1,166 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/decode.h"
+
+#include <cstdlib>
+#include <cstring>
+#include <fstream>
+#include <new>
+#include <opencv2/core.hpp>
+#include <opencv2/core/utils/logger.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::string_view kJpegStart = "\xFF\xD8\xFF";
+constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;
+
+std::optional<std::string> read_bytes(const std::filesystem::path& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) return std::nullopt;
+  const std::uintmax_t size = std::filesystem::file_size(path, error);
+  if (error || size == 0 || size > kMaxFileBytes) return std::nullopt;
+  std::string bytes(static_cast<std::size_t>(size), '\0');
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream.read(bytes.data(), static_cast<std::streamsize>(size))) return std::nullopt;
+  return bytes;
+}
+
+/// Walks the chunks of a PNG (ISO/IEC 15948) to its IEND.
+bool is_complete_png(std::string_view bytes) {
+  constexpr std::size_t kChunkOverhead = 12;
+  for (std::size_t at = 8; at + kChunkOverhead <= bytes.size();) {
+    std::uint32_t length = 0;
+    for (std::size_t i = 0; i < 4; ++i)
+      length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
+    if (length > bytes.size() - at - kChunkOverhead) return false;
+    if (bytes.substr(at + 4, 4) == "IEND") return true;
+    at += kChunkOverhead + length;
+  }
+  return false;
+}
+
+/// Whether the end of the file is there. The libraries fill the missing part of a truncated JPEG
+/// with grey and report success, and complain on standard error about truncated PNG.
+bool is_complete(std::string_view bytes) {
+  constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1A\n";
+  constexpr std::string_view kJpegEnd = "\xFF\xD9";
+  if (bytes.starts_with(kPngSignature)) return is_complete_png(bytes);
+  if (bytes.starts_with(kJpegStart)) return bytes.rfind(kJpegEnd) != std::string_view::npos;
+  return true;
+}
+
+std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
+  if (bytes.empty() || bytes.size() > kMaxFileBytes || !is_complete(bytes)) return std::nullopt;
+  try {
+    const cv::Mat encoded(1,
+                          static_cast<int>(bytes.size()),
+                          CV_8UC1,
+                          const_cast<char*>(bytes.data()));  // Is only read.
+    cv::Mat decoded = cv::imdecode(encoded, flags);
+    if (decoded.empty()) return std::nullopt;
+    return decoded;
+  } catch (const cv::Exception&) {
+    return std::nullopt;
+  } catch (const std::bad_alloc&) {  // A small file may claim to be a huge image.
+    return std::nullopt;
+  }
+}
+
+std::optional<cv::Mat> decode(const std::filesystem::path& path, int flags) {
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? decode_bytes(*bytes, flags) : std::nullopt;
+}
+
+std::string encode(const cv::Mat& image, const char* extension) {
+  std::vector<std::uint8_t> bytes;
+  WAYMARK_CHECK(cv::imencode(extension, image, bytes));
+  return {bytes.begin(), bytes.end()};
+}
+
+template <class T>
+BasicImage<T> copy_rows(const cv::Mat& mat) {
+  BasicImage<T> image(mat.cols, mat.rows);
+  for (int y = 0; y < mat.rows; ++y) {
+    std::memcpy(image.row(y), mat.ptr(y), sizeof(T) * static_cast<std::size_t>(mat.cols));
+  }
+  return image;
+}
+
+}  // namespace
+
+std::optional<Image> read_grey_image(const std::filesystem::path& path) {
+  constexpr double kScale = 255.0 / 65535.0;
+  std::optional<cv::Mat> mat =
+      decode(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!mat) return std::nullopt;
+  if (mat->type() == CV_16UC1) mat->convertTo(*mat, CV_8U, kScale);
+  if (mat->type() != CV_8UC1) return std::nullopt;
+  return copy_rows<std::uint8_t>(*mat);
+}
+
+std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
+  const std::optional<cv::Mat> mat = decode(path, cv::IMREAD_UNCHANGED);
+  if (!mat || mat->type() != CV_16UC1) return std::nullopt;
+  return copy_rows<std::uint16_t>(*mat);
+}
+
+std::optional<ColorImage> decode_color_image(std::string_view bytes) {
+  const std::optional<cv::Mat> mat =
+      decode_bytes(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!mat || mat->type() != CV_8UC3) return std::nullopt;
+  ColorImage image(mat->cols, mat->rows);
+  for (int y = 0; y < mat->rows; ++y) {
+    for (int x = 0; x < mat->cols; ++x) {
+      const cv::Vec3b& bgr = mat->at<cv::Vec3b>(y, x);
+      image.row(y)[x] = {bgr[2], bgr[1], bgr[0]};
+    }
+  }
+  return image;
+}
+
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path) {
+  std::optional<std::string> bytes = read_bytes(path);
+  if (!bytes) return std::nullopt;
+  if (bytes->starts_with(kJpegStart) && is_complete(*bytes)) return bytes;
+  const std::optional<cv::Mat> mat =
+      decode_bytes(*bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  if (!mat) return std::nullopt;
+  return encode(*mat, ".jpg");
+}
+
+std::string encode_jpeg(const ColorImage& image) {
+  cv::Mat mat(image.height_px, image.width_px, CV_8UC3);
+  for (int y = 0; y < mat.rows; ++y) {
+    for (int x = 0; x < mat.cols; ++x) {
+      const Rgb& rgb = image.row(y)[x];
+      mat.at<cv::Vec3b>(y, x) = {rgb[2], rgb[1], rgb[0]};
+    }
+  }
+  return encode(mat, ".jpg");
+}
+
+std::string encode_png(const Image& image) {
+  const cv::Mat mat(image.height_px,
+                    image.width_px,
+                    CV_8UC1,
+                    const_cast<std::uint8_t*>(image.values.data()));  // Is only read.
+  return encode(mat, ".png");
+}
+
+void silence_image_library() {
+  static const bool is_done = [] {
+    cv::utils::logging::setLogLevel(cv::utils::logging::LOG_LEVEL_SILENT);
+    constexpr const char* kQuiet = "-8";  // AV_LOG_QUIET
+    return ::setenv("OPENCV_FFMPEG_LOGLEVEL", kQuiet, /*overwrite=*/0) == 0;
+  }();
+  static_cast<void>(is_done);
+}
+
+}  // namespace waymark

@@ -1,0 +1,38 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+
+#include "waymark/image/convert.h"
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+/// Decodes an image file to 8-bit grey: colour is converted, 16 bit scaled down, transparency
+/// dropped, orientation tags ignored. Nothing when the file is missing, truncated or no image.
+std::optional<Image> read_grey_image(const std::filesystem::path& path);
+
+/// Decodes a single-channel 16-bit image, otherwise nothing.
+std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
+
+/// Decodes the bytes of an image file to colour, grey ones too; orientation tags ignored. Nothing
+/// when they are truncated or no image.
+std::optional<ColorImage> decode_color_image(std::string_view bytes);
+
+/// The image of a file as a JPEG: the file itself if it is one. Nothing when it is no image.
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path);
+
+/// The bytes of an image file.
+std::string encode_jpeg(const ColorImage& image);
+/// The bytes of an image file, lossless.
+std::string encode_png(const Image& image);
+
+/// Keeps OpenCV and its video library from printing to standard error; errors reach the user as
+/// faults of frames. For the whole process, done once.
+void silence_image_library();
+
+}  // namespace waymark

@@ -1,0 +1,179 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <cstdlib>
+
+#include "waymark/base/check.h"
+#include "waymark/base/config.h"
+#include "waymark/base/config_value.h"
+#include "waymark/base/text.h"
+#include "waymark/camera/camchain.h"
+#include "waymark/input/datasets.h"
+
+namespace waymark {
+namespace {
+
+/// Cameras of a pair are triggered together; their stamps may differ by the readout.
+constexpr std::int64_t kMaxPairDifferenceNs = 5'000'000;
+constexpr int kMaxImageSize = 1 << 16;
+
+std::filesystem::path mav0_of(const std::filesystem::path& folder) {
+  return std::filesystem::is_directory(folder / "mav0") ? folder / "mav0" : folder;
+}
+
+const ConfigNode& require(const ConfigNode& config,
+                          const ConfigSource& source,
+                          std::string_view key) {
+  const ConfigNode* node = config.find(key);
+  if (node == nullptr) {
+    throw InputError(source.name,
+                     fmt::format("has no {}, expected the sensor.yaml of a camera", key));
+  }
+  return *node;
+}
+
+Rigid3 read_body_from_sensor(const ConfigNode& config, const ConfigSource& source) {
+  const ConfigNode& node = require(config, source, "T_BS");
+  const std::vector<double> values = config_doubles(require(node, source, "data"), "T_BS.data");
+  if (values.size() != 16) {
+    throw InputError(node.where(),
+                     fmt::format("T_BS.data has {} numbers, expected 16", values.size()));
+  }
+  const Eigen::Matrix4d matrix =
+      Eigen::Map<const Eigen::Matrix<double, 4, 4, Eigen::RowMajor>>(values.data());
+  return rigid_from_matrix(matrix, node.where(), "T_BS");
+}
+
+CameraChain read_sensors(const std::filesystem::path& mav0, std::size_t num_cameras) {
+  CameraChain chain;
+  Rigid3 body_from_camera0;
+  for (std::size_t i = 0; i < num_cameras; ++i) {
+    const std::filesystem::path path = mav0 / fmt::format("cam{}", i) / "sensor.yaml";
+    const EurocSensor sensor = parse_euroc_sensor(ConfigSource::from_file(path));
+    if (i == 0) body_from_camera0 = sensor.body_from_sensor;
+    const Rigid3 cam_from_rig =
+        i == 0 ? Rigid3() : sensor.body_from_sensor.inverse() * body_from_camera0;
+    chain.cameras.push_back({sensor.description, cam_from_rig});
+  }
+  return chain;
+}
+
+std::optional<CameraChain> read_calibration(const std::filesystem::path& mav0,
+                                            std::size_t num_cameras) {
+  if (std::filesystem::exists(mav0 / "cam0" / "sensor.yaml"))
+    return read_sensors(mav0, num_cameras);
+  const std::filesystem::path camchain = (mav0 / ".." / "dso" / "camchain.yaml").lexically_normal();
+  if (!std::filesystem::exists(camchain)) return std::nullopt;
+  return read_camchain(parse_config(ConfigSource::from_file(camchain)));
+}
+
+std::vector<EurocImage> read_images(const std::filesystem::path& mav0, std::size_t camera) {
+  const std::filesystem::path path = mav0 / fmt::format("cam{}", camera) / "data.csv";
+  return parse_euroc_images(read_text_file(path, "the image list of an EuRoC data set"),
+                            path.string());
+}
+
+void check_pairs(const std::filesystem::path& mav0,
+                 const std::vector<EurocImage>& left,
+                 const std::vector<EurocImage>& right) {
+  if (left.size() != right.size()) {
+    throw InputError((mav0 / "cam1" / "data.csv").string(),
+                     fmt::format("{} images, expected {} as cam0 has", right.size(), left.size()));
+  }
+  for (std::size_t i = 0; i < left.size(); ++i) {
+    if (std::abs(right[i].timestamp_ns - left[i].timestamp_ns) <= kMaxPairDifferenceNs) continue;
+    throw InputError(
+        right[i].where,
+        fmt::format(
+            "time {}, expected {} as cam0 has", right[i].timestamp_ns, left[i].timestamp_ns));
+  }
+}
+
+}  // namespace
+
+std::vector<EurocImage> parse_euroc_images(std::string_view text, const std::string& name) {
+  std::vector<EurocImage> images;
+  RowReader rows(text, name, ',');
+  while (rows.next()) {
+    rows.expect_at_least(2, "2: nanoseconds,file name");
+    EurocImage image{rows.nanoseconds(0), rows.relative_path(1), rows.where()};
+    if (!images.empty() && image.timestamp_ns <= images.back().timestamp_ns) {
+      throw InputError(image.where, "not later than the time before, expected increasing times");
+    }
+    images.push_back(std::move(image));
+  }
+  if (images.empty()) throw InputError(name, "empty, expected rows of nanoseconds,file name");
+  return images;
+}
+
+EurocSensor parse_euroc_sensor(const ConfigSource& source) {
+  const ConfigNode config = parse_config(source);
+  EurocSensor sensor;
+  CameraDescription& description = sensor.description;
+  description.where = source.name;
+  description.camera_model = config_string(require(config, source, "camera_model"), "camera_model");
+  description.intrinsics = config_doubles(require(config, source, "intrinsics"), "intrinsics");
+  if (const ConfigNode* model = config.find("distortion_model")) {
+    description.distortion_model = config_string(*model, "distortion_model");
+    if (description.distortion_model == "radial-tangential")
+      description.distortion_model = "radtan";
+  }
+  if (const ConfigNode* coefficients = config.find("distortion_coefficients")) {
+    description.distortion_coeffs = config_doubles(*coefficients, "distortion_coefficients");
+  }
+  const ConfigNode& resolution = require(config, source, "resolution");
+  const std::vector<double> size = config_doubles(resolution, "resolution", {1, kMaxImageSize});
+  if (size.size() != 2)
+    throw InputError(resolution.where(), "resolution is malformed, expected [width, height]");
+  description.width_px = static_cast<int>(size[0]);
+  description.height_px = static_cast<int>(size[1]);
+  sensor.body_from_sensor = read_body_from_sensor(config, source);
+  return sensor;
+}
+
+bool is_euroc(const std::filesystem::path& folder) {
+  return std::filesystem::is_directory(folder / "mav0") ||
+         std::filesystem::exists(folder / "cam0" / "data.csv");
+}
+
+Listing list_euroc(const std::filesystem::path& folder, const InputOptions& options) {
+  const std::filesystem::path mav0 = mav0_of(folder);
+  std::vector<Setup> offered = {Setup::kMono};
+  if (std::filesystem::is_directory(mav0 / "cam1")) offered.push_back(Setup::kStereo);
+
+  Listing listing;
+  listing.format = "euroc";
+  listing.title = "EuRoC / TUM-VI";
+  listing.setup = choose_setup(folder, offered, options.setup);
+  const std::vector<EurocImage> left = read_images(mav0, 0);
+  for (const EurocImage& image : left) {
+    listing.frames.push_back({image.timestamp_ns, {mav0 / "cam0" / "data" / image.name}, {}});
+  }
+  if (listing.setup == Setup::kStereo) {
+    const std::vector<EurocImage> right = read_images(mav0, 1);
+    check_pairs(mav0, left, right);
+    for (std::size_t i = 0; i < right.size(); ++i) {
+      listing.frames[i].images.push_back(mav0 / "cam1" / "data" / right[i].name);
+    }
+  }
+  if (!options.calibration)
+    listing.calibration = read_calibration(mav0, num_cameras(listing.setup));
+  return listing;
+}
+
+Rigid3 euroc_sensor_from_camera0(const std::filesystem::path& csv_path) {
+  const std::filesystem::path sensor_folder = std::filesystem::absolute(csv_path).parent_path();
+  const std::filesystem::path camera_yaml = sensor_folder.parent_path() / "cam0" / "sensor.yaml";
+  if (sensor_folder.filename() == "cam0" || !std::filesystem::exists(camera_yaml)) return {};
+  const Rigid3 body_from_camera0 =
+      parse_euroc_sensor(ConfigSource::from_file(camera_yaml)).body_from_sensor;
+  const std::filesystem::path own_yaml = sensor_folder / "sensor.yaml";
+  if (!std::filesystem::exists(own_yaml)) return body_from_camera0;
+  const ConfigSource source = ConfigSource::from_file(own_yaml);
+  const ConfigNode config = parse_config(source);
+  if (config.find("T_BS") == nullptr) return body_from_camera0;
+  return read_body_from_sensor(config, source).inverse() * body_from_camera0;
+}
+
+}  // namespace waymark

@@ -1,0 +1,147 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/foreign_calibration.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/base/config_value.h"
+
+namespace waymark {
+namespace {
+
+using Keys = std::initializer_list<const char*>;
+
+const ConfigNode* find_any(const ConfigNode& map, Keys keys) {
+  for (const char* key : keys) {
+    const ConfigNode* node = map.kind == ConfigNode::Kind::kMap ? map.find(key) : nullptr;
+    if (node != nullptr) return node;
+  }
+  return nullptr;
+}
+
+const ConfigNode& require_any(const ConfigNode& map, const std::string& file, Keys keys) {
+  const ConfigNode* node = find_any(map, keys);
+  if (node == nullptr) {
+    throw InputError(file, fmt::format("has no {}, which is needed", *keys.begin()));
+  }
+  return *node;
+}
+
+/// The numbers of a matrix: {rows, cols, data}, or a list.
+std::vector<double> matrix_values(const ConfigNode& node, const std::string& key) {
+  if (node.kind != ConfigNode::Kind::kMap) return config_doubles(node, key);
+  const ConfigNode* data = node.find("data");
+  if (data == nullptr) {
+    throw InputError(node.where(), fmt::format("{} has no data, expected rows, cols, data", key));
+  }
+  return config_doubles(*data, key + ".data");
+}
+
+CameraDescription read_size_and_matrix(const ConfigNode& root, const std::string& file) {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.where = file;
+  const ConfigRange size{.low = 1, .high = 1e6};
+  camera.width_px = config_int(
+      require_any(root, file, {"image_width", "imageWidth", "width"}), "image_width", size);
+  camera.height_px = config_int(
+      require_any(root, file, {"image_height", "imageHeight", "height"}), "image_height", size);
+  const ConfigNode& node =
+      require_any(root, file, {"camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "k"});
+  const std::vector<double> k = matrix_values(node, "camera_matrix");
+  if (k.size() != 9) {
+    throw InputError(node.where(),
+                     fmt::format("camera_matrix has {} numbers, expected 3x3", k.size()));
+  }
+  const bool is_calibration =
+      k[1] == 0.0 && k[3] == 0.0 && k[6] == 0.0 && k[7] == 0.0 && k[8] == 1.0;
+  if (!is_calibration) {
+    throw InputError(node.where(),
+                     "camera_matrix is no [fu 0 pu; 0 fv pv; 0 0 1], expected one without skew");
+  }
+  camera.intrinsics = {k[0], k[4], k[2], k[5]};
+  return camera;
+}
+
+/// OpenCV's order is that of radtan: k1 k2 p1 p2 k3 k4 k5 k6, then thin prism and tilt.
+void set_radial_tangential(CameraDescription& camera,
+                           std::vector<double> coeffs,
+                           const std::string& where) {
+  const auto is_zero = [](double value) { return value == 0.0; };
+  if (coeffs.size() > 8 && std::all_of(coeffs.begin() + 8, coeffs.end(), is_zero)) coeffs.resize(8);
+  if (std::all_of(coeffs.begin(), coeffs.end(), is_zero)) return;
+  if (coeffs.size() > 8) {
+    throw InputError(where,
+                     "distortion_coefficients has thin prism or tilt terms, expected at most 8 "
+                     "numbers that are not 0");
+  }
+  camera.distortion_model = "radtan";
+  camera.distortion_coeffs = std::move(coeffs);
+}
+
+void set_equidistant(CameraDescription& camera, std::vector<double> coeffs) {
+  camera.distortion_model = "equidistant";
+  camera.distortion_coeffs = std::move(coeffs);
+}
+
+CameraChain checked_chain(const CameraDescription& camera) {
+  CameraChain chain;
+  chain.cameras.push_back({camera, Rigid3()});
+  make_rig(chain);  // Refuses what no model accepts.
+  return chain;
+}
+
+}  // namespace
+
+ConfigSource without_opencv_header(ConfigSource source) {
+  if (source.text.starts_with("%YAML:")) source.text.replace(0, 1, "#");
+  return source;
+}
+
+CameraChain read_opencv_calibration(const ConfigSource& source) {
+  const ConfigNode root = parse_config(without_opencv_header(source));
+  CameraDescription camera = read_size_and_matrix(root, source.name);
+  const ConfigNode* node = find_any(
+      root,
+      {"distortion_coefficients", "distCoeffs", "Distortion_Coefficients", "dist_coeffs", "D"});
+  std::vector<double> coeffs;
+  if (node != nullptr) coeffs = matrix_values(*node, "distortion_coefficients");
+  const ConfigNode* fisheye = find_any(root, {"fisheye_model"});
+  if (fisheye != nullptr && config_int(*fisheye, "fisheye_model", {.low = 0, .high = 1}) == 1) {
+    set_equidistant(camera, std::move(coeffs));
+  } else {
+    set_radial_tangential(camera, std::move(coeffs), node ? node->where() : source.name);
+  }
+  return checked_chain(camera);
+}
+
+CameraChain read_ros_calibration(const ConfigSource& source) {
+  const ConfigNode root = parse_config(source);
+  CameraDescription camera = read_size_and_matrix(root, source.name);
+  const ConfigNode& model_node = require_any(root, source.name, {"distortion_model"});
+  const std::string model = config_string(model_node, "distortion_model");
+  const ConfigNode* node = find_any(root, {"distortion_coefficients", "D", "d"});
+  std::vector<double> coeffs;
+  if (node != nullptr) coeffs = matrix_values(*node, "distortion_coefficients");
+  if (model == "equidistant" || model == "fisheye") {
+    set_equidistant(camera, std::move(coeffs));
+  } else if (model == "plumb_bob" || model == "rational_polynomial") {
+    set_radial_tangential(camera, std::move(coeffs), node ? node->where() : source.name);
+  } else {
+    throw InputError(model_node.where(),
+                     fmt::format("distortion_model is {}, expected plumb_bob, "
+                                 "rational_polynomial, equidistant or fisheye",
+                                 describe_value(model_node)));
+  }
+  return checked_chain(camera);
+}
+
+}  // namespace waymark

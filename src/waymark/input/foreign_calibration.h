@@ -1,0 +1,34 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "waymark/base/config.h"
+#include "waymark/camera/camchain.h"
+
+namespace waymark {
+
+/// The calibration of one camera as other programs write it, as a camchain. What is missing,
+/// malformed or has no counterpart is an InputError with its line; so is what no camera model
+/// accepts. What was passed over is in the notes.
+///
+/// OpenCV: a file of cv::FileStorage in YAML, with the keys of its calibration sample: image_width,
+/// image_height, camera_matrix, distortion_coefficients of 0, 4, 5, 8, or 12 or 14 the last of
+/// which are 0; fisheye_model 1 for the cv::fisheye model. Spellings such as K and D are accepted.
+/// Without the "%YAML:1.0" with which OpenCV's FileStorage begins and which is not YAML's
+/// directive.
+ConfigSource without_opencv_header(ConfigSource source);
+
+CameraChain read_opencv_calibration(const ConfigSource& source);
+
+/// ROS: a sensor_msgs/CameraInfo as camera_calibration saves it or `ros2 topic echo` prints it.
+/// distortion_model plumb_bob, rational_polynomial, equidistant or fisheye.
+CameraChain read_ros_calibration(const ConfigSource& source);
+
+/// COLMAP: cameras.txt of a text model; its first camera. COLMAP counts pixels from the corner of
+/// the image; the result counts from the centre of the first pixel.
+CameraChain read_colmap_calibration(const ConfigSource& source);
+
+}  // namespace waymark

@@ -1,0 +1,86 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/input.h"
+
+#include <fmt/format.h>
+
+#include "waymark/base/check.h"
+#include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
+#include "waymark/input/decode.h"
+#include "waymark/input/listing_input.h"
+
+namespace waymark {
+namespace {
+
+constexpr const char* kKnownFormats = "euroc, kitti, tum, images or video";
+
+std::string recognize_folder(const std::filesystem::path& folder) {
+  if (is_euroc(folder)) return "euroc";
+  if (is_kitti(folder)) return "kitti";
+  if (std::filesystem::exists(folder / "rgb.txt")) return "tum";
+  if (std::filesystem::is_directory(folder / "images")) return "images";
+  const std::size_t num_videos = list_videos(folder).size();
+  if (num_videos == 1) return "video";
+  if (num_videos > 1) {
+    throw InputError(folder.string(), fmt::format("holds {} videos, expected one", num_videos));
+  }
+  return "images";
+}
+
+std::string recognize(const std::filesystem::path& path) {
+  if (std::filesystem::is_directory(path)) return recognize_folder(path);
+  if (is_video_name(path)) return "video";
+  throw InputError(path.string(),
+                   "is neither folder nor video, expected a data set (EuRoC, KITTI, TUM RGB-D), a "
+                   "folder of images or a video");
+}
+
+std::filesystem::path video_of(const std::filesystem::path& path) {
+  if (!std::filesystem::is_directory(path)) return path;
+  const std::vector<std::filesystem::path> videos = list_videos(path);
+  if (videos.size() == 1) return videos.front();
+  throw InputError(path.string(), fmt::format("holds {} videos, expected one", videos.size()));
+}
+
+Listing list_files(const std::filesystem::path& path,
+                   const std::string& format,
+                   const InputOptions& options) {
+  if (!std::filesystem::is_directory(path)) {
+    throw InputError(path.string(),
+                     fmt::format("is a file, expected a folder for format {}", format));
+  }
+  if (format == "euroc") return list_euroc(path, options);
+  if (format == "kitti") return list_kitti(path, options);
+  if (format == "tum") return list_tum_rgbd(path, options);
+  if (format == "images") return list_image_folder(path, options);
+  throw InputError("--format",
+                   fmt::format("is {}, expected {}", quote_for_message(format), kKnownFormats));
+}
+
+}  // namespace
+
+bool is_camera(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  return text.starts_with("camera:") || text.starts_with("/dev/video");
+}
+
+std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
+  silence_image_library();
+  if (is_camera(path)) return open_camera(path, options);
+  if (!std::filesystem::exists(path)) {
+    throw InputError(path.string(),
+                     "does not exist, expected a data set, a folder of images or a video");
+  }
+  const std::string format = options.format.empty() ? recognize(path) : options.format;
+  try {
+    if (format == "video") return open_video(video_of(path), options);
+    return std::make_unique<ListingInput>(path, list_files(path, format, options), options);
+  } catch (const std::filesystem::filesystem_error& error) {
+    throw InputError(
+        path.string(),
+        fmt::format("cannot be read: {}, expected the right to", error.code().message()));
+  }
+}
+
+}  // namespace waymark

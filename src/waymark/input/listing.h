@@ -1,0 +1,60 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/input/input.h"
+
+namespace waymark {
+
+/// Files of one moment.
+struct ListedFrame {
+  std::int64_t timestamp_ns = 0;              ///< As the data set states it.
+  std::vector<std::filesystem::path> images;  ///< One per camera.
+  std::filesystem::path depth;                ///< Empty: none.
+};
+
+/// A data set of image files, understood but not yet decoded: what each layout comes down to.
+struct Listing {
+  std::string format;               ///< As in InputOptions.
+  std::string title;                ///< For people, for example "KITTI odometry".
+  std::vector<ListedFrame> frames;  ///< At least one; times increase.
+  Setup setup = Setup::kMono;       ///< That of the frames' images.
+  /// Calibration that the data set carries; a resolution of 0 is that of the first image.
+  std::optional<CameraChain> calibration;
+  std::vector<std::string> notes;  ///< What else was understood.
+};
+
+/// Cameras whose images a setup uses.
+std::size_t num_cameras(Setup setup);
+
+/// The setup to use: the wanted one if it is among those offered, else InputError; without a wish
+/// the last (richest) one offered.
+Setup choose_setup(const std::filesystem::path& path,
+                   const std::vector<Setup>& offered,
+                   const std::optional<Setup>& wanted);
+
+/// Image files of a folder, sorted by name with numbers in it compared as numbers. Throws
+/// InputError when the folder is missing or holds none.
+std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder);
+/// Video files of a folder in the same order; empty if there are none.
+std::vector<std::filesystem::path> list_videos(const std::filesystem::path& folder);
+
+/// Whether the extension is one of a video that may hold frames.
+bool is_video_name(const std::filesystem::path& path);
+
+/// times.txt, checked to hold one time per image. what names the images in errors.
+std::vector<std::int64_t> read_times(const std::filesystem::path& path,
+                                     std::size_t num_images,
+                                     std::string_view what);
+
+/// "T frames over D s, R per second".
+std::string describe_rate(const std::vector<std::int64_t>& times_ns);
+
+}  // namespace waymark

@@ -1,0 +1,155 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/listing_input.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "waymark/base/check.h"
+#include "waymark/input/decode.h"
+
+namespace waymark {
+namespace {
+
+/// With so many bad images in a row at the start the path is wrong rather than the disk bad.
+constexpr std::size_t kMaxBadAtStart = 50;
+
+std::string stem_of(const ListedFrame& frame) { return frame.images.front().stem().string(); }
+
+}  // namespace
+
+ListingInput::ListingInput(const std::filesystem::path& path,
+                           Listing listing,
+                           const InputOptions& options)
+    : listing_(std::move(listing)),
+      selection_(select_frames(path, options, listing_.frames.size())),
+      masks_(options.mask),
+      has_jpeg_(options.has_jpeg) {
+  info_.format = listing_.format;
+  info_.setup = listing_.setup;
+  info_.num_frames = selection_.count(listing_.frames.size());
+  info_.calibration =
+      choose_calibration(path, options.calibration, listing_.calibration, info_.setup);
+  std::vector<std::string> stems;
+  for (const ListedFrame& frame : listing_.frames) stems.push_back(stem_of(frame));
+  masks_.expect_one_of(stems);
+  check_first_frame(find_first_readable());
+  check_first_depth();
+  describe(path, options);
+}
+
+std::optional<InputFrame> ListingInput::next() {
+  if (num_read_ == *info_.num_frames) return std::nullopt;
+  return read(selection_.first + selection_.every * num_read_++);
+}
+
+InputFrame ListingInput::read(std::size_t index) const {
+  const ListedFrame& listed = listing_.frames[index];
+  InputFrame frame;
+  frame.index = index;
+  frame.timestamp_ns = listed.timestamp_ns;
+  frame.fault = read_images(listed, frame);
+  if (frame.fault != FrameFault::kNone) {
+    frame.images.clear();
+    return frame;
+  }
+  read_depth(listed, frame);
+  masks_.attach(stem_of(listed), frame);
+  if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front()).value_or("");
+  return frame;
+}
+
+FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& frame) const {
+  for (std::size_t i = 0; i < listed.images.size(); ++i) {
+    std::optional<Image> image = read_grey_image(listed.images[i]);
+    if (!image) return FrameFault::kUnreadable;
+    if (!sizes_.empty() && sizes_[i] != ImageSize{image->width_px, image->height_px}) {
+      return FrameFault::kWrongSize;
+    }
+    frame.images.push_back(std::move(*image));
+  }
+  return FrameFault::kNone;
+}
+
+/// A bad depth image leaves the frame without depth, as a missing one does.
+void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) const {
+  if (listed.depth.empty()) return;
+  const Image& image = frame.images.front();
+  std::optional<DepthImage> depth = read_depth_image(listed.depth);
+  if (!depth || depth->width_px != image.width_px || depth->height_px != image.height_px) return;
+  frame.depth = std::move(depth);
+}
+
+std::size_t ListingInput::find_first_readable() const {
+  const std::size_t num_tried = std::min(*info_.num_frames, kMaxBadAtStart);
+  for (std::size_t i = 0; i < num_tried; ++i) {
+    const std::size_t index = selection_.first + selection_.every * i;
+    InputFrame frame;
+    if (read_images(listing_.frames[index], frame) == FrameFault::kNone) return index;
+  }
+  const std::filesystem::path& first = listing_.frames[selection_.first].images.front();
+  throw InputError(
+      first.string(),
+      fmt::format("missing or unreadable as the {} frames from it on, expected an image",
+                  num_tried));
+}
+
+void ListingInput::check_first_frame(std::size_t index) {
+  const ListedFrame& listed = listing_.frames[index];
+  InputFrame frame;
+  read_images(listed, frame);
+  for (std::size_t i = 0; i < frame.images.size(); ++i) {
+    const ImageSize size{frame.images[i].width_px, frame.images[i].height_px};
+    if (info_.calibration) fit_first_image(*info_.calibration, i, size, listed.images[i]);
+    sizes_.push_back(size);
+  }
+  info_.width_px = sizes_.front().width_px;
+  info_.height_px = sizes_.front().height_px;
+  masks_.attach(stem_of(listed), frame);
+  masks_.check_first(stem_of(listed), frame);
+}
+
+void ListingInput::check_first_depth() const {
+  for (const ListedFrame& listed : listing_.frames) {
+    if (listed.depth.empty()) continue;
+    const std::optional<DepthImage> depth = read_depth_image(listed.depth);
+    if (!depth) {
+      throw InputError(listed.depth.string(),
+                       "missing or unreadable, expected a 16-bit depth image");
+    }
+    if (depth->width_px != info_.width_px || depth->height_px != info_.height_px) {
+      throw InputError(listed.depth.string(),
+                       fmt::format("depth of {}x{}, expected {}x{} as the colour image",
+                                   depth->width_px,
+                                   depth->height_px,
+                                   info_.width_px,
+                                   info_.height_px));
+    }
+    return;
+  }
+}
+
+void ListingInput::describe(const std::filesystem::path& path, const InputOptions& options) {
+  std::vector<std::int64_t> times_ns;
+  for (const ListedFrame& frame : listing_.frames) times_ns.push_back(frame.timestamp_ns);
+  info_.lines.push_back(
+      fmt::format("{}: {} ({})", path.string(), listing_.title, to_string(info_.setup)));
+  info_.lines.push_back(describe_rate(times_ns));
+  std::string sizes;
+  for (const ImageSize& size : sizes_) {
+    sizes += fmt::format("{}{}x{}", sizes.empty() ? "" : " and ", size.width_px, size.height_px);
+  }
+  info_.lines.push_back(fmt::format("images of {} px", sizes));
+  for (const std::string& note : listing_.notes) info_.lines.push_back(note);
+  info_.lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
+  if (*info_.num_frames != listing_.frames.size()) {
+    info_.lines.push_back(fmt::format("{} frames used, from {} on, every {}",
+                                      *info_.num_frames,
+                                      selection_.first,
+                                      selection_.every));
+  }
+}
+
+}  // namespace waymark

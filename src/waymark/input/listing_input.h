@@ -1,0 +1,45 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <optional>
+
+#include "waymark/input/calibration.h"
+#include "waymark/input/input.h"
+#include "waymark/input/listing.h"
+#include "waymark/input/mask.h"
+#include "waymark/input/selection.h"
+
+namespace waymark {
+
+/// Reads the image files of a listing one frame after the other.
+class ListingInput : public Input {
+ public:
+  /// Reads the first image to learn sizes and to check them against the calibration. Throws
+  /// InputError.
+  ListingInput(const std::filesystem::path& path, Listing listing, const InputOptions& options);
+
+  const InputInfo& info() const override { return info_; }
+  std::optional<InputFrame> next() override;
+
+ private:
+  InputFrame read(std::size_t index) const;
+  FrameFault read_images(const ListedFrame& listed, InputFrame& frame) const;
+  void read_depth(const ListedFrame& listed, InputFrame& frame) const;
+  std::size_t find_first_readable() const;
+  void check_first_frame(std::size_t index);
+  void check_first_depth() const;
+  void describe(const std::filesystem::path& path, const InputOptions& options);
+
+  Listing listing_;
+  FrameSelection selection_;
+  MaskSource masks_;
+  bool has_jpeg_;
+  InputInfo info_;
+  std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
+  std::size_t num_read_ = 0;
+};
+
+}  // namespace waymark

@@ -1,0 +1,129 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapfile/map_features.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "waymark/image/pyramid.h"
+
+namespace waymark {
+namespace {
+
+constexpr double kMaxAngle = 10.0;      // Of angles in radians; more is no angle.
+constexpr double kMaxUnitError = 1e-3;  // Of bearings, which are single floats.
+constexpr double kMaxOutsidePx = 2.0;   // Noise and rounding may leave the image a little.
+constexpr double kMaxSlope = 1e9;       // In pixels per unit of bearing.
+constexpr NumberRange kAngle{-kMaxAngle, kMaxAngle};
+
+std::vector<Keypoint> read_keypoints(MapRecord& record) {
+  const auto pixels = record.array<Eigen::Vector2f>("pixel", std::nullopt);
+  const std::size_t count = pixels.size();
+  const auto angles = record.array<float>("angle_rad", count, kAngle);
+  const auto responses = record.array<float>("response", count);
+  const auto levels = record.array<std::uint8_t>("level", count);
+  const auto cameras = record.array<std::uint8_t>("camera", count);
+  std::vector<Keypoint> keypoints(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    keypoints[i] = {pixels[i].x(), pixels[i].y(), angles[i], responses[i], levels[i], cameras[i]};
+  }
+  return keypoints;
+}
+
+void check_keypoint(const MapRecord& record,
+                    const Rig& rig,
+                    const Features& features,
+                    std::size_t i) {
+  const Keypoint& keypoint = features.keypoints[i];
+  const bool is_primary = i < features.num_primary;
+  if (keypoint.camera != (is_primary ? 0 : 1) || keypoint.camera >= rig.cameras.size()) {
+    record.fail(fmt::format("camera of feature {} is {}, expected {} of {} cameras",
+                            i,
+                            keypoint.camera,
+                            is_primary ? 0 : 1,
+                            rig.cameras.size()));
+  }
+  if (keypoint.level >= Pyramid::kNumLevels) {
+    record.fail(fmt::format("level of feature {} is {}, expected less than {}",
+                            i,
+                            keypoint.level,
+                            Pyramid::kNumLevels));
+  }
+  const Camera& camera = *rig.cameras[keypoint.camera].camera;
+  const double least = -0.5 - kMaxOutsidePx;
+  if (!(keypoint.x_px >= least && keypoint.x_px <= camera.width_px() - 1 - least) ||
+      !(keypoint.y_px >= least && keypoint.y_px <= camera.height_px() - 1 - least)) {
+    record.fail(fmt::format("pixel of feature {} is ({}, {}), expected one within {} x {} px",
+                            i,
+                            keypoint.x_px,
+                            keypoint.y_px,
+                            camera.width_px(),
+                            camera.height_px()));
+  }
+  const double length = features.bearings[i].cast<double>().norm();
+  if (!(std::abs(length - 1.0) <= kMaxUnitError)) {
+    record.fail(fmt::format("bearing of feature {} has the length {}, expected 1", i, length));
+  }
+}
+
+void check_range(const MapRecord& record, const Features& features, std::size_t i) {
+  if (features.range_m[i] > 0.0f || features.inverse_range_sigma[i] == 0.0f) return;
+  record.fail(fmt::format("inverse_range_sigma of feature {} is {} without a range, expected 0",
+                          i,
+                          features.inverse_range_sigma[i]));
+}
+
+void check_partner(const MapRecord& record, const Features& features, std::size_t i) {
+  const bool is_primary = i < features.num_primary;
+  const std::uint32_t partner = features.partner[i];
+  if (is_primary && partner == kNoFeature) return;
+  const bool is_there = partner < features.size();
+  const bool is_mutual = is_there && features.partner[partner] == i;
+  if (!is_mutual || (partner < features.num_primary) == is_primary) {
+    record.fail(fmt::format(
+        "partner of feature {} is {}, expected one of the other camera that names it, too",
+        i,
+        partner));
+  }
+}
+
+}  // namespace
+
+std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig) {
+  auto features = std::make_shared<Features>();
+  features->keypoints = read_keypoints(record);
+  const std::size_t count = features->size();
+  features->descriptors = record.array<Descriptor>("descriptor", std::nullopt);
+  const std::size_t num_primary = features->descriptors.size();
+  features->num_primary = num_primary;
+  if (num_primary > count) {
+    record.fail(fmt::format(
+        "has {} descriptors, expected at most {}, one per feature", num_primary, count));
+  }
+  features->bearings = record.array<Eigen::Vector3f>("bearing", count);
+  features->level_pixel_from_bearing =
+      record.array<Matrix23f>("level_pixel_from_bearing", count, {-kMaxSlope, kMaxSlope});
+  features->size_rad = record.array<float>("size_rad", count, {kPositive.low, kMaxAngle});
+  features->partner = record.array<std::uint32_t>("partner", count);
+  features->range_m = record.array<float>("range_m", num_primary, kNotNegative);
+  features->inverse_range_sigma =
+      record.array<float>("inverse_range_sigma", num_primary, kNotNegative);
+  for (std::size_t i = 0; i < count; ++i) {
+    check_keypoint(record, rig, *features, i);
+    check_partner(record, *features, i);
+    if (i < num_primary) check_range(record, *features, i);
+  }
+  const Camera& camera = *rig.cameras[0].camera;
+  features->grid =
+      FeatureGrid(camera.width_px(),
+                  camera.height_px(),
+                  camera.wrap_width_px(),
+                  num_primary,
+                  [&](std::size_t i) {
+                    return std::pair(features->keypoints[i].x_px, features->keypoints[i].y_px);
+                  });
+  return features;
+}
+
+}  // namespace waymark

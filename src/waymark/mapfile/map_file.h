@@ -1,0 +1,54 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <iosfwd>
+#include <map>
+#include <memory>
+#include <string>
+#include <vector>
+
+#include "waymark/camera/registry.h"
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+/// A JPEG file; shared, for there are many of them and they are large. Never null.
+using SharedJpeg = std::shared_ptr<const std::string>;
+
+/// Images of camera 0 of keyframes, as map files hold them.
+using KeyframeImages = std::map<KeyframeId, SharedJpeg>;
+
+/// What a map file holds; docs/map-format.md describes its bytes.
+struct StoredMap {
+  std::shared_ptr<const Map> map;  ///< Never null.
+  std::string settings;            ///< Those used, as YAML.
+  /// Of some keyframes or none; those of erased ones are not saved.
+  KeyframeImages images;
+  std::string producer = {};  ///< The program that wrote the file; save_map() sets its own.
+};
+
+/// Writes a map file, record by record into a temporary file that replaces `path` at the end: at
+/// any moment there is the old file or the new one. The same map gives the same bytes. Throws
+/// OutputError when that fails, InputError for a camera that was made without a description.
+void save_map(const std::filesystem::path& path, const StoredMap& stored);
+
+/// Reads a map file of any version ever written. Whatever is wrong with it, be it damaged or made
+/// to do harm, is an InputError that names the file, the record and what was expected. `registry`
+/// makes the cameras.
+StoredMap load_map(const std::filesystem::path& path,
+                   const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
+/// The same from a stream; `name` is what errors call it.
+StoredMap read_map(std::istream& stream,
+                   const std::string& name,
+                   const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
+/// What load_map() would complain of: the first damage, or else every invariant of the map that is
+/// violated, up to 1000, a line each. Empty if there is nothing.
+std::vector<std::string> find_map_faults(
+    const std::filesystem::path& path,
+    const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
+}  // namespace waymark

@@ -1,0 +1,183 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapfile/map_file.h"
+
+#include <gmock/gmock.h>
+
+#include <sstream>
+
+#include "waymark/base/testing/errors.h"
+#include "waymark/base/testing/temporary_folder.h"
+#include "waymark/base/text.h"
+#include "waymark/camera/model_camera.h"
+#include "waymark/camera/perspective.h"
+#include "waymark/map/testing/random_map.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::input_error_of;
+using ::testing::IsEmpty;
+using testing::RandomMap;
+using testing::TemporaryFolder;
+
+StoredMap stored_map(std::uint64_t seed) {
+  StoredMap stored;
+  stored.map = RandomMap(seed).map().freeze();
+  stored.settings = "features: {count: 800}\n";
+  stored.images[stored.map->submaps()[0].root] =
+      std::make_shared<const std::string>("\xFF\xD8\0jpeg", 7);
+  return stored;
+}
+
+/// Of everything but the tables that follow from others.
+void expect_same(const Keyframe& a, const Keyframe& b) {
+  EXPECT_EQ(a.frame, b.frame);
+  EXPECT_EQ(a.timestamp_ns, b.timestamp_ns);
+  EXPECT_EQ(a.submap, b.submap);
+  EXPECT_EQ(a.parent, b.parent);
+  EXPECT_EQ(a.rig_from_world.matrix(), b.rig_from_world.matrix());
+  EXPECT_EQ(a.applied_scale, b.applied_scale);
+  EXPECT_EQ(a.landmarks, b.landmarks);
+  ASSERT_EQ(a.rig->cameras.size(), b.rig->cameras.size());
+  for (std::size_t i = 0; i < a.rig->cameras.size(); ++i) {
+    EXPECT_TRUE(a.rig->cameras[i].description->is_same(*b.rig->cameras[i].description));
+    EXPECT_EQ(a.rig->cameras[i].cam_from_rig.matrix(), b.rig->cameras[i].cam_from_rig.matrix());
+    EXPECT_EQ(a.rig->cameras[i].camera->model(), b.rig->cameras[i].camera->model());
+  }
+}
+
+void expect_same(const Features& a, const Features& b) {
+  ASSERT_EQ(a.size(), b.size());
+  EXPECT_EQ(a.num_primary, b.num_primary);
+  for (std::size_t i = 0; i < a.size(); ++i) {
+    const Keypoint& p = a.keypoints[i];
+    const Keypoint& q = b.keypoints[i];
+    EXPECT_EQ(std::tie(p.x_px, p.y_px, p.angle_rad, p.response, p.level, p.camera),
+              std::tie(q.x_px, q.y_px, q.angle_rad, q.response, q.level, q.camera));
+  }
+  EXPECT_EQ(a.descriptors, b.descriptors);
+  EXPECT_EQ(a.bearings, b.bearings);
+  EXPECT_EQ(a.level_pixel_from_bearing, b.level_pixel_from_bearing);
+  EXPECT_EQ(a.size_rad, b.size_rad);
+  EXPECT_EQ(a.partner, b.partner);
+  EXPECT_EQ(a.range_m, b.range_m);
+  EXPECT_EQ(a.inverse_range_sigma, b.inverse_range_sigma);
+  std::vector<std::uint32_t> near_a, near_b;
+  a.grid.visit_near(100.0, 80.0, 30.0, [&](std::uint32_t i) { near_a.push_back(i); });
+  b.grid.visit_near(100.0, 80.0, 30.0, [&](std::uint32_t i) { near_b.push_back(i); });
+  EXPECT_EQ(near_a, near_b);
+}
+
+TEST(MapFile, HoldsEverything) {
+  const TemporaryFolder folder;
+  const StoredMap saved = stored_map(1);
+  save_map(folder / "a.wmap", saved);
+  const StoredMap loaded = load_map(folder / "a.wmap");
+  EXPECT_EQ(loaded.settings, saved.settings);
+  ASSERT_EQ(loaded.images.size(), 1u);
+  EXPECT_EQ(loaded.images.begin()->first, saved.images.begin()->first);
+  EXPECT_EQ(*loaded.images.begin()->second, *saved.images.begin()->second);
+  EXPECT_THAT(loaded.producer, HasSubstr("waymark "));
+  EXPECT_THAT(find_map_faults(folder / "a.wmap"), IsEmpty());
+  ASSERT_EQ(loaded.map->keyframes().size(), saved.map->keyframes().size());
+  saved.map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    expect_same(keyframe, loaded.map->keyframes().at(id));
+    expect_same(*keyframe.features, *loaded.map->keyframes().at(id).features);
+  });
+  ASSERT_EQ(loaded.map->landmarks().size(), saved.map->landmarks().size());
+  saved.map->landmarks().for_each([&](LandmarkId id, const Landmark& a) {
+    const Landmark& b = loaded.map->landmarks().at(id);
+    EXPECT_EQ(std::tie(a.submap, a.position_in_world, a.reference, a.observations),
+              std::tie(b.submap, b.position_in_world, b.reference, b.observations));
+    EXPECT_EQ(std::tie(a.num_visible, a.num_found, a.appearance.descriptor, a.appearance.size_m),
+              std::tie(b.num_visible, b.num_found, b.appearance.descriptor, b.appearance.size_m));
+    EXPECT_EQ(a.appearance.direction, b.appearance.direction);
+  });
+}
+
+TEST(MapFile, SavingWhatWasLoadedGivesTheSameBytes) {
+  const TemporaryFolder folder;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    save_map(folder / "a.wmap", stored_map(seed));
+    save_map(folder / "b.wmap", load_map(folder / "a.wmap"));
+    const std::string bytes = read_text_file(folder / "a.wmap", "a map");
+    ASSERT_EQ(bytes, read_text_file(folder / "b.wmap", "a map")) << "seed " << seed;
+    std::istringstream stream(bytes);
+    EXPECT_EQ(read_map(stream, "stream").map->broken_invariants(), "");
+  }
+}
+
+TEST(MapFile, KeepsEmptyMaps) {
+  const TemporaryFolder folder;
+  StoredMap empty;
+  empty.map = Map().freeze();
+  save_map(folder / "empty.wmap", empty);
+  EXPECT_TRUE(load_map(folder / "empty.wmap").map->keyframes().is_empty());
+}
+
+TEST(MapFile, KeepsCamerasOfRegisteredModels) {
+  CameraRegistry registry = CameraRegistry::with_builtin_models();
+  registry.add("mine", [](const CameraDescription& description) {
+    const PerspectiveModel model(
+        {description.intrinsics.at(0), description.intrinsics.at(0)}, {50.0, 50.0}, {});
+    return std::make_shared<const ModelCamera<PerspectiveModel>>(
+        model, description.width_px, description.height_px);
+  });
+  CameraChain chain;
+  chain.cameras.push_back({{"mine", {123.0}, "none", {}, 100, 100, "test"}, Rigid3()});
+  Map map;
+  Keyframe keyframe;
+  keyframe.submap = map.add_submap(false);
+  keyframe.rig = std::make_shared<const Rig>(make_rig(chain, registry));
+  keyframe.features = std::make_shared<const Features>();
+  map.add_keyframe(keyframe);
+  StoredMap stored;
+  stored.map = map.freeze();
+  const TemporaryFolder folder;
+  save_map(folder / "mine.wmap", stored);
+  const StoredMap loaded = load_map(folder / "mine.wmap", registry);
+  EXPECT_EQ(loaded.map->keyframes().at(KeyframeId{0}).rig->cameras[0].description->intrinsics,
+            std::vector<double>{123.0});
+  EXPECT_THAT(input_error_of([&] { load_map(folder / "mine.wmap"); }),
+              HasSubstr("mine.wmap: camera 0: camera_model is mine, expected one of"));
+}
+
+TEST(MapFile, RefusesCamerasWithoutDescription) {
+  Map map;
+  Keyframe keyframe;
+  keyframe.submap = map.add_submap(false);
+  auto rig = std::make_shared<Rig>();
+  rig->cameras.push_back({nullptr, Rigid3()});
+  keyframe.rig = rig;
+  keyframe.features = std::make_shared<const Features>();
+  map.add_keyframe(keyframe);
+  StoredMap stored;
+  stored.map = map.freeze();
+  const TemporaryFolder folder;
+  EXPECT_THAT(input_error_of([&] { save_map(folder / "a.wmap", stored); }),
+              HasSubstr("expected rigs made by make_rig()"));
+  EXPECT_FALSE(std::filesystem::exists(folder / "a.wmap"));
+}
+
+TEST(MapFile, LeavesOutImagesOfErasedKeyframes) {
+  StoredMap stored = stored_map(1);
+  const std::size_t num_kept = stored.images.size();
+  KeyframeId erased{0};
+  while (stored.map->keyframes().contains(erased)) ++erased.value;
+  stored.images[erased] = std::make_shared<const std::string>("gone");
+  const TemporaryFolder folder;
+  save_map(folder / "a.wmap", stored);
+  EXPECT_EQ(load_map(folder / "a.wmap").images.size(), num_kept);
+}
+
+TEST(MapFile, SaysWhatItCannotOpen) {
+  const TemporaryFolder folder;
+  EXPECT_THAT(input_error_of([&] { load_map(folder / "none.wmap"); }),
+              HasSubstr("none.wmap: missing, expected a map file"));
+  EXPECT_THAT(input_error_of([&] { load_map(folder.path()); }), HasSubstr("is no regular file"));
+}
+
+}  // namespace
+}  // namespace waymark

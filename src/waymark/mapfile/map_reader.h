@@ -1,0 +1,59 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "waymark/mapfile/map_file.h"
+#include "waymark/mapfile/map_record.h"
+
+namespace waymark {
+
+/// Gathers a map from the records of version 1, which come in the order of kinds that
+/// docs/map-format.md gives. What one record says is checked here; how they fit together is left to
+/// Map::list_broken_invariants().
+class MapReader {
+ public:
+  MapReader(std::string name, const CameraRegistry& registry)
+      : name_(std::move(name)), registry_(registry) {}
+
+  /// Takes the next record in, whose kind is not "end".
+  void add(MapRecord& record, const std::string& kind);
+  /// Takes in the last one and gives all that was gathered. InputError for what no map can be made
+  /// of.
+  StoredMap finish(MapRecord& record);
+
+ private:
+  struct Kind;
+  static const std::vector<Kind>& kinds();
+
+  void check_order(const MapRecord& record, std::size_t kind, std::uint64_t id);
+  void check_ids() const;
+
+  void read_map(MapRecord& record);
+  void read_camera(MapRecord& record);
+  void read_submap(MapRecord& record);
+  void read_keyframe(MapRecord& record);
+  void read_landmarks(MapRecord& record);
+  void read_erased_keyframe(MapRecord& record);
+  void read_merged_landmarks(MapRecord& record);
+  void read_loop_edge(MapRecord& record);
+  void read_image(MapRecord& record);
+  template <class Stored>
+  std::vector<LandmarkId> read_landmark_ids(MapRecord& record, const std::vector<Stored>& before);
+
+  const std::string name_;
+  const CameraRegistry& registry_;
+  std::size_t kind_ = 0;  // Of the last record, by place in kinds().
+  std::uint64_t id_ = 0;
+  std::map<std::string, std::uint64_t> counts_;  // Of records by kind.
+  std::vector<std::shared_ptr<Rig>> rigs_;
+  MapParts parts_;
+  StoredMap stored_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,67 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/base/atomic_file.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/mapfile/map_layout.h"
+
+namespace waymark {
+
+/// Writes the records of a map file one after the other, each a MessagePack map that ends with its
+/// checksum. Holds one record at a time. The file is borrowed.
+class MapRecordWriter {
+ public:
+  explicit MapRecordWriter(AtomicFile& file) : file_(file) {}
+
+  /// The first record, which has no kind.
+  void write_header(int version, std::string_view producer);
+
+  void begin(std::string_view kind, std::uint64_t id);
+  void add(std::string_view key, std::uint64_t value);
+  void add_signed(std::string_view key, std::int64_t value);
+  void add_flag(std::string_view key, bool value);
+  void add_text(std::string_view key, std::string_view value);
+  void add_bytes(std::string_view key, std::string_view value);
+  void add_number(std::string_view key, double value);
+  void add_numbers(std::string_view key, std::span<const double> values);
+  void add_transform(std::string_view key, const Rigid3& transform);
+  /// nil where the id is invalid.
+  template <class Tag>
+  void add_id(std::string_view key, Id<Tag> id) {
+    id.is_valid() ? add(key, id.value) : add_nothing(key);
+  }
+  template <class T>
+  void add_array(std::string_view key, const std::vector<T>& values) {
+    add_raw_array(key,
+                  map_array_layout<T>(),
+                  values.size(),
+                  {reinterpret_cast<const char*>(values.data()), values.size() * sizeof(T)});
+  }
+  void end();
+
+  /// The last record: how many there are of each kind.
+  void write_counts();
+
+ private:
+  void add_key(std::string_view key);
+  void add_nothing(std::string_view key);
+  void add_raw_array(std::string_view key,
+                     const MapArrayLayout& layout,
+                     std::size_t count,
+                     std::string_view bytes);
+
+  AtomicFile& file_;
+  std::string body_;
+  std::uint32_t num_keys_ = 0;
+  std::map<std::string, std::uint64_t, std::less<>> counts_;
+};
+
+}  // namespace waymark

@@ -1,0 +1,272 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "waymark/base/check.h"
+#include "waymark/camera/same_rig.h"
+#include "waymark/mapfile/map_file.h"
+#include "waymark/mapfile/map_layout.h"
+#include "waymark/mapfile/map_record_writer.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kVersion = 1;
+constexpr std::string_view kProducer = "waymark " WAYMARK_VERSION;
+
+/// The distinct rigs of a map, in the order of the keyframes.
+class RigTable {
+ public:
+  explicit RigTable(const Map& map) {
+    map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) { add(*keyframe.rig); });
+  }
+
+  const std::vector<const Rig*>& rigs() const { return rigs_; }
+
+  std::uint64_t index_of(const Rig& rig) const {
+    const auto at = std::find_if(
+        rigs_.begin(), rigs_.end(), [&](const Rig* known) { return is_same_rig(*known, rig); });
+    WAYMARK_CHECK(at != rigs_.end());
+    return static_cast<std::uint64_t>(at - rigs_.begin());
+  }
+
+ private:
+  void add(const Rig& rig) {
+    if (!rigs_.empty() && rigs_.back() == &rig) return;
+    for (const RigCamera& camera : rig.cameras) {
+      if (camera.description) continue;
+      throw InputError("map",
+                       fmt::format("holds a camera of the model {} that was made without a "
+                                   "description, expected rigs made by make_rig()",
+                                   camera.camera ? camera.camera->model() : "none"));
+    }
+    const bool is_known = std::any_of(
+        rigs_.begin(), rigs_.end(), [&](const Rig* known) { return is_same_rig(*known, rig); });
+    if (!is_known) rigs_.push_back(&rig);
+  }
+
+  std::vector<const Rig*> rigs_;
+};
+
+void write_cameras(MapRecordWriter& writer, const RigTable& table) {
+  std::uint64_t id = 0;
+  for (std::size_t rig = 0; rig < table.rigs().size(); ++rig) {
+    for (const RigCamera& camera : table.rigs()[rig]->cameras) {
+      const CameraDescription& description = *camera.description;
+      writer.begin("camera", id++);
+      writer.add("rig", rig);
+      writer.add_text("camera_model", description.camera_model);
+      writer.add_numbers("intrinsics", description.intrinsics);
+      writer.add_text("distortion_model", description.distortion_model);
+      writer.add_numbers("distortion_coeffs", description.distortion_coeffs);
+      writer.add("width_px", static_cast<std::uint64_t>(description.width_px));
+      writer.add("height_px", static_cast<std::uint64_t>(description.height_px));
+      writer.add_transform("cam_from_rig", camera.cam_from_rig);
+      writer.end();
+    }
+  }
+}
+
+void write_submaps(MapRecordWriter& writer, const Map& map) {
+  std::uint64_t id = 0;
+  for (const Submap& submap : map.submaps()) {
+    writer.begin("submap", id++);
+    writer.add_flag("is_metric", submap.is_metric);
+    writer.add_id("root", submap.root);
+    writer.add_id("joined_into", submap.joined_into);
+    writer.end();
+  }
+}
+
+/// A column of a table of structs.
+template <class T, class Rows, class Get>
+std::vector<T> column(const Rows& rows, const Get& get) {
+  std::vector<T> values;
+  values.reserve(rows.size());
+  for (const auto& row : rows) values.push_back(get(row));
+  return values;
+}
+
+void add_features(MapRecordWriter& writer, const Features& features) {
+  const std::size_t count = features.size();
+  WAYMARK_CHECK(features.bearings.size() == count && features.partner.size() == count &&
+                features.level_pixel_from_bearing.size() == count &&
+                features.size_rad.size() == count);
+  WAYMARK_CHECK(features.num_primary <= count &&
+                features.descriptors.size() == features.num_primary &&
+                features.range_m.size() == features.num_primary &&
+                features.inverse_range_sigma.size() == features.num_primary);
+  const std::vector<Keypoint>& keypoints = features.keypoints;
+  using Point = const Keypoint&;
+  writer.add_array("pixel", column<Eigen::Vector2f>(keypoints, [](Point point) {
+                     return Eigen::Vector2f(point.x_px, point.y_px);
+                   }));
+  writer.add_array("angle_rad",
+                   column<float>(keypoints, [](Point point) { return point.angle_rad; }));
+  writer.add_array("response",
+                   column<float>(keypoints, [](Point point) { return point.response; }));
+  writer.add_array("level",
+                   column<std::uint8_t>(keypoints, [](Point point) { return point.level; }));
+  writer.add_array("camera",
+                   column<std::uint8_t>(keypoints, [](Point point) { return point.camera; }));
+  writer.add_array("descriptor", features.descriptors);
+  writer.add_array("bearing", features.bearings);
+  writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing);
+  writer.add_array("size_rad", features.size_rad);
+  writer.add_array("partner", features.partner);
+  writer.add_array("range_m", features.range_m);
+  writer.add_array("inverse_range_sigma", features.inverse_range_sigma);
+}
+
+void write_keyframes(MapRecordWriter& writer, const Map& map, const RigTable& rigs) {
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    writer.begin("keyframe", id.value);
+    writer.add("frame", keyframe.frame.value);
+    writer.add_signed("timestamp_ns", keyframe.timestamp_ns);
+    writer.add("rig", rigs.index_of(*keyframe.rig));
+    writer.add_id("submap", keyframe.submap);
+    writer.add_id("parent", keyframe.parent);
+    writer.add_transform("rig_from_world", keyframe.rig_from_world);
+    writer.add_number("applied_scale", keyframe.applied_scale);
+    add_features(writer, *keyframe.features);
+    writer.add_array("landmark", keyframe.landmarks);
+    writer.end();
+  });
+}
+
+/// Rows gathered until there are enough for a record.
+struct LandmarkRows {
+  std::vector<LandmarkId> id;
+  std::vector<SubmapId> submap;
+  std::vector<Eigen::Vector3d> position_in_world;
+  std::vector<KeyframeId> reference;
+  std::vector<std::uint32_t> num_visible;
+  std::vector<std::uint32_t> num_found;
+  std::vector<Descriptor> descriptor;
+  std::vector<Eigen::Vector3d> direction;
+  std::vector<double> size_m;
+
+  void add(LandmarkId landmark_id, const Landmark& landmark) {
+    id.push_back(landmark_id);
+    submap.push_back(landmark.submap);
+    position_in_world.push_back(landmark.position_in_world);
+    reference.push_back(landmark.reference);
+    num_visible.push_back(landmark.num_visible);
+    num_found.push_back(landmark.num_found);
+    descriptor.push_back(landmark.appearance.descriptor);
+    direction.push_back(landmark.appearance.direction);
+    size_m.push_back(landmark.appearance.size_m);
+  }
+
+  void write(MapRecordWriter& writer, std::uint64_t record_id) const {
+    writer.begin("landmarks", record_id);
+    writer.add_array("landmark", id);
+    writer.add_array("submap", submap);
+    writer.add_array("position_in_world", position_in_world);
+    writer.add_array("reference", reference);
+    writer.add_array("num_visible", num_visible);
+    writer.add_array("num_found", num_found);
+    writer.add_array("descriptor", descriptor);
+    writer.add_array("direction", direction);
+    writer.add_array("size_m", size_m);
+    writer.end();
+  }
+};
+
+void write_landmarks(MapRecordWriter& writer, const Map& map) {
+  LandmarkRows rows;
+  std::uint64_t record_id = 0;
+  map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+    rows.add(id, landmark);
+    if (rows.id.size() < kLandmarksPerRecord) return;
+    rows.write(writer, record_id++);
+    rows = {};
+  });
+  if (!rows.id.empty()) rows.write(writer, record_id);
+}
+
+void write_erased_keyframes(MapRecordWriter& writer, const Map& map) {
+  map.keyframe_forwarding().for_each([&](KeyframeId id, const KeyframeForwarding& forwarding) {
+    if (!forwarding.heir.is_valid()) return;
+    writer.begin("erased_keyframe", id.value);
+    writer.add_id("heir", forwarding.heir);
+    writer.add_transform("rig_from_heir", forwarding.rig_from_heir);
+    writer.add_number("heir_scale", forwarding.heir_scale);
+    writer.add_number("scale", forwarding.scale);
+    writer.end();
+  });
+}
+
+void write_merged_landmarks(MapRecordWriter& writer, const Map& map) {
+  std::vector<LandmarkId> landmarks, survivors;
+  std::uint64_t record_id = 0;
+  const auto write = [&] {
+    writer.begin("merged_landmarks", record_id++);
+    writer.add_array("landmark", landmarks);
+    writer.add_array("survivor", survivors);
+    writer.end();
+    landmarks.clear();
+    survivors.clear();
+  };
+  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
+    if (!survivor.is_valid()) return;
+    landmarks.push_back(id);
+    survivors.push_back(survivor);
+    if (landmarks.size() == kLandmarksPerRecord) write();
+  });
+  if (!landmarks.empty()) write();
+}
+
+void write_loop_edges(MapRecordWriter& writer, const Map& map) {
+  std::uint64_t id = 0;
+  for (const LoopEdge& edge : map.measured_loop_edges()) {
+    writer.begin("loop_edge", id++);
+    writer.add_id("from", edge.from);
+    writer.add_id("to", edge.to);
+    writer.add_transform("to_from_from",
+                         {edge.to_from_from.rotation, edge.to_from_from.translation});
+    writer.add_number("scale", edge.to_from_from.scale);
+    writer.end();
+  }
+}
+
+void write_images(MapRecordWriter& writer, const StoredMap& stored) {
+  for (const auto& [id, jpeg] : stored.images) {
+    if (!stored.map->keyframes().contains(id)) continue;  // Erased meanwhile.
+    WAYMARK_CHECK(jpeg->size() <= kMaxArrayBytes);
+    writer.begin("image", id.value);
+    writer.add_bytes("jpeg", *jpeg);
+    writer.end();
+  }
+}
+
+}  // namespace
+
+void save_map(const std::filesystem::path& path, const StoredMap& stored) {
+  WAYMARK_CHECK(stored.map != nullptr);
+  const Map& map = *stored.map;
+  WAYMARK_CHECK(map.landmarks().end_id().value <= kMaxIds);
+  const RigTable rigs(map);
+  AtomicFile file(path);
+  MapRecordWriter writer(file);
+  writer.write_header(kVersion, kProducer);
+  writer.begin("map", 0);
+  writer.add("end_keyframe", map.keyframes().end_id().value);
+  writer.add("end_landmark", map.landmarks().end_id().value);
+  writer.add_text("settings", stored.settings);
+  writer.end();
+  write_cameras(writer, rigs);
+  write_submaps(writer, map);
+  write_keyframes(writer, map, rigs);
+  write_landmarks(writer, map);
+  write_erased_keyframes(writer, map);
+  write_merged_landmarks(writer, map);
+  write_loop_edges(writer, map);
+  write_images(writer, stored);
+  writer.write_counts();
+  file.commit();
+}
+
+}  // namespace waymark

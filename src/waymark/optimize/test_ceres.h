@@ -1,0 +1,18 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <span>
+
+#include "waymark/optimize/schur_solver.h"
+
+namespace waymark::testing {
+
+/// The same problem, loss and result as minimize_with_schur by Ceres: the independent opinion.
+/// One thread and contiguous blocks, which makes Ceres repeatable.
+BundleRound minimize_with_ceres(BundleProblem& problem,
+                                std::span<const std::uint8_t> is_used,
+                                const BundleOptions& options);
+
+}  // namespace waymark::testing

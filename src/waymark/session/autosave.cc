@@ -1,0 +1,69 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/autosave.h"
+
+#include <utility>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+
+Autosave::Autosave(std::filesystem::path path,
+                   double interval_s,
+                   std::string settings,
+                   const ImageKeeper& images)
+    : path_(std::move(path)),
+      interval_(
+          std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_s))),
+      settings_(std::move(settings)),
+      images_(images) {}
+
+std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& map) {
+  using namespace std::chrono_literals;
+  if (under_way_.valid()) {
+    if (under_way_.wait_for(0s) != std::future_status::ready) return std::nullopt;
+    const std::string failure = finish_save();
+    if (!failure.empty()) return failure;
+  }
+  const Clock::time_point now = Clock::now();
+  const bool is_due = interval_ > Clock::duration::zero() && now - last_start_ >= interval_ &&
+                      !map->keyframes().is_empty();
+  if (!is_due && wanted_.empty()) return std::nullopt;
+  last_start_ = now;
+  served_ = std::exchange(wanted_, {});
+  // The map never changes, the rest is fixed: nothing is shared that anyone writes.
+  under_way_ =
+      std::async(std::launch::async, [this, stored = prepare(map)] { save_map(path_, stored); });
+  return std::nullopt;
+}
+
+void Autosave::save_soon(std::function<void(const std::string& error)> on_done) {
+  wanted_.push_back(std::move(on_done));
+}
+
+std::string Autosave::finish_save() {
+  std::string failure;
+  try {
+    under_way_.get();
+  } catch (const OutputError& error) {
+    failure = error.what();
+  }
+  for (const auto& on_done : std::exchange(served_, {})) on_done(failure);
+  return failure;
+}
+
+void Autosave::save(const std::shared_ptr<const Map>& map) {
+  if (under_way_.valid()) finish_save();
+  save_map(path_, prepare(map));
+  for (const auto& on_done : std::exchange(wanted_, {})) on_done("");
+}
+
+StoredMap Autosave::prepare(const std::shared_ptr<const Map>& map) const {
+  StoredMap stored;
+  stored.map = map;
+  stored.settings = settings_;
+  stored.images = images_.images_of(*map);
+  return stored;
+}
+
+}  // namespace waymark

@@ -1,0 +1,114 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/frame_feed.h"
+
+#include <sys/resource.h>
+
+#include <algorithm>
+#include <map>
+#include <optional>
+
+namespace waymark {
+namespace {
+
+double cpu_seconds(const rusage& usage) {
+  const auto seconds = [](const timeval& time) {
+    return static_cast<double>(time.tv_sec) + 1e-6 * static_cast<double>(time.tv_usec);
+  };
+  return seconds(usage.ru_utime) + seconds(usage.ru_stime);
+}
+
+rusage resources() {
+  rusage usage = {};
+  getrusage(RUSAGE_SELF, &usage);
+  return usage;
+}
+
+FrameRecord record_of_fault(const InputFrame& frame) {
+  FrameRecord record;
+  record.index = frame.index;
+  record.timestamp_ns = frame.timestamp_ns;
+  if (frame.fault == FrameFault::kLate) {
+    record.state = FrameState::kDropped;
+    record.reason = FrameReason::kLate;
+    return record;
+  }
+  record.state = FrameState::kUnreadable;
+  record.reason = frame.fault == FrameFault::kWrongSize ? FrameReason::kWrongSize
+                                                        : FrameReason::kUnreadableImage;
+  return record;
+}
+
+FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& result) {
+  FrameRecord record;
+  record.index = frame.index;
+  record.timestamp_ns = frame.timestamp_ns;
+  static_cast<FrameStatus&>(record) = result;
+  record.is_keyframe = result.is_keyframe;
+  record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());
+  return record;
+}
+
+FrameImages borrow(const InputFrame& frame) {
+  FrameImages input;
+  input.timestamp_ns = frame.timestamp_ns;
+  input.image0 = frame.images.at(0).view();
+  if (frame.images.size() > 1) input.image1 = frame.images[1].view();
+  if (frame.depth) input.depth = frame.depth->view();
+  if (frame.mask) input.mask = frame.mask->view();
+  return input;
+}
+
+}  // namespace
+
+void forget_session(FedFrames& frames) {
+  for (const std::size_t row : frames.fed) frames.table.frames[row].submap = SubmapId{};
+  frames.fed.clear();
+}
+
+FedFrames feed_all(Input& input,
+                   const std::function<TrackingResult(const FrameImages&)>& feed,
+                   const std::function<bool()>& should_stop,
+                   const FrameObserver& observer) {
+  FedFrames frames;
+  frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
+  while (!should_stop || !should_stop()) {
+    const std::optional<InputFrame> frame = input.next();
+    if (!frame) break;
+    if (frame->fault != FrameFault::kNone) {
+      frames.table.frames.push_back(record_of_fault(*frame));
+    } else {
+      const TrackingResult result = feed(borrow(*frame));
+      if (result.frame == FrameId{0}) forget_session(frames);
+      frames.fed.push_back(frames.table.frames.size());
+      frames.tracking_ms.push_back(result.stages.tracking_ms());
+      frames.table.frames.push_back(record_of_result(*frame, result));
+    }
+    if (observer) observer(frames.table.frames.back());
+  }
+  return frames;
+}
+
+std::vector<SubmapTrajectory> split_by_submap(
+    const std::vector<std::pair<SubmapId, StampedPose>>& frames) {
+  std::map<SubmapId, std::vector<StampedPose>> by_submap;
+  for (const auto& [submap, pose] : frames) by_submap[submap].push_back(pose);
+  std::vector<SubmapTrajectory> parts(by_submap.begin(), by_submap.end());
+  std::stable_sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
+    return a.second.size() > b.second.size();
+  });
+  return parts;
+}
+
+UsageMeter::UsageMeter()
+    : start_(std::chrono::steady_clock::now()), cpu_start_s_(cpu_seconds(resources())) {}
+
+void UsageMeter::write_to(RunSummary& summary) const {
+  const rusage usage = resources();
+  const auto elapsed = std::chrono::steady_clock::now() - start_;
+  summary.wall_s = std::chrono::duration<double>(elapsed).count();
+  summary.cpu_s = cpu_seconds(usage) - cpu_start_s_;
+  summary.peak_rss_mb = static_cast<double>(usage.ru_maxrss) / 1024.0;  // From kB.
+}
+
+}  // namespace waymark

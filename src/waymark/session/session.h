@@ -1,0 +1,56 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <functional>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "waymark/exchange/results.h"
+#include "waymark/exchange/trajectory.h"
+#include "waymark/input/input.h"
+#include "waymark/session/frame_feed.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// Everything a session leaves behind.
+struct SessionResults {
+  FrameTable table;  ///< A row per input frame, in order.
+  /// One trajectory per sub-map, that with most frames first; world_from_camera0.
+  std::vector<std::vector<StampedPose>> trajectories;
+  std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
+  RunSummary summary;
+};
+
+/// Who takes part in a session while it runs; any may be empty.
+struct SessionHooks {
+  std::function<bool()> should_stop;  ///< Asked before each frame.
+  FrameObserver observer;
+  /// Hears of each frame that was fed.
+  std::function<void(const FrameImages&, const TrackingResult&)> on_result;
+  std::function<void()> on_input_end;
+};
+
+/// Feeds an input to a system until it ends or should_stop() says so, finishes the system and
+/// collects the results. Frames with a fault are not fed, but have their row. setup, timing, seed
+/// and version of the summary are left to the caller. What the input throws ends it, and the map
+/// made so far stays with the system.
+SessionResults run_session(Input& input, System& system, const SessionHooks& hooks = {});
+
+/// Fills in the trajectories of all sub-maps, and what follows from them.
+void add_trajectories(const Map& map,
+                      const std::vector<std::pair<SubmapId, StampedPose>>& poses,
+                      SessionResults& results);
+
+/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json; throws
+/// OutputError.
+void write_results(const std::filesystem::path& folder, const SessionResults& results);
+
+/// "inline", "lockstep", "realtime".
+std::string_view to_string(Timing timing);
+
+}  // namespace waymark

@@ -1,0 +1,101 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/session_options.h"
+
+#include <fmt/format.h>
+
+#include <utility>
+
+#include "waymark/base/check.h"
+#include "waymark/base/config.h"
+#include "waymark/camera/camchain.h"
+#include "waymark/mapfile/map_file.h"
+
+namespace waymark {
+namespace {
+
+ConfigNode read_configuration(const SessionOptions& options) {
+  std::vector<ConfigSource> sources;
+  for (const std::filesystem::path& file : options.configs) {
+    sources.push_back(ConfigSource::from_file(file));
+  }
+  for (const std::string& assignment : options.assignments) {
+    sources.push_back(ConfigSource::from_assignment(assignment));
+  }
+  return merge_configs(sources);
+}
+
+std::string describe(const ChainCamera& camera, std::size_t index) {
+  const CameraDescription& description = camera.description;
+  return fmt::format("camera {}: {}, distortion {}, {}x{} px",
+                     index,
+                     description.camera_model,
+                     description.distortion_model,
+                     description.width_px,
+                     description.height_px);
+}
+
+}  // namespace
+
+std::string describe(const Map& map, const std::filesystem::path& path) {
+  return fmt::format("map {}: {} keyframes, {} landmarks, {}",
+                     path.string(),
+                     map.keyframes().size(),
+                     map.landmarks().size(),
+                     is_metric(map) ? "in metres" : "scale free");
+}
+
+PreparedInput prepare_input(const SessionOptions& options) {
+  PreparedInput prepared;
+  const ConfigNode config = read_configuration(options);
+  read_settings(prepared.settings, config);
+  if (options.seed) prepared.settings.seed = *options.seed;
+
+  InputOptions reading = options.reading;
+  reading.calibration = read_camchain(config);
+  prepared.input = open_input(options.input, reading);
+
+  const InputInfo& info = prepared.input->info();
+  if (!info.calibration) {
+    throw InputError(options.input.string(),
+                     "carries no calibration, expected its cameras in a file given with -c");
+  }
+  if (info.calibration->depth_factor) {
+    prepared.settings.depth.factor = *info.calibration->depth_factor;
+  }
+  prepared.rig = make_rig(*info.calibration);
+
+  prepared.description = info.lines;
+  for (std::size_t i = 0; i < info.calibration->cameras.size(); ++i) {
+    prepared.description.push_back(describe(info.calibration->cameras[i], i));
+  }
+  for (const std::string& note : info.calibration->notes) {
+    prepared.description.push_back("note: " + note);
+  }
+  return prepared;
+}
+
+Session open_session(const SessionOptions& options) {
+  PreparedInput prepared = prepare_input(options);
+  Session session;
+  session.input = std::move(prepared.input);
+  session.settings = std::move(prepared.settings);
+  session.description = std::move(prepared.description);
+  std::shared_ptr<const Map> map;
+  if (!options.map_in.empty()) {
+    StoredMap stored = load_map(options.map_in);
+    map = std::move(stored.map);
+    session.images = std::move(stored.images);
+    if (session.input->info().setup != Setup::kMono && !is_metric(*map)) {
+      throw InputError(
+          options.map_in.string(),
+          "has no scale in metres, which stereo and depth need, expected --setup mono");
+    }
+    session.description.push_back(describe(*map, options.map_in));
+  }
+  session.system = std::make_unique<System>(
+      std::move(prepared.rig), session.settings, options.timing, std::move(map));
+  return session;
+}
+
+}  // namespace waymark

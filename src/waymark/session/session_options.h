@@ -1,0 +1,57 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "waymark/base/timing.h"
+#include "waymark/input/input.h"
+#include "waymark/mapfile/map_file.h"
+#include "waymark/system/settings.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// What the command line says about a session.
+struct SessionOptions {
+  std::filesystem::path input;
+  std::vector<std::filesystem::path> configs;  ///< Cameras and settings, later ones override.
+  std::vector<std::string> assignments;        ///< KEY=VALUE, override the files.
+  std::filesystem::path map_in;                ///< Map to go on in; empty: a new one.
+  InputOptions reading;                        ///< The calibration is filled in.
+  Timing timing = Timing::kLockstep;
+  std::optional<int> seed;  ///< Overrides the settings.
+};
+
+/// An input with its cameras and the settings to use it with.
+struct PreparedInput {
+  std::unique_ptr<Input> input;
+  Settings settings;
+  Rig rig;
+  std::vector<std::string> description;  ///< What was understood, in words.
+};
+
+/// An input and the system to feed it to.
+struct Session {
+  std::unique_ptr<Input> input;
+  KeyframeImages images;  ///< Of the map to go on in.
+  Settings settings;
+  std::unique_ptr<System> system;
+  std::vector<std::string> description;  ///< What was understood, in words.
+};
+
+/// What is in a map, in words.
+std::string describe(const Map& map, const std::filesystem::path& path);
+
+/// Reads the configuration and opens the input. Throws InputError.
+PreparedInput prepare_input(const SessionOptions& options);
+
+/// Prepares the input and makes the system for its cameras, with the map to go on in. Throws
+/// InputError.
+Session open_session(const SessionOptions& options);
+
+}  // namespace waymark
