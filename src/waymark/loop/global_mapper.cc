@@ -36,7 +36,7 @@ void GlobalMapper::add(const NewKeyframe& message) {
   const Mapper::Changes changes = mapper_.add(message);
   update_places(changes);
   if (!settings_.enabled || close_alike(changes.added.back())) return;
-  if (!unadjusted_.is_valid()) consolidate(kNumConsolidatedPerKeyframe);
+  if (!unadjusted_.is_valid()) consolidate_some(kNumConsolidatedPerKeyframe);
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {
@@ -59,15 +59,17 @@ bool GlobalMapper::close(const std::optional<Revisit>& revisit) {
   return true;
 }
 
-/// A closure brings parts of the map together that may touch elsewhere, too.
 bool GlobalMapper::close_alike(KeyframeId query) {
   const std::vector<KeyframeId> alike = find_alike(mapper_.map(), places_, query);
   if (!close(verifier_.verify_alike(mapper_.map(), query, alike))) return false;
-  unconsolidated_.clear();
-  mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.submap == unadjusted_) unconsolidated_.push_back(id);
-  });
+  unconsolidated_ = all_keyframes();
   return true;
+}
+
+std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
+  std::vector<KeyframeId> ids;
+  mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
+  return ids;
 }
 
 bool GlobalMapper::close_beside(KeyframeId query) {
@@ -75,7 +77,7 @@ bool GlobalMapper::close_beside(KeyframeId query) {
   return close(verifier_.verify_beside(mapper_.map(), query, beside));
 }
 
-void GlobalMapper::consolidate(std::size_t max_count) {
+void GlobalMapper::consolidate_some(std::size_t max_count) {
   for (std::size_t i = 0; i < max_count && !unconsolidated_.empty(); ++i) {
     const KeyframeId query = unconsolidated_.back();
     unconsolidated_.pop_back();
@@ -102,12 +104,13 @@ void GlobalMapper::finish() {
     return;
   }
   if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_alike(KeyframeId{end - 1});
+  if (num_closures_ == 0) unconsolidated_ = all_keyframes();
+  consolidate();
+}
+
+void GlobalMapper::consolidate() {
   mapper_.refine_globally();
-  if (num_closures_ == 0) {
-    mapper_.map().keyframes().for_each(
-        [&](KeyframeId id, const Keyframe&) { unconsolidated_.push_back(id); });
-  }
-  consolidate(unconsolidated_.size());
+  consolidate_some(unconsolidated_.size());
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
   mapper_.refine_globally();
 }

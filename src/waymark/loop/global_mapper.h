@@ -24,8 +24,8 @@ struct AdjustmentTask {
 };
 
 /// The mapper with all that reaches beyond the surroundings of the newest keyframe: finds places
-/// seen before, closes loops and joins sub-maps at once by a pose graph, and has the rest adjusted
-/// later by whoever runs the tasks it hands out.
+/// seen before, verifies and closes them at once, consolidates little by little, and has the rest
+/// adjusted later by whoever runs the tasks it hands out.
 class GlobalMapper {
  public:
   GlobalMapper(std::shared_ptr<const Rig> rig,
@@ -41,19 +41,26 @@ class GlobalMapper {
   std::optional<AdjustmentTask> take_task();
   /// Takes in what a task gave, unless a loop was closed meanwhile: then a new task follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
-  /// The end: looks for loops a last time and adjusts every sub-map.
+  /// The end: looks for loops a last time and consolidates.
   void finish();
+
+  /// Finds what looks like a keyframe, verifies and closes it; whether there was something.
+  bool close_alike(KeyframeId query);
+  /// A closure brings parts of the map together that may touch elsewhere, too: adjusts every
+  /// sub-map, closes what lies beside each other, fuses overlaps and adjusts again.
+  void consolidate();
 
   const Map& map() const { return mapper_.map(); }
   MapSnapshot snapshot();
   int num_loops() const { return num_loops_; }
+  int num_joins() const { return static_cast<int>(num_closures_) - num_loops_; }
 
  private:
   void update_places(const Mapper::Changes& changes);
-  bool close_alike(KeyframeId query);
   bool close_beside(KeyframeId query);
   bool close(const std::optional<Revisit>& revisit);
-  void consolidate(std::size_t max_count);
+  void consolidate_some(std::size_t max_count);
+  std::vector<KeyframeId> all_keyframes() const;
 
   const LoopSettings settings_;
   Mapper mapper_;
