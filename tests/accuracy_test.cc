@@ -63,7 +63,7 @@ struct RecordedCase {
 
 void PrintTo(const RecordedCase& recorded, std::ostream* stream) { *stream << recorded.name; }
 
-class Recorded : public testing::TestWithParam<RecordedCase> {};
+class Recorded : public ::testing::TestWithParam<RecordedCase> {};
 
 TEST_P(Recorded, IsAsAccurateAsStated) {
   const RecordedCase& expected = GetParam();
@@ -77,14 +77,14 @@ TEST_P(Recorded, IsAsAccurateAsStated) {
 INSTANTIATE_TEST_SUITE_P(
     Sequences,
     Recorded,
-    testing::Values(RecordedCase{"euroc_mh01_stereo", Setup::kStereo, 1.0, 0.0045},
-                    RecordedCase{"euroc_mh01_stereo", Setup::kMono, 0.98, 0.0085},
-                    RecordedCase{"kitti_00_stereo", Setup::kStereo, 1.0, 0.28},
-                    RecordedCase{"tum_fr1_rpy_rgbd", Setup::kRgbd, 1.0, 0.026},
-                    RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kStereo, 1.0, 0.10},
-                    RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kMono, 0.98, 0.12},
-                    RecordedCase{"sim_atrium_360", Setup::kMono, 0.98, 0.025}),
-    [](const testing::TestParamInfo<RecordedCase>& info) {
+    ::testing::Values(RecordedCase{"euroc_mh01_stereo", Setup::kStereo, 1.0, 0.0045},
+                      RecordedCase{"euroc_mh01_stereo", Setup::kMono, 0.98, 0.0085},
+                      RecordedCase{"kitti_00_stereo", Setup::kStereo, 1.0, 0.28},
+                      RecordedCase{"tum_fr1_rpy_rgbd", Setup::kRgbd, 1.0, 0.026},
+                      RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kStereo, 1.0, 0.10},
+                      RecordedCase{"sim_warehouse_fisheye_stereo", Setup::kMono, 0.98, 0.12},
+                      RecordedCase{"sim_atrium_360", Setup::kMono, 0.98, 0.025}),
+    [](const ::testing::TestParamInfo<RecordedCase>& info) {
       return std::string(info.param.name) + "_" + std::string(to_string(info.param.setup));
     });
 

@@ -34,7 +34,7 @@ std::optional<FocalCheck> check_with(const char* name, double factor) {
   return check == nullptr ? std::nullopt : std::optional(*check);
 }
 
-class FocalLength : public testing::TestWithParam<const char*> {};
+class FocalLength : public ::testing::TestWithParam<const char*> {};
 
 TEST_P(FocalLength, ThatFitsIsLeftInPeace) {
   const std::optional<FocalCheck> check = check_with(GetParam(), 1.0);
@@ -50,7 +50,7 @@ TEST_P(FocalLength, ThatIsOffIsReported) {
   EXPECT_NEAR(check->factor, 1.0 / 1.04, 0.02);
 }
 
-INSTANTIATE_TEST_SUITE_P(Cameras, FocalLength, testing::Values("perspective", "fisheye"));
+INSTANTIATE_TEST_SUITE_P(Cameras, FocalLength, ::testing::Values("perspective", "fisheye"));
 
 }  // namespace
 }  // namespace waymark

@@ -13,9 +13,8 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumFrames = 60;
-constexpr int kHeightPx = 300;
-constexpr double kDepthFactor = 5000.0;
+constexpr int kNumCameraFrames = 60;
+constexpr int kCameraHeightPx = 300;
 
 struct CameraCase {
   const char* camera;
@@ -27,7 +26,7 @@ struct CameraCase {
 void PrintTo(const CameraCase& test, std::ostream* stream) { *stream << test.camera; }
 
 CameraChain make_chain(const CameraCase& test) {
-  const CameraDescription camera = named_camera(test.camera, kHeightPx);
+  const CameraDescription camera = named_camera(test.camera, kCameraHeightPx);
   if (test.setup == Setup::kMono) return mono_chain(camera);
   if (test.setup == Setup::kRgbd) return rgbd_chain(camera, kDepthFactor);
   Vector6d cam1_from_cam0;
@@ -36,11 +35,11 @@ CameraChain make_chain(const CameraCase& test) {
 }
 
 /// The bounds are about twice what was measured.
-class CameraAccuracy : public testing::TestWithParam<CameraCase> {};
+class CameraAccuracy : public ::testing::TestWithParam<CameraCase> {};
 
 TEST_P(CameraAccuracy, IsAsStatedAndRepeats) {
   const CameraCase& test = GetParam();
-  SequenceSpec spec = small_sequence(test.setup, kNumFrames);
+  SequenceSpec spec = small_sequence(test.setup, kNumCameraFrames);
   spec.chain = make_chain(test);
   const Recording recording = simulate(spec);
   const SessionResults results = map_recording(recording, Timing::kLockstep);
@@ -51,35 +50,35 @@ TEST_P(CameraAccuracy, IsAsStatedAndRepeats) {
   EXPECT_EQ(hash_of(map_recording(recording, Timing::kInline)), hash_of(results));
 }
 
-std::string name_of(const testing::TestParamInfo<CameraCase>& info) {
+std::string name_of(const ::testing::TestParamInfo<CameraCase>& info) {
   return std::string(info.param.camera) + "_" + std::string(to_string(info.param.setup)) +
          (info.param.verged_rad > 0.0 ? "_verged" : "");
 }
 
 INSTANTIATE_TEST_SUITE_P(Mono,
                          CameraAccuracy,
-                         testing::Values(CameraCase{"perspective", Setup::kMono, 0.02},
-                                         CameraCase{"fisheye", Setup::kMono, 0.02},
-                                         CameraCase{"fisheye_200", Setup::kMono, 0.03},
-                                         CameraCase{"equirectangular", Setup::kMono, 0.01},
-                                         CameraCase{"omni", Setup::kMono, 0.02},
-                                         CameraCase{"eucm", Setup::kMono, 0.02},
-                                         CameraCase{"ds", Setup::kMono, 0.02},
-                                         CameraCase{"division", Setup::kMono, 0.02}),
+                         ::testing::Values(CameraCase{"perspective", Setup::kMono, 0.02},
+                                           CameraCase{"fisheye", Setup::kMono, 0.02},
+                                           CameraCase{"fisheye_200", Setup::kMono, 0.03},
+                                           CameraCase{"equirectangular", Setup::kMono, 0.01},
+                                           CameraCase{"omni", Setup::kMono, 0.02},
+                                           CameraCase{"eucm", Setup::kMono, 0.02},
+                                           CameraCase{"ds", Setup::kMono, 0.02},
+                                           CameraCase{"division", Setup::kMono, 0.02}),
                          name_of);
 
 INSTANTIATE_TEST_SUITE_P(Stereo,
                          CameraAccuracy,
-                         testing::Values(CameraCase{"perspective", Setup::kStereo, 0.008},
-                                         CameraCase{"fisheye", Setup::kStereo, 0.008},
-                                         CameraCase{"fisheye", Setup::kStereo, 0.008, 0.1745},
-                                         CameraCase{"equirectangular", Setup::kStereo, 0.008}),
+                         ::testing::Values(CameraCase{"perspective", Setup::kStereo, 0.008},
+                                           CameraCase{"fisheye", Setup::kStereo, 0.008},
+                                           CameraCase{"fisheye", Setup::kStereo, 0.008, 0.1745},
+                                           CameraCase{"equirectangular", Setup::kStereo, 0.008}),
                          name_of);
 
 INSTANTIATE_TEST_SUITE_P(Rgbd,
                          CameraAccuracy,
-                         testing::Values(CameraCase{"perspective", Setup::kRgbd, 0.008},
-                                         CameraCase{"fisheye", Setup::kRgbd, 0.008}),
+                         ::testing::Values(CameraCase{"perspective", Setup::kRgbd, 0.008},
+                                           CameraCase{"fisheye", Setup::kRgbd, 0.008}),
                          name_of);
 
 }  // namespace

@@ -77,7 +77,7 @@ double mean_normalized_error_squared(const std::vector<ReportedPose>& poses) {
   return sum / static_cast<double>(poses.size() - 1);
 }
 
-class Covariance : public testing::TestWithParam<Setup> {};
+class Covariance : public ::testing::TestWithParam<Setup> {};
 
 TEST_P(Covariance, SaysHowWrongThePoseIs) {
   std::vector<ReportedPose> poses = track(simulate(small_sequence(GetParam(), 120)));
@@ -90,8 +90,8 @@ TEST_P(Covariance, SaysHowWrongThePoseIs) {
 
 INSTANTIATE_TEST_SUITE_P(Setups,
                          Covariance,
-                         testing::Values(Setup::kMono, Setup::kStereo, Setup::kRgbd),
-                         [](const testing::TestParamInfo<Setup>& info) {
+                         ::testing::Values(Setup::kMono, Setup::kStereo, Setup::kRgbd),
+                         [](const ::testing::TestParamInfo<Setup>& info) {
                            return std::string(to_string(info.param));
                          });
 

@@ -9,11 +9,11 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumFrames = 240;
+constexpr int kNumLightFrames = 240;
 
 /// Four steps of the exposure from x1/6 to x3, then two seconds in the dark with strong noise.
 SequenceSpec changing_light() {
-  SequenceSpec spec = small_sequence(Setup::kStereo, kNumFrames);
+  SequenceSpec spec = small_sequence(Setup::kStereo, kNumLightFrames);
   const auto at_gain = [&spec](double gain, double noise_sigma) {
     ImageEffects effects = spec.effects;
     effects.gain = gain;

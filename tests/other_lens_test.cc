@@ -167,12 +167,12 @@ class Score {
     ASSERT_FALSE(errors_m_.empty());
     const auto num_elsewhere = std::count_if(
         errors_m_.begin(), errors_m_.end(), [](double error_m) { return error_m > 0.5; });
-    testing::Test::RecordProperty("share", std::to_string(share));
-    testing::Test::RecordProperty("median_m",
-                                  std::to_string(median(std::vector<double>(errors_m_))));
-    testing::Test::RecordProperty("median_deg",
-                                  std::to_string(median(std::vector<double>(errors_deg_))));
-    testing::Test::RecordProperty("elsewhere", static_cast<int>(num_elsewhere));
+    ::testing::Test::RecordProperty("share", std::to_string(share));
+    ::testing::Test::RecordProperty("median_m",
+                                    std::to_string(median(std::vector<double>(errors_m_))));
+    ::testing::Test::RecordProperty("median_deg",
+                                    std::to_string(median(std::vector<double>(errors_deg_))));
+    ::testing::Test::RecordProperty("elsewhere", static_cast<int>(num_elsewhere));
     EXPECT_GE(share, min_share);
     EXPECT_LE(median(std::vector<double>(errors_m_)), 0.05);
     EXPECT_LE(median(std::vector<double>(errors_deg_)), 1.0);

@@ -10,7 +10,7 @@
 namespace waymark {
 namespace {
 
-class Threads : public testing::TestWithParam<Setup> {};
+class Threads : public ::testing::TestWithParam<Setup> {};
 
 TEST_P(Threads, DoNotChangeTheAnswer) {
   const Recording recording = simulate(small_sequence(GetParam(), 40));
@@ -21,8 +21,8 @@ TEST_P(Threads, DoNotChangeTheAnswer) {
 
 INSTANTIATE_TEST_SUITE_P(Setups,
                          Threads,
-                         testing::Values(Setup::kMono, Setup::kStereo, Setup::kRgbd),
-                         [](const testing::TestParamInfo<Setup>& info) {
+                         ::testing::Values(Setup::kMono, Setup::kStereo, Setup::kRgbd),
+                         [](const ::testing::TestParamInfo<Setup>& info) {
                            return std::string(to_string(info.param));
                          });
 

@@ -40,7 +40,7 @@ void expect_tracked(const Motion& motion, double max_ate_m) {
   EXPECT_GE(coverage(results), 0.98);
   EXPECT_EQ(results.summary.counts.lost_count, 0u);
   const double ate_m = evaluate_results(results, recording).ate_m.rmse;
-  testing::Test::RecordProperty("ate_mm", std::to_string(1000.0 * ate_m));
+  ::testing::Test::RecordProperty("ate_mm", std::to_string(1000.0 * ate_m));
   EXPECT_LT(ate_m, max_ate_m);
   // The orientation too: the angle between the first pose and each other is that of the truth.
   const auto& poses = results.trajectories.at(0);

@@ -17,7 +17,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxSize = std::size_t{1} << 20;
+constexpr std::size_t kMaxDocumentSize = std::size_t{1} << 20;
 constexpr std::size_t kMaxDepth = 32;
 constexpr std::size_t kMaxNodes = 100000;
 
@@ -136,7 +136,7 @@ class TreeBuilder final : public YAML::EventHandler {
 
 /// Refuses what is no text before the parser sees it.
 void expect_text(const ConfigSource& source) {
-  if (source.text.size() > kMaxSize) {
+  if (source.text.size() > kMaxDocumentSize) {
     throw InputError(source.name, "is larger than 1 MiB, expected settings as YAML");
   }
   int line = 1;

@@ -19,7 +19,7 @@ ConfigNode value(const std::string& yaml) {
   return *parse_config({"a.yaml", "k: " + yaml + "\n"}).find("k");
 }
 
-std::string error_of(const std::function<void()>& action) {
+std::string refusal_of(const std::function<void()>& action) {
   try {
     action();
   } catch (const InputError& error) {
@@ -43,45 +43,45 @@ TEST(ConfigValue, ReadsEachType) {
 
 TEST(ConfigValue, RefusesOtherTypes) {
   for (const char* yaml : {"yes", "1", "True", "[true]", "", "{}"}) {
-    EXPECT_THAT(error_of([&] { config_bool(value(yaml), "k"); }),
+    EXPECT_THAT(refusal_of([&] { config_bool(value(yaml), "k"); }),
                 EndsWith("expected true or false"));
   }
   for (const char* yaml :
        {"1.0", "1e3", "x", "0x10", "1 2", "''", "", "[1]", "99999999999", "+-1", "true"}) {
-    EXPECT_THAT(error_of([&] { config_int(value(yaml), "k"); }), EndsWith("expected an integer"))
+    EXPECT_THAT(refusal_of([&] { config_int(value(yaml), "k"); }), EndsWith("expected an integer"))
         << yaml;
   }
   for (const char* yaml :
        {"nan", ".nan", "inf", ".inf", "-inf", "1e999", "1,5", "1.5m", "", "[1.0]", "{a: 1}"}) {
-    EXPECT_THAT(error_of([&] { config_double(value(yaml), "k"); }), EndsWith("expected a number"))
+    EXPECT_THAT(refusal_of([&] { config_double(value(yaml), "k"); }), EndsWith("expected a number"))
         << yaml;
   }
   for (const char* yaml : {"", "[a]", "{a: b}"}) {
-    EXPECT_THAT(error_of([&] { config_string(value(yaml), "k"); }), EndsWith("expected a text"));
+    EXPECT_THAT(refusal_of([&] { config_string(value(yaml), "k"); }), EndsWith("expected a text"));
   }
   for (const char* yaml : {"1", "[1, x]", "[1, [2]]", "[nan]"}) {
-    EXPECT_THAT(error_of([&] { config_doubles(value(yaml), "k"); }), HasSubstr("expected a"))
+    EXPECT_THAT(refusal_of([&] { config_doubles(value(yaml), "k"); }), HasSubstr("expected a"))
         << yaml;
   }
 }
 
 TEST(ConfigValue, NamesPlaceValueAndRange) {
-  EXPECT_EQ(error_of([&] { config_int(value("7"), "t.m", {.low = 10, .high = 1000}); }),
+  EXPECT_EQ(refusal_of([&] { config_int(value("7"), "t.m", {.low = 10, .high = 1000}); }),
             "a.yaml:1: t.m is 7, expected an integer from 10 to 1000");
-  EXPECT_EQ(error_of([&] { config_double(value("-0.5"), "t.m", {.low = 0}); }),
+  EXPECT_EQ(refusal_of([&] { config_double(value("-0.5"), "t.m", {.low = 0}); }),
             "a.yaml:1: t.m is -0.5, expected a number of at least 0");
-  EXPECT_EQ(error_of([&] { config_doubles(value("[1, 5]"), "t.m", {.high = 2.5}); }),
+  EXPECT_EQ(refusal_of([&] { config_doubles(value("[1, 5]"), "t.m", {.high = 2.5}); }),
             "a.yaml:1: t.m[1] is 5, expected a number of at most 2.5");
-  EXPECT_EQ(error_of([&] { config_int(value("{x: 1}"), "t.m"); }),
+  EXPECT_EQ(refusal_of([&] { config_int(value("{x: 1}"), "t.m"); }),
             "a.yaml:1: t.m is a section, expected an integer");
   EXPECT_EQ(config_int(value("10"), "t.m", {.low = 10, .high = 10}), 10);
 }
 
 TEST(ConfigValue, MessagesStayOnOneShortLine) {
   const std::string message =
-      error_of([&] { config_int(value("\"" + std::string(1000, 'x') + "\\n\""), "k"); });
+      refusal_of([&] { config_int(value("\"" + std::string(1000, 'x') + "\\n\""), "k"); });
   EXPECT_LT(message.size(), 120u);
-  EXPECT_EQ(error_of([&] { config_int(value("\"a\\nb\""), "k"); }),
+  EXPECT_EQ(refusal_of([&] { config_int(value("\"a\\nb\""), "k"); }),
             "a.yaml:1: k is a b, expected an integer");
 }
 
@@ -93,7 +93,7 @@ TEST(ConfigValue, UnknownKeysNameTheNearest) {
                                           "features",
                                           "features.count"};
   const auto message = [&](const char* key) {
-    return error_of([&] { fail_unknown_key(value("1"), key, known); });
+    return refusal_of([&] { fail_unknown_key(value("1"), key, known); });
   };
   EXPECT_EQ(
       message("tracking.min_num_match"),

@@ -16,7 +16,6 @@ namespace {
 
 constexpr std::size_t kMaxDigits = 64;
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
 bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\v' || c == '\f'; }
 
 std::string_view trim(std::string_view text) {

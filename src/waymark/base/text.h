@@ -12,6 +12,8 @@
 
 namespace waymark {
 
+inline bool is_digit(char c) { return c >= '0' && c <= '9'; }
+
 /// A finite decimal number that fills the whole text, or nothing.
 std::optional<double> parse_number(std::string_view text);
 

@@ -11,7 +11,7 @@
 namespace waymark {
 namespace {
 
-struct TestCamera {
+struct PerspectiveCase {
   const char* name;
   Eigen::Vector2d focal_px;
   Eigen::Vector2d center_px;
@@ -28,8 +28,8 @@ struct TestCamera {
 
 // Calibrations of the EuRoC, KITTI and TUM RGB-D data sets, and a wide-angle one of eight
 // coefficients.
-const std::vector<TestCamera>& test_cameras() {
-  static const std::vector<TestCamera> cameras = {
+const std::vector<PerspectiveCase>& test_cameras() {
+  static const std::vector<PerspectiveCase> cameras = {
       {"euroc",
        {458.654, 457.296},
        {367.215, 248.375},
@@ -63,7 +63,7 @@ std::vector<Eigen::Vector3d> bearings_of(const Camera& camera,
 }
 
 TEST(Perspective, IsSound) {
-  for (const TestCamera& test : test_cameras()) {
+  for (const PerspectiveCase& test : test_cameras()) {
     SCOPED_TRACE(test.name);
     CameraTestOptions options;
     options.min_valid_part = 1.0;
@@ -73,7 +73,7 @@ TEST(Perspective, IsSound) {
 }
 
 TEST(Perspective, ProjectsAsOpenCv) {
-  for (const TestCamera& test : test_cameras()) {
+  for (const PerspectiveCase& test : test_cameras()) {
     SCOPED_TRACE(test.name);
     const std::vector<Eigen::Vector3d> points = random_points_for_test(5000, 7);
     const CameraTestProjection ours = project_for_test(test.camera(), points);
@@ -94,7 +94,7 @@ TEST(Perspective, ProjectsAsOpenCv) {
 }
 
 TEST(Perspective, UnprojectsAsOpenCv) {
-  for (const TestCamera& test : test_cameras()) {
+  for (const PerspectiveCase& test : test_cameras()) {
     SCOPED_TRACE(test.name);
     const PerspectiveCamera camera = test.camera();
     const std::vector<Eigen::Vector2d> pixels = pixel_grid_for_test(camera, 21);

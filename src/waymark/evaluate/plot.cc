@@ -16,7 +16,7 @@ namespace waymark {
 namespace {
 
 constexpr std::size_t kMaxPoints = 2000;
-constexpr double kGapIntervals = 5.0;
+constexpr double kPlotGapIntervals = 5.0;
 constexpr double kMargin = 0.05;  // Of the extent, around the data.
 constexpr Chart::Frame kMapFrame{70, 70, 400, 330};
 constexpr Chart::Frame kErrorFrame{570, 70, 400, 330};
@@ -50,7 +50,7 @@ double seconds_between(std::int64_t from_ns, std::int64_t to_ns) {
 
 /// A longer time between successive poses is drawn as a gap.
 double max_gap_of(std::span<const StampedPose> poses) {
-  return 1e-9 * kGapIntervals * static_cast<double>(median_interval_ns(poses));
+  return 1e-9 * kPlotGapIntervals * static_cast<double>(median_interval_ns(poses));
 }
 
 /// At most kMaxPoints positions, the last one included; strokes break where poses are missing.

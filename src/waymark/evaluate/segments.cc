@@ -13,7 +13,7 @@ namespace {
 
 constexpr std::array<double, 8> kLengths = {100, 200, 300, 400, 500, 600, 700, 800};
 constexpr std::size_t kStartStep = 10;
-constexpr double kDegPerRad = 57.29577951308232;
+constexpr double kDegPerRadian = 57.29577951308232;
 
 std::vector<double> path_lengths(std::span<const Rigid3> poses) {
   std::vector<double> lengths(poses.size(), 0.0);
@@ -57,7 +57,7 @@ std::optional<SegmentErrors> segment_errors(std::span<const Rigid3> estimate,
       add(sum,
           {length,
            100.0 * error.translation.norm() / length,
-           100.0 * kDegPerRad * so3_log(error.rotation).norm() / length,
+           100.0 * kDegPerRadian * so3_log(error.rotation).norm() / length,
            1});
     }
     if (sum.num_segments == 0) continue;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr double kOffAxisRad = 55.0 * std::numbers::pi / 180.0;
 constexpr int kMinSizePx = 64;
-constexpr int kMaxSizePx = 4096;
+constexpr int kMaxPartSizePx = 4096;
 
 Eigen::Quaterniond turn(double angle_rad, const Eigen::Vector3d& axis) {
   return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis));
@@ -85,8 +85,9 @@ Lookup make_lookup(const SplitPart& part) {
 }
 
 std::vector<SplitPart> parts_of(std::shared_ptr<const Camera> camera, int num_views) {
-  const int size_px = std::clamp(
-      static_cast<int>(std::lround(2.0 / central_pixel_angle(*camera))), kMinSizePx, kMaxSizePx);
+  const int size_px = std::clamp(static_cast<int>(std::lround(2.0 / central_pixel_angle(*camera))),
+                                 kMinSizePx,
+                                 kMaxPartSizePx);
   std::vector<SplitPart> parts;
   for (const Eigen::Quaterniond& rotation :
        parts_from_camera(camera->wrap_width_px() > 0.0, num_views)) {

@@ -21,7 +21,7 @@ namespace waymark {
 namespace {
 
 /// How far from a rotation a quaternion may be.
-constexpr double kRotationTolerance = 0.02;
+constexpr double kOpenvslamRotationTolerance = 0.02;
 /// Closer to a camera a landmark has no direction.
 constexpr double kMinDistance = 1e-9;
 /// Memory that the search grids of all keyframes may take, in pixels of all images together: as
@@ -147,7 +147,7 @@ void Importer::add_keyframes() {
 
 void Importer::add_keyframe(std::int64_t id, const OpenvslamKeyframe& keyframe) {
   const double norm = keyframe.rotation_cw.norm();
-  if (!(std::abs(norm - 1.0) <= kRotationTolerance)) {
+  if (!(std::abs(norm - 1.0) <= kOpenvslamRotationTolerance)) {
     throw InputError(where(id),
                      fmt::format("rot_cw is a quaternion of length {:.4g}, expected 1", norm));
   }

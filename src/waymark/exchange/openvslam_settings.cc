@@ -14,6 +14,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config_value.h"
 #include "waymark/exchange/openvslam_camera.h"
+#include "waymark/input/foreign_calibration.h"
 
 namespace waymark {
 namespace {
@@ -147,16 +148,10 @@ void note_ignored(const ConfigNode& root, const std::string& file, CameraChain& 
                                     fmt::join(ignored, ", ")));
 }
 
-/// Old files begin with "%YAML:1.0", which is not YAML's directive.
-ConfigSource without_header(ConfigSource source) {
-  if (source.text.starts_with("%YAML:")) source.text.replace(0, 1, "#");
-  return source;
-}
-
 }  // namespace
 
 CameraChain read_openvslam_settings(const ConfigSource& source) {
-  const ConfigNode root = parse_config(without_header(source));
+  const ConfigNode root = parse_config(without_opencv_header(source));
   const OpenvslamCamera camera = read_camera(Section(root, source.name, "Camera"), source.name);
   CameraChain chain = openvslam_camchain(camera);
   const Section rectifier(root, source.name, "StereoRectifier");

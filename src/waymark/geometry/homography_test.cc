@@ -7,7 +7,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <numeric>
 #include <opencv2/calib3d.hpp>
 #include <opencv2/core.hpp>
 #include <vector>
@@ -49,12 +48,6 @@ TwoViewScene plane_scene(const Rigid3& b_from_a,
       if (cosine > 0.3) return Eigen::Vector3d(plane.distance / cosine * ray);
     }
   });
-}
-
-std::vector<std::uint32_t> all_of(const TwoViewScene& scene) {
-  std::vector<std::uint32_t> indices(scene.bearings_a.size());
-  std::iota(indices.begin(), indices.end(), 0u);
-  return indices;
 }
 
 cv::Mat to_cv(const Eigen::Matrix3d& matrix) {
@@ -134,7 +127,7 @@ TEST(RefineHomography, IsBetterThanFourPointsAndStationary) {
   const auto initial = solve_four_point(FourBearings(scene.bearings_a.data(), 4),
                                         FourBearings(scene.bearings_b.data(), 4));
   ASSERT_TRUE(initial);
-  const auto refined = refine_homography(*initial, scene.matches(), all_of(scene));
+  const auto refined = refine_homography(*initial, scene.matches(), scene.indices());
   ASSERT_TRUE(refined);
   const auto cost = [&](const Eigen::Matrix3d& h) {
     double sum = 0.0;
@@ -147,7 +140,7 @@ TEST(RefineHomography, IsBetterThanFourPointsAndStationary) {
   Eigen::Matrix3d last = *refined, before = *refined;
   for (int i = 0; i < 5; ++i) {
     before = last;
-    last = *refine_homography(last, scene.matches(), all_of(scene));
+    last = *refine_homography(last, scene.matches(), scene.indices());
   }
   EXPECT_LT((last - before).norm(), 1e-6);
   EXPECT_LT((last - *refined).norm(), 3e-4);

@@ -60,18 +60,18 @@ class LineEstimator {
   double sigma_;
 };
 
-constexpr double kSigma = 0.01;
+constexpr double kLineSigma = 0.01;
 
 LineEstimator noisy_line(const Line& line, int num_inliers, int num_outliers, std::uint64_t seed) {
   Rng rng(seed, 0);
   std::vector<Eigen::Vector2d> points;
   for (int i = 0; i < num_inliers + num_outliers; ++i) {
     const double x = rng.uniform(-1.0, 1.0);
-    const double y = i < num_inliers ? line.slope * x + line.offset + kSigma * rng.normal()
+    const double y = i < num_inliers ? line.slope * x + line.offset + kLineSigma * rng.normal()
                                      : rng.uniform(-3.0, 3.0);
     points.emplace_back(x, y);
   }
-  return LineEstimator(points, kSigma);
+  return LineEstimator(points, kLineSigma);
 }
 
 TEST(Ransac, FindsTheLineAmongOutliers) {
@@ -80,8 +80,8 @@ TEST(Ransac, FindsTheLineAmongOutliers) {
         ransac(noisy_line({0.7, -0.2}, 100, 100, seed), {.seed = seed, .stream = 3});
     ASSERT_TRUE(result);
     // Ten standard deviations of a fit to 95 points: least squares does not know its inliers.
-    EXPECT_NEAR(result->model.slope, 0.7, 10.0 * kSigma / std::sqrt(95.0 / 3.0));
-    EXPECT_NEAR(result->model.offset, -0.2, 10.0 * kSigma / std::sqrt(95.0));
+    EXPECT_NEAR(result->model.slope, 0.7, 10.0 * kLineSigma / std::sqrt(95.0 / 3.0));
+    EXPECT_NEAR(result->model.offset, -0.2, 10.0 * kLineSigma / std::sqrt(95.0));
     EXPECT_GT(result->inliers.size(), 80u);
     EXPECT_LT(result->inliers.size(), 115u);
   }
@@ -113,12 +113,12 @@ TEST(Ransac, SameSeedAndStreamGiveTheSameBits) {
 }
 
 TEST(Ransac, GivesNothingWhereThereIsNothing) {
-  EXPECT_FALSE(ransac(LineEstimator({}, kSigma), {}));
-  EXPECT_FALSE(ransac(LineEstimator({{0.0, 0.0}}, kSigma), {}));
-  EXPECT_FALSE(ransac(LineEstimator({{0.0, 0.0}, {1.0, 0.0}}, kSigma), {}));  // no third
-  const LineEstimator same(std::vector<Eigen::Vector2d>(20, {0.5, 0.5}), kSigma);
+  EXPECT_FALSE(ransac(LineEstimator({}, kLineSigma), {}));
+  EXPECT_FALSE(ransac(LineEstimator({{0.0, 0.0}}, kLineSigma), {}));
+  EXPECT_FALSE(ransac(LineEstimator({{0.0, 0.0}, {1.0, 0.0}}, kLineSigma), {}));  // no third
+  const LineEstimator same(std::vector<Eigen::Vector2d>(20, {0.5, 0.5}), kLineSigma);
   EXPECT_FALSE(ransac(same, RansacOptions{}));
-  const LineEstimator bad(std::vector<Eigen::Vector2d>(20, {0.5, std::nan("")}), kSigma);
+  const LineEstimator bad(std::vector<Eigen::Vector2d>(20, {0.5, std::nan("")}), kLineSigma);
   EXPECT_FALSE(ransac(bad, RansacOptions{}));
 }
 

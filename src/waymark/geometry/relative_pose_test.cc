@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <cmath>
-#include <numeric>
 #include <vector>
 
 #include "waymark/base/rng.h"
@@ -30,12 +29,6 @@ TwoViewScene scene_all_round(std::size_t num_matches, double sigma_rad, double o
       outliers,
       rng,
       [](Rng& r) { return Eigen::Vector3d(r.uniform(1.0, 6.0) * random_direction(r)); });
-}
-
-std::vector<std::uint32_t> all_of(const TwoViewScene& scene) {
-  std::vector<std::uint32_t> indices(scene.bearings_a.size());
-  std::iota(indices.begin(), indices.end(), 0u);
-  return indices;
 }
 
 TEST(EpipolarResidual, JacobianMatchesNumericDerivative) {
@@ -99,7 +92,7 @@ TEST(RefineRelativePose, ReachesTheTruthWithoutNoise) {
     Vector5d offset;
     for (int k = 0; k < 5; ++k) offset[k] = 0.03 * rng.normal();
     const Rigid3 start = perturb_relative_pose(scene.b_from_a, offset);
-    const Rigid3 refined = refine_relative_pose(start, scene.matches(), all_of(scene), {});
+    const Rigid3 refined = refine_relative_pose(start, scene.matches(), scene.indices(), {});
     EXPECT_LT(testing::rotation_error_rad(refined, scene.b_from_a), 1e-6);
     EXPECT_LT(testing::direction_error_rad(refined, scene.b_from_a), 1e-6);
   }
@@ -112,7 +105,7 @@ TEST(RefineRelativePose, OutliersHaveNoPull) {
     Vector5d offset;
     for (int k = 0; k < 5; ++k) offset[k] = 0.001 * rng.normal();
     const Rigid3 start = perturb_relative_pose(scene.b_from_a, offset);
-    const Rigid3 refined = refine_relative_pose(start, scene.matches(), all_of(scene), {});
+    const Rigid3 refined = refine_relative_pose(start, scene.matches(), scene.indices(), {});
     EXPECT_LT(testing::rotation_error_rad(refined, scene.b_from_a), 1e-3);
     EXPECT_LT(testing::direction_error_rad(refined, scene.b_from_a), 3e-3);
   }
@@ -127,11 +120,12 @@ TEST(RelativePoseInformation, IsThatOfTheErrors) {
     const TwoViewScene scene = scene_all_round(100, 0.002, 0.0, rng);
     const RefinementOptions least_squares{.first_scale = 1e3, .last_scale = 1e3};
     const Rigid3 refined =
-        refine_relative_pose(scene.b_from_a, scene.matches(), all_of(scene), least_squares);
+        refine_relative_pose(scene.b_from_a, scene.matches(), scene.indices(), least_squares);
     Vector5d error;
     error << so3_log(scene.b_from_a.rotation * refined.rotation.conjugate()),
         tangent_basis(refined.translation).transpose() * scene.b_from_a.translation;
-    const Matrix5d information = relative_pose_information(refined, scene.matches(), all_of(scene));
+    const Matrix5d information =
+        relative_pose_information(refined, scene.matches(), scene.indices());
     sum += error.dot(information * error);
   }
   // Chi-squared of 5 degrees of freedom; four standard deviations of its mean.

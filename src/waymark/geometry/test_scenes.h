@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <vector>
 
 #include "waymark/base/rng.h"
@@ -25,6 +26,11 @@ struct TwoViewScene {
   std::vector<std::uint8_t> is_outlier;
 
   BearingMatches matches() const { return {bearings_a, bearings_b, sigmas_rad_a, sigmas_rad_b}; }
+  std::vector<std::uint32_t> indices() const {
+    std::vector<std::uint32_t> all(bearings_a.size());
+    std::iota(all.begin(), all.end(), 0u);
+    return all;
+  }
 };
 
 /// What a camera sees: everything, or a pyramid around +z of these half angles.

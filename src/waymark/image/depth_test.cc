@@ -12,7 +12,7 @@
 namespace waymark {
 namespace {
 
-constexpr double kFocalPx = 500.0;
+constexpr double kDepthFocalPx = 500.0;
 constexpr double kFactor = 5000.0;
 
 struct Measured {
@@ -35,7 +35,7 @@ Matrix23f derivative(const Eigen::Vector3f& bearing) {
   const float z = std::max(bearing.z(), 1e-3f);
   Matrix23f result;
   result << 1.0f / z, 0.0f, -bearing.x() / (z * z), 0.0f, 1.0f / z, -bearing.y() / (z * z);
-  return static_cast<float>(kFocalPx) *
+  return static_cast<float>(kDepthFocalPx) *
          (result - (result * bearing).eval() * bearing.transpose()).eval();
 }
 
@@ -79,7 +79,7 @@ TEST(Depth, StrayNearPixelIsNoSurface) {
 TEST(Depth, SlantedSurfaceIsOneSurfaceAndLessCertain) {
   // A wall that turns away at 70 degrees: inverse depth is linear in x.
   const auto depth_m = [](double x) {
-    return 1.0 / (0.5 * (1.0 + std::tan(1.22) * (x - 30.0) / kFocalPx));
+    return 1.0 / (0.5 * (1.0 + std::tan(1.22) * (x - 30.0) / kDepthFocalPx));
   };
   const DepthImage image = depth_image([&](int x, int) { return depth_m(x); });
   const Measured slanted = measure(image, 30.5f, 20.0f);

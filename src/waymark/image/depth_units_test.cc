@@ -31,7 +31,7 @@ TEST(DepthUnits, RoundsAndLeavesOutWhatIsNoMeasurement) {
       depth_in_units({metres.data(), 5, 2, 6}, DepthSettings{.factor = 5000.0});
   EXPECT_EQ(depth.width_px, 5);
   EXPECT_EQ(depth.height_px, 2);
-  EXPECT_THAT(depth.values, testing::ElementsAre(5000, 10001, 0, 0, 0, 0, 0, 65535, 0, 0));
+  EXPECT_THAT(depth.values, ::testing::ElementsAre(5000, 10001, 0, 0, 0, 0, 0, 65535, 0, 0));
 }
 
 }  // namespace

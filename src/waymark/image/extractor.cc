@@ -27,11 +27,6 @@ constexpr int kBorderPx = kBriefRadius;
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
 
-struct Candidates {
-  std::vector<Corner> buffer;
-  std::span<Corner> corners;
-};
-
 void check_input(ImageView image, ImageView mask) {
   if (image.is_empty()) throw InputError("image", "no pixels, expected a grey image");
   if (image.width_px > kMaxSizePx || image.height_px > kMaxSizePx) {
@@ -78,6 +73,11 @@ std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corner
 }  // namespace
 
 struct FeatureExtractor::Workspace {
+  struct Candidates {
+    std::vector<Corner> buffer;
+    std::span<Corner> corners;
+  };
+
   Pyramid pyramid;
   CornerWorkspace corner;
   std::array<Candidates, Pyramid::kNumLevels> candidates;

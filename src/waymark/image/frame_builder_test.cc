@@ -11,14 +11,16 @@
 namespace waymark {
 namespace {
 
-constexpr int kWidth = 320;
-constexpr int kHeight = 240;
+constexpr int kFrameWidth = 320;
+constexpr int kFrameHeight = 240;
 constexpr int kDisparityPx = 12;
 constexpr double kFocalPx = 300.0;
 
 std::shared_ptr<const Camera> make_camera(std::vector<double> distortion = {}) {
   return std::make_shared<PerspectiveCamera>(
-      PerspectiveModel({kFocalPx, kFocalPx}, {159.5, 119.5}, distortion), kWidth, kHeight);
+      PerspectiveModel({kFocalPx, kFocalPx}, {159.5, 119.5}, distortion),
+      kFrameWidth,
+      kFrameHeight);
 }
 
 Rig make_stereo_rig() {
@@ -28,11 +30,11 @@ Rig make_stereo_rig() {
 
 /// Two windows of one texture, kDisparityPx apart: a wall at 2.5 m.
 struct StereoImages {
-  PaddedImage texture = testing::make_texture(kWidth + kDisparityPx, kHeight, 5);
+  PaddedImage texture = testing::make_texture(kFrameWidth + kDisparityPx, kFrameHeight, 5);
 
-  ImageView left() const { return {texture.row(0), kWidth, kHeight, texture.stride()}; }
+  ImageView left() const { return {texture.row(0), kFrameWidth, kFrameHeight, texture.stride()}; }
   ImageView right() const {
-    return {texture.row(0) + kDisparityPx, kWidth, kHeight, texture.stride()};
+    return {texture.row(0) + kDisparityPx, kFrameWidth, kFrameHeight, texture.stride()};
   }
 };
 
@@ -104,7 +106,7 @@ TEST(FrameBuilder, StereoAddsPartnersOfCameraOne) {
 
 TEST(FrameBuilder, DepthImageGivesRangeAndSigma) {
   const StereoImages images;
-  DepthImage depth(kWidth, kHeight);
+  DepthImage depth(kFrameWidth, kFrameHeight);
   std::fill(depth.values.begin(), depth.values.end(), std::uint16_t{4000});
   FrameBuilder builder({{{make_camera(), Rigid3()}}},
                        {.features = {.count = 300}, .depth = {.factor = 2000.0}});
@@ -120,8 +122,8 @@ TEST(FrameBuilder, ChoosesFeaturesWithBearings) {
   // Strong distortion: the corners of the image lie outside the model's field of view.
   const auto camera = std::make_shared<PerspectiveCamera>(
       PerspectiveModel({150.0, 150.0}, {159.5, 119.5}, std::vector<double>{-0.28, 0.0, 0.0, 0.0}),
-      kWidth,
-      kHeight);
+      kFrameWidth,
+      kFrameHeight);
   const StereoImages images;
   FrameBuilder wide({{{camera, Rigid3()}}}, {.features = {.count = 300}});
   const auto features = wide.build({.image0 = images.left()});

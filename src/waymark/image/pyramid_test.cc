@@ -14,7 +14,7 @@
 namespace waymark {
 namespace {
 
-cv::Mat as_cv(const PaddedImage& image) {
+cv::Mat cv_view_of(const PaddedImage& image) {
   const ImageView view = image.view();
   return cv::Mat(view.height_px,
                  view.width_px,
@@ -133,9 +133,9 @@ TEST(GaussianBlur, AgreesWithOpenCv) {
     PaddedImage ours;
     gaussian_blur(image, workspace, ours);
     cv::Mat theirs;
-    cv::GaussianBlur(as_cv(image), theirs, cv::Size(7, 7), 2.0, 2.0, cv::BORDER_REFLECT_101);
+    cv::GaussianBlur(cv_view_of(image), theirs, cv::Size(7, 7), 2.0, 2.0, cv::BORDER_REFLECT_101);
     cv::Mat difference;
-    cv::absdiff(as_cv(ours), theirs, difference);
+    cv::absdiff(cv_view_of(ours), theirs, difference);
     EXPECT_LE(cv::norm(difference, cv::NORM_INF), 1.0);
     EXPECT_LE(cv::countNonZero(difference), 0.01 * static_cast<double>(difference.total()));
   }

@@ -11,7 +11,7 @@
 namespace waymark {
 namespace {
 
-Image random_image(int width_px, int height_px) {
+Image random_area(int width_px, int height_px) {
   Rng rng(1, 0);
   Image image(width_px, height_px);
   for (std::uint8_t& value : image.values) value = static_cast<std::uint8_t>(rng.below(256));
@@ -19,7 +19,7 @@ Image random_image(int width_px, int height_px) {
 }
 
 TEST(Reduce, IsTheMeanOfAreasAsInOpenCv) {
-  const Image image = random_image(150, 90);
+  const Image image = random_area(150, 90);
   for (const double factor : {0.5, 0.4, 2.0 / 3.0}) {
     const Image reduced = reduce(image.view(), factor);
     const cv::Mat source(90, 150, CV_8U, const_cast<std::uint8_t*>(image.values.data()));
@@ -54,7 +54,7 @@ TEST(Reduce, PickedValuesAreThoseOfTheImage) {
   const DepthImage picked = pick_reduced(depth.view(), 0.3);
   EXPECT_EQ(picked.width_px, 3);
   for (const std::uint16_t value : picked.values) EXPECT_TRUE(value == 0 || value == 1000);
-  EXPECT_EQ(pick_reduced(random_image(10, 10).view(), 0.3).height_px, 3);
+  EXPECT_EQ(pick_reduced(random_area(10, 10).view(), 0.3).height_px, 3);
 }
 
 }  // namespace

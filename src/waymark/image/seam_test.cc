@@ -15,8 +15,8 @@
 namespace waymark {
 namespace {
 
-constexpr int kWidth = 640;
-constexpr int kHeight = 320;
+constexpr int kPanoramaWidth = 640;
+constexpr int kPanoramaHeight = 320;
 
 TEST(SeamPadding, RepeatsColumnsAtBothSides) {
   const PaddedImage image = testing::make_noise(50, 7, 1);
@@ -43,25 +43,26 @@ PaddedImage turned(const PaddedImage& image, int shift) {
 
 std::shared_ptr<const Features> features_of(const PaddedImage& image) {
   const auto camera = std::make_shared<EquirectangularCamera>(
-      EquirectangularModel(kWidth, kHeight), kWidth, kHeight);
+      EquirectangularModel(kPanoramaWidth, kPanoramaHeight), kPanoramaWidth, kPanoramaHeight);
   FrameBuilder builder({{{camera, Rigid3()}}}, {.features = {.count = 8000}});
   return builder.build({.image0 = image.view()});
 }
 
 TEST(FrameBuilder, FindsAndDescribesFeaturesAtTheSeamLikeOthers) {
-  const PaddedImage texture = testing::make_texture(kWidth, kHeight, 3);
+  const PaddedImage texture = testing::make_texture(kPanoramaWidth, kPanoramaHeight, 3);
   // Half a turn: what was at the seam is in the middle. Pyramid pixels fall elsewhere, hence only
   // features of level 0 are the same bit for bit.
   const auto at_seam = features_of(texture);
-  const auto in_middle = features_of(turned(texture, kWidth / 2));
+  const auto in_middle = features_of(turned(texture, kPanoramaWidth / 2));
   int num_near_seam = 0, num_found = 0;
   for (std::size_t i = 0; i < at_seam->num_primary; ++i) {
     const Keypoint& a = at_seam->keypoints[i];
     EXPECT_GE(a.x_px, -0.5f);
-    EXPECT_LT(a.x_px, kWidth - 0.5f);
-    if (a.level != 0 || std::min(a.x_px, kWidth - a.x_px) > 18.0f) continue;
+    EXPECT_LT(a.x_px, kPanoramaWidth - 0.5f);
+    if (a.level != 0 || std::min(a.x_px, kPanoramaWidth - a.x_px) > 18.0f) continue;
     ++num_near_seam;
-    const float expected_x = a.x_px < 100.0f ? a.x_px + kWidth / 2 : a.x_px - kWidth / 2;
+    const float expected_x =
+        a.x_px < 100.0f ? a.x_px + kPanoramaWidth / 2 : a.x_px - kPanoramaWidth / 2;
     for (std::size_t k = 0; k < in_middle->num_primary; ++k) {
       const Keypoint& b = in_middle->keypoints[k];
       if (b.level != 0 || std::hypot(b.x_px - expected_x, b.y_px - a.y_px) > 0.01f) continue;

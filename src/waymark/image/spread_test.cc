@@ -12,8 +12,8 @@
 namespace waymark {
 namespace {
 
-constexpr int kWidth = 400;
-constexpr int kHeight = 300;
+constexpr int kSpreadWidth = 400;
+constexpr int kSpreadHeight = 300;
 
 int sum(const LevelCounts& counts) { return std::accumulate(counts.begin(), counts.end(), 0); }
 
@@ -51,50 +51,51 @@ std::vector<Corner> make_corners(int width, int height, double density, std::uin
   return corners;
 }
 
-bool is_before(const Corner& a, const Corner& b) {
+bool is_read_before(const Corner& a, const Corner& b) {
   return a.y_px != b.y_px ? a.y_px < b.y_px : a.x_px < b.x_px;
 }
 
 std::vector<Corner> select(const std::vector<Corner>& corners, int count) {
   SpreadSelector selector;
-  selector.reserve(kWidth, kHeight, count);
+  selector.reserve(kSpreadWidth, kSpreadHeight, count);
   std::vector<Corner> selected;
-  selector.select(corners, kWidth, kHeight, count, selected);
+  selector.select(corners, kSpreadWidth, kSpreadHeight, count, selected);
   return selected;
 }
 
 TEST(SpreadSelector, ReturnsAsManyAsAskedForInRasterOrder) {
   for (double density : {0.02, 0.1, 0.9}) {
-    const std::vector<Corner> corners = make_corners(kWidth, kHeight, density, 1);
+    const std::vector<Corner> corners = make_corners(kSpreadWidth, kSpreadHeight, density, 1);
     for (int count : {0, 1, 2, 10, 100, 290, 1000, 5000, 100000}) {
       const std::vector<Corner> selected = select(corners, count);
       EXPECT_EQ(selected.size(), std::min<std::size_t>(corners.size(), count));
-      EXPECT_TRUE(std::is_sorted(selected.begin(), selected.end(), is_before));
+      EXPECT_TRUE(std::is_sorted(selected.begin(), selected.end(), is_read_before));
       EXPECT_EQ(std::adjacent_find(selected.begin(), selected.end()), selected.end());
       EXPECT_TRUE(std::includes(
-          corners.begin(), corners.end(), selected.begin(), selected.end(), is_before));
+          corners.begin(), corners.end(), selected.begin(), selected.end(), is_read_before));
     }
   }
 }
 
 TEST(SpreadSelector, CoversWeakPartsOfTheImage) {
   // The left half is weak, the right half strong and dense.
-  std::vector<Corner> corners = make_corners(kWidth, kHeight, 0.3, 2);
+  std::vector<Corner> corners = make_corners(kSpreadWidth, kSpreadHeight, 0.3, 2);
   for (Corner& corner : corners) {
-    corner.score = corner.x_px < kWidth / 2 ? 10 : 100;
+    corner.score = corner.x_px < kSpreadWidth / 2 ? 10 : 100;
   }
   const std::vector<Corner> selected = select(corners, 200);
   const auto num_left = std::count_if(
-      selected.begin(), selected.end(), [](const Corner& c) { return c.x_px < kWidth / 2; });
+      selected.begin(), selected.end(), [](const Corner& c) { return c.x_px < kSpreadWidth / 2; });
   // Half of the features cover the image evenly, the other half are the strongest.
   EXPECT_NEAR(static_cast<double>(num_left), 50.0, 8.0);
 }
 
 TEST(SpreadSelector, LeavesNoHoles) {
-  const std::vector<Corner> selected = select(make_corners(kWidth, kHeight, 0.5, 3), 200);
+  const std::vector<Corner> selected =
+      select(make_corners(kSpreadWidth, kSpreadHeight, 0.5, 3), 200);
   // The 100 that cover the image would be sqrt(400 * 300 / 100) = 34.6 apart on a square lattice.
-  for (int y = 0; y < kHeight; y += 5) {
-    for (int x = 0; x < kWidth; x += 5) {
+  for (int y = 0; y < kSpreadHeight; y += 5) {
+    for (int x = 0; x < kSpreadWidth; x += 5) {
       double nearest = 1e9;
       for (const Corner& c : selected)
         nearest = std::min(nearest, std::hypot(c.x_px - x, c.y_px - y));
@@ -104,7 +105,7 @@ TEST(SpreadSelector, LeavesNoHoles) {
 }
 
 TEST(SpreadSelector, TakesTheStrongest) {
-  std::vector<Corner> corners = make_corners(kWidth, kHeight, 0.3, 4);
+  std::vector<Corner> corners = make_corners(kSpreadWidth, kSpreadHeight, 0.3, 4);
   for (Corner& corner : corners) corner.score = 50;
   const std::size_t middle = corners.size() / 2;
   corners[middle].score = 51;

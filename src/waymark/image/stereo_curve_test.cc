@@ -12,7 +12,7 @@ namespace {
 
 const Rigid3 kCam1FromCam0(so3_exp({0.1, -0.2, 0.05}), {-0.3, 0.05, 0.1});
 
-Rig make_rig() {
+Rig make_distorted_rig() {
   const auto camera = std::make_shared<PerspectiveCamera>(
       PerspectiveModel({400.0, 400.0}, {320.0, 240.0}, std::vector<double>{-0.3, 0.1, 0.0, 0.0}),
       640,
@@ -37,7 +37,7 @@ TEST(EpipolarRay, AnglesInverseRangesAndDirectionsAgree) {
 }
 
 TEST(EpipolarCurves, NodesLieOnTheCurveAndSpanItsRange) {
-  const Rig rig = make_rig();
+  const Rig rig = make_distorted_rig();
   EpipolarCurves curves(rig, 0.8);
   const std::vector<Eigen::Vector3f> bearings = {Eigen::Vector3f(0.0f, 0.0f, 1.0f),
                                                  Eigen::Vector3f(0.2f, 0.1f, 1.0f).normalized()};
@@ -60,7 +60,7 @@ TEST(EpipolarCurves, NodesLieOnTheCurveAndSpanItsRange) {
 }
 
 TEST(EpipolarCurves, StopsWhereTheImageEnds) {
-  EpipolarCurves curves(make_rig(), 0.3);
+  EpipolarCurves curves(make_distorted_rig(), 0.3);
   const std::vector<Eigen::Vector3f> bearings = {Eigen::Vector3f(-0.45f, 0.0f, 1.0f).normalized(),
                                                  Eigen::Vector3f(0.0f, 0.0f, -1.0f)};
   const std::vector<float> size_rad = {1.0f / 400.0f, 1.0f / 400.0f};
@@ -72,7 +72,7 @@ TEST(EpipolarCurves, StopsWhereTheImageEnds) {
 }
 
 TEST(EpipolarCurves, ThereIsNoneTowardsTheOtherCamera) {
-  EpipolarCurves curves(make_rig(), 0.3);
+  EpipolarCurves curves(make_distorted_rig(), 0.3);
   const Eigen::Vector3d epipole = kCam1FromCam0.origin_in_source().normalized();
   const std::vector<Eigen::Vector3f> bearings = {epipole.cast<float>()};
   const std::vector<float> size_rad = {1.0f / 400.0f};

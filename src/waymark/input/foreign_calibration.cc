@@ -99,16 +99,15 @@ CameraChain checked_chain(const CameraDescription& camera) {
   return chain;
 }
 
-/// FileStorage begins with "%YAML:1.0", which is not YAML's directive.
-ConfigSource without_header(ConfigSource source) {
+}  // namespace
+
+ConfigSource without_opencv_header(ConfigSource source) {
   if (source.text.starts_with("%YAML:")) source.text.replace(0, 1, "#");
   return source;
 }
 
-}  // namespace
-
 CameraChain read_opencv_calibration(const ConfigSource& source) {
-  const ConfigNode root = parse_config(without_header(source));
+  const ConfigNode root = parse_config(without_opencv_header(source));
   CameraDescription camera = read_size_and_matrix(root, source.name);
   const ConfigNode* node = find_any(
       root,

@@ -17,6 +17,10 @@ namespace waymark {
 /// OpenCV: a file of cv::FileStorage in YAML, with the keys of its calibration sample: image_width,
 /// image_height, camera_matrix, distortion_coefficients of 0, 4, 5, 8, or 12 or 14 the last of
 /// which are 0; fisheye_model 1 for the cv::fisheye model. Spellings such as K and D are accepted.
+/// Without the "%YAML:1.0" with which OpenCV's FileStorage begins and which is not YAML's
+/// directive.
+ConfigSource without_opencv_header(ConfigSource source);
+
 CameraChain read_opencv_calibration(const ConfigSource& source);
 
 /// ROS: a sensor_msgs/CameraInfo as camera_calibration saves it or `ros2 topic echo` prints it.

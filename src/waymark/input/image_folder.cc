@@ -11,7 +11,7 @@ namespace {
 
 constexpr std::int64_t kAssumedRateHz = 30;
 
-std::filesystem::path find_times(const std::filesystem::path& images) {
+std::filesystem::path find_image_times(const std::filesystem::path& images) {
   for (const std::filesystem::path& folder : {images, images / ".."}) {
     const std::filesystem::path candidate = (folder / "times.txt").lexically_normal();
     if (std::filesystem::exists(candidate)) return candidate;
@@ -30,7 +30,7 @@ Listing list_image_folder(const std::filesystem::path& folder, const InputOption
   const bool is_nested = std::filesystem::is_directory(folder / "images");
   const std::filesystem::path images_folder = is_nested ? folder / "images" : folder;
   const std::vector<std::filesystem::path> images = list_images(images_folder);
-  const std::filesystem::path times_path = find_times(images_folder);
+  const std::filesystem::path times_path = find_image_times(images_folder);
   std::vector<std::int64_t> times_ns;
   if (times_path.empty()) {
     for (std::size_t i = 0; i < images.size(); ++i) {

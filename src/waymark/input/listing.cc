@@ -26,8 +26,6 @@ bool has_extension(const std::filesystem::path& path, const Extensions& extensio
   return std::find(extensions.begin(), extensions.end(), extension) != extensions.end();
 }
 
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-
 std::string_view take_number(std::string_view& text) {
   std::size_t length = 0;
   while (length < text.size() && is_digit(text[length])) ++length;

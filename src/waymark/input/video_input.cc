@@ -22,7 +22,7 @@
 namespace waymark {
 namespace {
 
-constexpr double kAssumedRateHz = 30.0;
+constexpr double kAssumedVideoRateHz = 30.0;
 
 /// Frames of a video in order, each with the time of the container.
 class VideoReader {
@@ -39,7 +39,7 @@ class VideoReader {
                        "cannot be opened as a video, expected mp4, mov, avi, mkv or the like");
     }
     const double rate_hz = capture_.get(cv::CAP_PROP_FPS);
-    rate_hz_ = std::isfinite(rate_hz) && rate_hz > 0.0 ? rate_hz : kAssumedRateHz;
+    rate_hz_ = std::isfinite(rate_hz) && rate_hz > 0.0 ? rate_hz : kAssumedVideoRateHz;
   }
 
   /// Steps to the next frame; false at the end.
@@ -86,7 +86,7 @@ class VideoReader {
 
  private:
   cv::VideoCapture capture_;
-  double rate_hz_ = kAssumedRateHz;
+  double rate_hz_ = kAssumedVideoRateHz;
   std::size_t num_grabbed_ = 0;
   std::int64_t timestamp_ns_ = 0;
 };

@@ -15,9 +15,9 @@ namespace waymark {
 namespace {
 
 /// Keyframes so many steps away in the graph are known to each other well enough.
-constexpr int kNumNearSteps = 5;
+constexpr int kNumNearLinkSteps = 5;
 /// Beyond this ORB features change too much.
-constexpr ViewReach kReach = {0.8, 0.7};
+constexpr ViewReach kLinkReach = {0.8, 0.7};
 /// Features of the query that show landmarks of both sides, and their distances in the same ratio.
 constexpr std::size_t kMinPairs = 10;
 constexpr double kMaxRatioError = 0.15;
@@ -25,7 +25,7 @@ constexpr double kMaxRatioError = 0.15;
 /// The nearest in space of those that the graph does not know to be near.
 KeyframeId nearest_unknown(const Map& map, KeyframeId query) {
   const Rig& rig = *map.keyframes().at(query).rig;
-  for (const KeyframeId id : strangers_beside(map, query, kNumNearSteps, kReach)) {
+  for (const KeyframeId id : strangers_beside(map, query, kNumNearLinkSteps, kLinkReach)) {
     if (is_same_rig(*map.keyframes().at(id).rig, rig)) return id;
   }
   return {};

@@ -9,9 +9,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
-
 /// A walk past its beginning, none of whose landmarks it knows again.
 LoopScene walk_round(bool is_metric, const Vector7d& drift) {
   LoopScene scene(cloud_all_round(kNumPoints), is_metric, drift);

@@ -10,9 +10,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
-
 /// The true relative pose of two steps, in the units that the map has at the second.
 Sim3 true_motion(const LoopScene& scene, int query_step, int match_step) {
   const Rigid3 relative =

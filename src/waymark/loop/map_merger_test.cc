@@ -13,9 +13,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumPoints = 4000;
-constexpr int kRound = LoopScene::kStepsPerRound;
-
 /// A map of the steps from one to another, in a frame and units of its own.
 std::unique_ptr<LoopScene> walk(int from_step, int to_step, bool is_metric, double scale) {
   auto scene =

@@ -9,8 +9,6 @@
 namespace waymark {
 namespace {
 
-constexpr int kRound = LoopScene::kStepsPerRound;
-
 std::uint32_t num_shared(const Map& map, KeyframeId a, KeyframeId b) {
   for (const CovisibilityEdge& edge : map.covisible(a)) {
     if (edge.keyframe == b) return edge.num_shared;

@@ -48,7 +48,7 @@ void add_view(const Map& map,
   side.level_pixel_from_bearing.push_back(keyframe.features->level_pixel_from_bearing[feature]);
 }
 
-std::vector<KeyframeId> with_neighbours(const Map& map, KeyframeId id) {
+std::vector<KeyframeId> with_surroundings(const Map& map, KeyframeId id) {
   std::vector<KeyframeId> ids = strongest_neighbours(map, id, kNumSurroundings);
   ids.push_back(id);
   return ids;
@@ -192,14 +192,14 @@ void RevisitVerifier::count_sightings(const Map& map, RevisitEvidence& evidence)
   const Revisit& revisit = evidence.revisit;
   const Rigid3 query_from_world = map.keyframes().at(revisit.query).rig_from_world;
   const Rigid3 match_from_world = map.keyframes().at(revisit.match).rig_from_world;
-  const std::vector<KeyframeId> around_match = with_neighbours(map, revisit.match);
+  const std::vector<KeyframeId> around_match = with_surroundings(map, revisit.match);
   evidence.in_query = look_for(map,
                                around_match,
                                revisit.query,
                                pose_in_other_world(revisit.query_from_match, match_from_world));
   evidence.in_match =
       look_for(map,
-               with_neighbours(map, revisit.query),
+               with_surroundings(map, revisit.query),
                revisit.match,
                pose_in_other_world(revisit.query_from_match.inverse(), query_from_world));
   for (KeyframeId id : strongest_neighbours(map, revisit.query, kMaxWitnesses)) {

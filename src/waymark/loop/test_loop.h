@@ -140,4 +140,7 @@ class LoopScene {
   std::map<std::uint32_t, KnownPoint> landmark_of_point;
 };
 
+constexpr int kNumPoints = 4000;
+constexpr int kRound = LoopScene::kStepsPerRound;
+
 }  // namespace waymark

@@ -9,7 +9,7 @@ namespace {
 
 /// Keyframes 0 to 4 in a row, each the child of the one before, 1 m apart along x and looking along
 /// z, one landmark each, 2 m ahead.
-class CorrectionTest : public testing::Test {
+class CorrectionTest : public ::testing::Test {
  protected:
   void SetUp() override {
     auto features = std::make_shared<Features>();

@@ -18,7 +18,7 @@ namespace {
 constexpr NumberRange kScale{1e-12, 1e12};
 constexpr NumberRange kLength{-1e15, 1e15};
 constexpr std::size_t kMaxCameraNumbers = 16;
-constexpr std::uint64_t kMaxSizePx = 1u << 16;
+constexpr std::uint64_t kMaxImageSizePx = 1u << 16;
 
 template <class Stored, class IdType>
 bool is_among(const std::vector<Stored>& stored, IdType id) {
@@ -102,8 +102,8 @@ void MapReader::read_camera(MapRecord& record) {
   description.intrinsics = record.numbers("intrinsics", kMaxCameraNumbers);
   description.distortion_model = record.text("distortion_model", kMaxTextBytes);
   description.distortion_coeffs = record.numbers("distortion_coeffs", kMaxCameraNumbers);
-  description.width_px = static_cast<int>(record.whole("width_px", kMaxSizePx));
-  description.height_px = static_cast<int>(record.whole("height_px", kMaxSizePx));
+  description.width_px = static_cast<int>(record.whole("width_px", kMaxImageSizePx));
+  description.height_px = static_cast<int>(record.whole("height_px", kMaxImageSizePx));
   const Rigid3 cam_from_rig = record.transform("cam_from_rig");
   rigs_.back()->cameras.push_back({registry_.make_camera(description), cam_from_rig, description});
 }

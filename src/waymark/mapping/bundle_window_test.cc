@@ -5,7 +5,6 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
-#include <cmath>
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/track/test_map.h"
@@ -16,11 +15,6 @@ namespace {
 template <class T>
 bool contains(const std::vector<T>& sorted, T value) {
   return std::binary_search(sorted.begin(), sorted.end(), value);
-}
-
-/// Half a metre apart; not on a line, along which an alignment could turn.
-Rigid3 row_pose(std::uint32_t keyframe) {
-  return pose_at(0.5 * keyframe, 0.2 * std::sin(2.0 * keyframe), 0.2 * std::cos(1.5 * keyframe));
 }
 
 /// Keyframes in a row before a long cloud: near ones share landmarks.

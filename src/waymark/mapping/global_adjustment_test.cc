@@ -4,18 +4,12 @@
 
 #include <gtest/gtest.h>
 
-#include <cmath>
-
 #include "waymark/track/test_map.h"
 
 namespace waymark {
 namespace {
 
 constexpr std::uint32_t kNumKnown = 8;
-
-Rigid3 row_pose(std::uint32_t keyframe) {
-  return pose_at(0.5 * keyframe, 0.2 * std::sin(2.0 * keyframe), 0.2 * std::cos(1.5 * keyframe));
-}
 
 /// Keyframes in a row before a long cloud, some of which were not there when the adjustment began.
 class GlobalAdjustmentTest : public ::testing::TestWithParam<bool> {

@@ -8,7 +8,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxNeighbours = 10;
+constexpr std::size_t kMaxTriangulationNeighbours = 10;
 /// Baselines below this part of the scene's distance give no useful depth.
 constexpr double kMinBaselineRatio = 0.01;
 
@@ -57,7 +57,7 @@ std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
                                                     DirtyLandmarks& dirty) {
   std::vector<LandmarkId> added;
   const double distance = median_distance(map, map.keyframes().at(id));
-  for (KeyframeId neighbour : strongest_neighbours(map, id, kMaxNeighbours)) {
+  for (KeyframeId neighbour : strongest_neighbours(map, id, kMaxTriangulationNeighbours)) {
     const Keyframe a = map.keyframes().at(id);
     const Keyframe b = map.keyframes().at(neighbour);
     const Rigid3 b_from_a = (b.rig->cameras[0].cam_from_rig * b.rig_from_world) *

@@ -16,7 +16,7 @@ constexpr float kPi = std::numbers::pi_v<float>;
 /// Closer to the epipole than this the azimuth says nothing and depth is ill-conditioned.
 constexpr float kMinAxisAngle = 0.03f;
 /// How much the sizes of the two features may differ beyond what the distances explain.
-constexpr float kMaxSizeRatio = 1.6f;
+constexpr float kMaxEpipolarSizeRatio = 1.6f;
 
 /// Orthonormal axes with the baseline, from a to b, as third.
 Eigen::Matrix3f baseline_axes(const Eigen::Vector3d& centre_of_b_in_a) {
@@ -79,11 +79,11 @@ void EpipolarMatcher::choose(const Polar& polar,
     if (azimuth_difference * std::min(sin_a, sin_b) > error * std::max(size_a, size_b)) return;
     // Law of sines: the distances from a and b are as sin_b to sin_a.
     const float size_ratio = size_b * sin_a / (size_a * sin_b);
-    if (size_ratio > kMaxSizeRatio || size_ratio < 1.0f / kMaxSizeRatio) return;
+    if (size_ratio > kMaxEpipolarSizeRatio || size_ratio < 1.0f / kMaxEpipolarSizeRatio) return;
     candidates_.push_back(other.feature);
   };
   // Sizes of b may be coarser than a's by the allowed ratio.
-  const float tolerance = std::min(error * size_a * 2.0f * kMaxSizeRatio / sin_a, kPi);
+  const float tolerance = std::min(error * size_a * 2.0f * kMaxEpipolarSizeRatio / sin_a, kPi);
   for (const float turn : {-2.0f * kPi, 0.0f, 2.0f * kPi}) {
     const float centre = polar.azimuth_rad + turn;
     auto it = std::lower_bound(

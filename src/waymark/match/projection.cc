@@ -10,7 +10,7 @@ namespace waymark {
 namespace {
 
 /// A feature may differ from the landmark's expected size by up to two pyramid levels.
-constexpr double kMaxSizeRatio = 1.5;
+constexpr double kMaxProjectionSizeRatio = 1.5;
 constexpr std::uint32_t kNoLandmark = UINT32_MAX;
 
 }  // namespace
@@ -81,7 +81,7 @@ void ProjectionMatcher::find_candidates(std::size_t landmark,
     const double dy = keypoint.y_px - pixel.y();
     if (dx * dx + dy * dy > radius * radius) return;
     const double ratio = features.size_rad[feature] / size_rad;
-    if (ratio > kMaxSizeRatio || ratio < 1.0 / kMaxSizeRatio) return;
+    if (ratio > kMaxProjectionSizeRatio || ratio < 1.0 / kMaxProjectionSizeRatio) return;
     if (!is_taken.empty() && is_taken[feature]) return;
     candidates_.push_back(feature);
   };

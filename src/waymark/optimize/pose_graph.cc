@@ -21,7 +21,7 @@ constexpr double kNegligibleShare = 1e-10;
 constexpr double kNegligibleDecrease = 1e-12;
 /// Damping at which no step is left to try, and that which keeps a graph without fixed nodes from
 /// drifting along with rounding.
-constexpr double kMaxDamping = 1e16;
+constexpr double kMaxGraphDamping = 1e16;
 constexpr double kMinDamping = 1e-10;
 /// Deviation from 1 of the norm of a quaternion that is still taken for a rotation.
 constexpr double kMaxNormError = 1e-3;
@@ -89,7 +89,8 @@ class PoseGraphSolver {
     while (num_slots_ > 0 && summary.num_iterations < options_.max_iterations) {
       if (should_linearize) linearize();
       ++summary.num_iterations;
-      const double decrease = damping.value() < kMaxDamping ? system_->solve(damping.value()) : 0.0;
+      const double decrease =
+          damping.value() < kMaxGraphDamping ? system_->solve(damping.value()) : 0.0;
       should_linearize = false;
       if (std::isfinite(decrease)) {
         if (!(decrease > kNegligibleShare * cost + kNegligibleDecrease)) {

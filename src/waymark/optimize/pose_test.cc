@@ -32,7 +32,7 @@ PoseEstimate run(const PoseScene& scene, const Rigid3& initial, PoseWorkspace& w
 }
 
 /// Autodiff residual with its own formulas: angle-axis increments on the initial pose.
-struct Oracle {
+struct PoseOracle {
   Eigen::Vector3d point_in_cam;  // At the initial pose.
   Eigen::Vector3d bearing;
   Matrix23d w;
@@ -58,10 +58,10 @@ Rigid3 solve_with_ceres(const PoseScene& scene, const Rigid3& initial, double hu
   double increment[6] = {};
   for (std::size_t i = 0; i < scene.observations.size(); ++i) {
     const auto& observations = scene.observations;
-    auto* cost = new ceres::AutoDiffCostFunction<Oracle, 2, 6>(
-        new Oracle{initial * observations.point_in_world[i],
-                   observations.bearing[i].cast<double>(),
-                   observations.level_pixel_from_bearing[i].cast<double>()});
+    auto* cost = new ceres::AutoDiffCostFunction<PoseOracle, 2, 6>(
+        new PoseOracle{initial * observations.point_in_world[i],
+                       observations.bearing[i].cast<double>(),
+                       observations.level_pixel_from_bearing[i].cast<double>()});
     problem.AddResidualBlock(cost, new ceres::HuberLoss(huber_scale), increment);
   }
   ceres::Solver::Options options;

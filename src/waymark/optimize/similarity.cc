@@ -20,16 +20,16 @@ namespace {
 /// Fewer do not determine a similarity.
 constexpr std::size_t kMinMatches = 3;
 /// Scales of the losses in units of the noise.
-constexpr double kFinalScale = 3.0;
-constexpr double kHuberScale = 2.5;
+constexpr double kSimilarityFinalScale = 3.0;
+constexpr double kSimilarityHuberScale = 2.5;
 /// The scale shrinks by this factor from stage to stage.
-constexpr double kAnnealing = 0.5;
-constexpr int kIterationsPerStage = 3;
-constexpr int kIterationsPerRound = 10;
-constexpr int kNumRounds = 3;
+constexpr double kSimilarityAnnealing = 0.5;
+constexpr int kSimilarityIterationsPerStage = 3;
+constexpr int kSimilarityIterationsPerRound = 10;
+constexpr int kNumSimilarityRounds = 3;
 /// Iterations end when the next step would lower the cost by less than this, in units of the
 /// squared noise.
-constexpr double kNegligibleDecrease = 1e-6;
+constexpr double kNegligibleSimilarityDecrease = 1e-6;
 /// Noise of the logarithm of a ratio of ranges: as assumed until it is measured, and its bounds.
 constexpr double kAssumedRangeNoise = 0.1;
 constexpr double kMinRangeNoise = 0.002;
@@ -82,7 +82,7 @@ class SimilaritySolver {
 
   void minimize(Sim3& b_from_a, Indices indices, const Loss& loss, int max_iterations) const {
     const auto at = [&](const Sim3& similarity) { return linearize(similarity, indices, loss); };
-    const double negligible = kNegligibleDecrease * options_.noise_px * options_.noise_px;
+    const double negligible = kNegligibleSimilarityDecrease * options_.noise_px * options_.noise_px;
     int num_iterations = 0;
     minimize_over_pose(b_from_a, at, max_iterations, negligible, num_iterations);
   }
@@ -90,12 +90,12 @@ class SimilaritySolver {
   /// Runs through Geman-McClure losses from the width of the residuals at hand to that of the
   /// noise.
   void anneal(Sim3& b_from_a, Indices indices) const {
-    const double final_scale = kFinalScale * options_.noise_px;
+    const double final_scale = kSimilarityFinalScale * options_.noise_px;
     double scale = std::max(final_scale, median_residual(b_from_a, indices));
-    for (; scale > final_scale; scale *= kAnnealing) {
-      minimize(b_from_a, indices, {geman_mcclure, scale}, kIterationsPerStage);
+    for (; scale > final_scale; scale *= kSimilarityAnnealing) {
+      minimize(b_from_a, indices, {geman_mcclure, scale}, kSimilarityIterationsPerStage);
     }
-    minimize(b_from_a, indices, {geman_mcclure, final_scale}, kIterationsPerRound);
+    minimize(b_from_a, indices, {geman_mcclure, final_scale}, kSimilarityIterationsPerRound);
   }
 
   std::vector<std::uint32_t> inliers(const Sim3& b_from_a) const {
@@ -190,7 +190,7 @@ class SimilarityEstimator {
     constexpr int kMaxIterations = 3;
     if (nearby.size() <= kSampleSize) return std::nullopt;
     Sim3 b_from_a = model.b_from_a;
-    const Loss loss = {geman_mcclure, kFinalScale * options_.noise_px};
+    const Loss loss = {geman_mcclure, kSimilarityFinalScale * options_.noise_px};
     SimilaritySolver(matches_, options_).minimize(b_from_a, nearby, loss, kMaxIterations);
     return model_of(b_from_a);
   }
@@ -216,18 +216,18 @@ SimilarityEstimate refine_similarity(const LandmarkMatches& matches,
                                      const Sim3& initial_b_from_a,
                                      const SimilarityOptions& options) {
   SimilaritySolver solver(matches, options);
-  const Loss huber_loss = {huber, kHuberScale * options.noise_px};
+  const Loss huber_loss = {huber, kSimilarityHuberScale * options.noise_px};
   SimilarityEstimate estimate;
   estimate.b_from_a = initial_b_from_a;
   std::vector<std::uint32_t> indices(matches.size());
   std::iota(indices.begin(), indices.end(), 0u);
   if (indices.size() >= kMinMatches) solver.anneal(estimate.b_from_a, indices);
   indices = solver.inliers(estimate.b_from_a);
-  for (int round = 0; round < kNumRounds && indices.size() >= kMinMatches; ++round) {
+  for (int round = 0; round < kNumSimilarityRounds && indices.size() >= kMinMatches; ++round) {
     if (options.is_scale_free) {
       estimate.range_noise = solver.measure_range_noise(estimate.b_from_a, indices);
     }
-    solver.minimize(estimate.b_from_a, indices, huber_loss, kIterationsPerRound);
+    solver.minimize(estimate.b_from_a, indices, huber_loss, kSimilarityIterationsPerRound);
     auto next = solver.inliers(estimate.b_from_a);
     const bool is_settled = next == indices;
     indices = std::move(next);

@@ -179,7 +179,7 @@ TEST(Similarity, RefinementConvergesFromAfar) {
 }
 
 /// Autodiff residuals with their own formulas, parameters (angle axis, translation, log scale).
-struct Oracle {
+struct SimilarityOracle {
   Eigen::Vector3d point_a, point_b, bearing_a, bearing_b;
   Matrix23d w_a, w_b;
 
@@ -244,13 +244,13 @@ Sim3 solve_with_ceres(const LandmarkMatches& matches, const Sim3& initial, doubl
   parameters[6] = std::log(initial.scale);
   ceres::Problem problem;
   for (std::size_t i = 0; i < matches.size(); ++i) {
-    auto* oracle = new Oracle{matches.a.point_in_cam[i],
-                              matches.b.point_in_cam[i],
-                              matches.a.bearing[i].cast<double>(),
-                              matches.b.bearing[i].cast<double>(),
-                              matches.a.level_pixel_from_bearing[i].cast<double>(),
-                              matches.b.level_pixel_from_bearing[i].cast<double>()};
-    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<Oracle, 4, 7>(oracle),
+    auto* oracle = new SimilarityOracle{matches.a.point_in_cam[i],
+                                        matches.b.point_in_cam[i],
+                                        matches.a.bearing[i].cast<double>(),
+                                        matches.b.bearing[i].cast<double>(),
+                                        matches.a.level_pixel_from_bearing[i].cast<double>(),
+                                        matches.b.level_pixel_from_bearing[i].cast<double>()};
+    problem.AddResidualBlock(new ceres::AutoDiffCostFunction<SimilarityOracle, 4, 7>(oracle),
                              new ceres::HuberLoss(huber_scale),
                              parameters);
     auto* range_oracle =

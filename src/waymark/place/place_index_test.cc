@@ -12,8 +12,8 @@
 namespace waymark {
 namespace {
 
-using testing::ElementsAre;
-using testing::IsEmpty;
+using ::testing::ElementsAre;
+using ::testing::IsEmpty;
 
 using Places = std::vector<std::vector<Descriptor>>;
 

@@ -39,7 +39,7 @@ TEST(PlaceKeysTest, KeysDifferWhereTheirBitsOfTheDescriptorsDiffer) {
 
 TEST(PlaceKeysTest, KeysOfAllBitsSetAreFull) {
   const Descriptor full = {UINT64_MAX, UINT64_MAX, UINT64_MAX, UINT64_MAX};
-  EXPECT_THAT(place_keys(full), testing::Each((PlaceKey{1} << kPlaceKeyBits) - 1));
+  EXPECT_THAT(place_keys(full), ::testing::Each((PlaceKey{1} << kPlaceKeyBits) - 1));
 }
 
 }  // namespace

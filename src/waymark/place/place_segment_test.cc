@@ -13,7 +13,7 @@
 namespace waymark {
 namespace {
 
-using testing::ElementsAre;
+using ::testing::ElementsAre;
 
 constexpr auto kKeepAll = [](KeyframeId) { return false; };
 

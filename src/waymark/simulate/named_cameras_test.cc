@@ -16,7 +16,7 @@
 namespace waymark {
 namespace {
 
-class NamedCamera : public testing::TestWithParam<std::string> {};
+class NamedCamera : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(NamedCamera, IsSoundAndSeesTheWorld) {
   const auto camera =
@@ -44,7 +44,7 @@ TEST_P(NamedCamera, IsSoundAndSeesTheWorld) {
   EXPECT_LE(num_black, num_invalid + 8 * image.height_px);
 }
 
-INSTANTIATE_TEST_SUITE_P(All, NamedCamera, testing::ValuesIn(camera_names()));
+INSTANTIATE_TEST_SUITE_P(All, NamedCamera, ::testing::ValuesIn(camera_names()));
 
 TEST(NamedCamera, VignetteHasNoFeatures) {
   const auto camera =

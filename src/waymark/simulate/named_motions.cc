@@ -14,7 +14,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kWholeTurn = 2.0 * std::numbers::pi;
 constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 /// Where one can go in a world. Paths run along the closed polygon; keys are spacing apart, and the
@@ -132,21 +132,21 @@ std::vector<MotionKey> about_start(const Course& course, Offset offset) {
   return keys;
 }
 
-MotionKey slide_offset(double phase) { return {{0.7 * std::sin(kTwoPi * phase), 0.0, 0.0}}; }
+MotionKey slide_offset(double phase) { return {{0.7 * std::sin(kWholeTurn * phase), 0.0, 0.0}}; }
 
 MotionKey forward_offset(double phase) {
-  return {{0.0, 0.0, 0.8 * (1.0 - std::cos(kTwoPi * phase))}};
+  return {{0.0, 0.0, 0.8 * (1.0 - std::cos(kWholeTurn * phase))}};
 }
 
 MotionKey rotate_offset(double phase) {
   return {Vector3d::Zero(),
-          100.0 * (1.0 - std::cos(kTwoPi * phase)),
-          6.0 * std::sin(3.0 * kTwoPi * phase),
+          100.0 * (1.0 - std::cos(kWholeTurn * phase)),
+          6.0 * std::sin(3.0 * kWholeTurn * phase),
           0.0};
 }
 
 MotionKey inspect_offset(double phase) {
-  const double a = kTwoPi * phase;
+  const double a = kWholeTurn * phase;
   return {{0.45 * std::sin(2.0 * a), 0.15 * std::sin(3.0 * a), 0.4 * std::sin(a)},
           32.0 * std::sin(a) + 6.0 * std::sin(3.0 * a),
           9.0 * std::sin(2.0 * a),

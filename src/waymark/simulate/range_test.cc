@@ -44,7 +44,7 @@ CameraDescription fisheye(double focal_px) {
   return description;
 }
 
-class StereoRange : public testing::TestWithParam<StereoCase> {};
+class StereoRange : public ::testing::TestWithParam<StereoCase> {};
 
 TEST_P(StereoRange, IsThatOfTheWorld) {
   const StereoCase& stereo = GetParam();
@@ -86,7 +86,7 @@ TEST_P(StereoRange, IsThatOfTheWorld) {
   EXPECT_LT(quantile(0.95), 0.4);
 }
 
-class MeasuredRange : public testing::TestWithParam<std::string> {};
+class MeasuredRange : public ::testing::TestWithParam<std::string> {};
 
 TEST_P(MeasuredRange, ErrsByItsSigma) {
   constexpr double kUnits = 5000.0;
@@ -129,19 +129,19 @@ TEST_P(MeasuredRange, ErrsByItsSigma) {
 
 INSTANTIATE_TEST_SUITE_P(Cameras,
                          MeasuredRange,
-                         testing::Values("perspective", "fisheye", "fisheye_200"));
+                         ::testing::Values("perspective", "fisheye", "fisheye_200"));
 
 INSTANTIATE_TEST_SUITE_P(
     Cameras,
     StereoRange,
-    testing::Values(
+    ::testing::Values(
         StereoCase{"perspective", describe("pinhole", {300.0, 300.0, 239.3, 240.8}), 0.0},
         StereoCase{"fisheye", fisheye(170.0), 0.0},
         StereoCase{"fisheye_verged", fisheye(170.0), 0.17},
         StereoCase{"fisheye_200", fisheye(130.0), 0.0},
         StereoCase{"ds", describe("ds", {-0.2, 0.6, 150.0, 150.0, 239.3, 240.8}), 0.0},
         StereoCase{"equirectangular", describe("equirectangular", {}, 960), 0.0}),
-    [](const testing::TestParamInfo<StereoCase>& info) { return std::string(info.param.name); });
+    [](const ::testing::TestParamInfo<StereoCase>& info) { return std::string(info.param.name); });
 
 }  // namespace
 }  // namespace waymark

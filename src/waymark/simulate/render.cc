@@ -62,7 +62,7 @@ float unwrap(float u, float reference, const TraceSurface& s) {
   return u - s.size.x() * std::round((u - reference) / s.size.x());
 }
 
-std::uint8_t to_grey(float value) {
+std::uint8_t nearest_grey(float value) {
   return static_cast<std::uint8_t>(std::clamp(value + 0.5f, 0.0f, 255.0f));
 }
 
@@ -89,9 +89,9 @@ class TileShader {
       if (other == RayTile::kNoRay) return 0;
       is_uniform = is_uniform && other == hit;
     }
-    if (!is_uniform) return to_grey(many_rays(corners));
-    if (hit == RayTile::kSky) return to_grey(sky_grey(rays_.direction(corners[0])));
-    return to_grey(one_surface(tracer_.surface(hit), corners));
+    if (!is_uniform) return nearest_grey(many_rays(corners));
+    if (hit == RayTile::kSky) return nearest_grey(sky_grey(rays_.direction(corners[0])));
+    return nearest_grey(one_surface(tracer_.surface(hit), corners));
   }
 
  private:

@@ -9,7 +9,7 @@
 namespace waymark {
 namespace {
 
-constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr double kRadPerDegree = std::numbers::pi / 180.0;
 constexpr double kDepthFactor = 5000.0;
 
 CameraDescription pinhole(int width_px, int height_px, double focal_px) {
@@ -35,7 +35,7 @@ CameraDescription distorted(int index) {
 
 /// Cameras side by side, camera 1 to the right, turned by a rotation vector in degrees.
 Rigid3 beside(double baseline_m, const Eigen::Vector3d& turn_deg) {
-  const Eigen::Quaterniond cam1_from_cam0 = so3_exp(-kRadPerDeg * turn_deg);
+  const Eigen::Quaterniond cam1_from_cam0 = so3_exp(-kRadPerDegree * turn_deg);
   return {cam1_from_cam0, -(cam1_from_cam0 * Eigen::Vector3d(baseline_m, 0.0, 0.0))};
 }
 

@@ -11,7 +11,7 @@ namespace {
 using Eigen::Vector2d;
 using Eigen::Vector3d;
 
-constexpr double kTwoPi = 2.0 * std::numbers::pi;
+constexpr double kFullTurn = 2.0 * std::numbers::pi;
 
 /// The ray in the surface's axes (u, v, normal), relative to its origin.
 struct LocalRay {
@@ -28,7 +28,7 @@ LocalRay to_local(const Surface& surface, const Vector3d& origin, const Vector3d
 
 double angle_of(double x, double y) {
   const double angle = std::atan2(y, x);
-  return angle < 0.0 ? angle + kTwoPi : angle;
+  return angle < 0.0 ? angle + kFullTurn : angle;
 }
 
 std::optional<SurfaceHit> intersect_plane(const Surface& surface, const LocalRay& ray) {
@@ -106,7 +106,7 @@ Surface make_cylinder(const Vector3d& base_centre, double radius, double height)
   Surface surface;
   surface.kind = SurfaceKind::kCylinder;
   surface.origin = base_centre + height * Vector3d::UnitZ();
-  surface.size = {kTwoPi * radius, height};
+  surface.size = {kFullTurn * radius, height};
   surface.radius = radius;
   return surface;
 }
@@ -115,7 +115,7 @@ Surface make_sphere(const Vector3d& centre, double radius) {
   Surface surface;
   surface.kind = SurfaceKind::kSphere;
   surface.origin = centre;
-  surface.size = {kTwoPi * radius, std::numbers::pi * radius};
+  surface.size = {kFullTurn * radius, std::numbers::pi * radius};
   surface.radius = radius;
   return surface;
 }

@@ -13,7 +13,7 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumFrames = 25;
+constexpr int kNumLocalizedFrames = 25;
 
 CameraDescription pinhole(double focal_px, int width_px, int height_px) {
   CameraDescription camera;
@@ -29,12 +29,12 @@ SequenceSpec spec_of(const CameraDescription& camera) {
   spec.name = "small";
   spec.motion = "slide";
   spec.seed = 3;
-  spec.num_frames = kNumFrames;
+  spec.num_frames = kNumLocalizedFrames;
   spec.chain = rgbd_chain(camera, 1000.0);
   return spec;
 }
 
-FrameInput input_of(const SimulatedFrame& frame) {
+FrameInput depth_input_of(const SimulatedFrame& frame) {
   FrameInput input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images[0].view();
@@ -42,7 +42,7 @@ FrameInput input_of(const SimulatedFrame& frame) {
   return input;
 }
 
-Settings small_settings() {
+Settings localizer_settings() {
   Settings settings;
   settings.features.count = 500;
   settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
@@ -53,12 +53,12 @@ Settings small_settings() {
 struct Scene {
   Scene() : query(spec_of(pinhole(260.0, 400, 260))) {
     SimulatedSequence sequence(spec_of(pinhole(210.0, 320, 240)));
-    System system(sequence.rig(), small_settings(), Timing::kInline);
-    for (int i = 0; i < kNumFrames; ++i) system.feed(input_of(sequence.frame(i)));
+    System system(sequence.rig(), localizer_settings(), Timing::kInline);
+    for (int i = 0; i < kNumLocalizedFrames; ++i) system.feed(depth_input_of(sequence.frame(i)));
     system.finish();
     map = system.map();
     truth_of_map = sequence.world_from_rig(0);
-    for (int i = 0; i < kNumFrames; ++i) frames.push_back(query.frame(i));
+    for (int i = 0; i < kNumLocalizedFrames; ++i) frames.push_back(query.frame(i));
   }
 
   Rigid3 truth(std::size_t i) const { return truth_of_map.inverse() * frames[i].world_from_rig; }
@@ -89,12 +89,12 @@ void expect_pose(const TrackingResult& result, std::size_t i) {
 
 TEST(Localizer, FollowsAStreamOfAnotherCamera) {
   const std::size_t num_keyframes = scene().map->keyframes().size();
-  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   for (std::size_t i = 0; i < scene().frames.size(); ++i) {
-    expect_pose(localizer.track(input_of(scene().frames[i])), i);
+    expect_pose(localizer.track(depth_input_of(scene().frames[i])), i);
   }
   EXPECT_EQ(scene().map->keyframes().size(), num_keyframes);
-  EXPECT_THROW(localizer.track(input_of(scene().frames[0])), InputError);
+  EXPECT_THROW(localizer.track(depth_input_of(scene().frames[0])), InputError);
 }
 
 /// A mask that leaves the columns from first to end.
@@ -112,9 +112,9 @@ int num_covered(std::size_t frame) {
 
 TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
   const Image left = columns(0, 200);
-  System system(scene().query.rig(), small_settings(), Timing::kInline);
+  System system(scene().query.rig(), localizer_settings(), Timing::kInline);
   for (const SimulatedFrame& frame : scene().frames) {
-    FrameInput input = input_of(frame);
+    FrameInput input = depth_input_of(frame);
     input.mask = left.view();
     system.feed(input);
   }
@@ -122,9 +122,9 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
   const auto map = system.map();
   const Rigid3 map_from_world = scene().query.world_from_rig(0).inverse();
   for (const bool has_depth : {true, false}) {
-    Localizer localizer(scene().query.rig(), small_settings(), map);
+    Localizer localizer(scene().query.rig(), localizer_settings(), map);
     for (std::size_t i = 0; i < scene().frames.size(); ++i) {
-      FrameInput input = input_of(scene().frames[i]);
+      FrameInput input = depth_input_of(scene().frames[i]);
       if (!has_depth) input.depth = {};
       const Image mask = columns(num_covered(i), 400);
       input.mask = mask.view();
@@ -144,9 +144,9 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
 }
 
 TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
-  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   for (const std::size_t i : {20u, 3u, 11u}) {
-    FrameInput grey = input_of(scene().frames[i]);
+    FrameInput grey = depth_input_of(scene().frames[i]);
     grey.depth = {};
     const TrackingResult result = localizer.locate(grey);
     expect_pose(result, i);
@@ -160,9 +160,9 @@ TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
 }
 
 TEST(Localizer, SaysWhatFailed) {
-  Localizer localizer(scene().query.rig(), small_settings(), scene().map);
+  Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   const Image black(400, 260);
-  FrameInput input = input_of(scene().frames[5]);
+  FrameInput input = depth_input_of(scene().frames[5]);
   input.image0 = black.view();
   for (const TrackingResult& blind : {localizer.locate(input), localizer.track(input)}) {
     EXPECT_EQ(blind.state, FrameState::kLost);
@@ -189,15 +189,15 @@ TEST(Localizer, SaysWhatFailed) {
 }
 
 TEST(Localizer, HasNothingToFindInAnEmptyMap) {
-  Localizer localizer(scene().query.rig(), small_settings(), std::make_shared<const Map>());
-  const TrackingResult result = localizer.locate(input_of(scene().frames[0]));
+  Localizer localizer(scene().query.rig(), localizer_settings(), std::make_shared<const Map>());
+  const TrackingResult result = localizer.locate(depth_input_of(scene().frames[0]));
   EXPECT_EQ(result.reason, FrameReason::kNoCandidate);
-  EXPECT_EQ(localizer.track(input_of(scene().frames[0])).reason, FrameReason::kNoCandidate);
+  EXPECT_EQ(localizer.track(depth_input_of(scene().frames[0])).reason, FrameReason::kNoCandidate);
 }
 
 TEST(Localizer, TheCameraMayChangeWhileAMapIsExtended) {
-  System system(scene().query.rig(), small_settings(), Timing::kInline, scene().map);
-  for (const SimulatedFrame& frame : scene().frames) system.feed(input_of(frame));
+  System system(scene().query.rig(), localizer_settings(), Timing::kInline, scene().map);
+  for (const SimulatedFrame& frame : scene().frames) system.feed(depth_input_of(frame));
   system.finish();
   EXPECT_EQ(system.map()->broken_invariants(), "");
   EXPECT_EQ(system.statistics().num_submaps, 1);

@@ -12,7 +12,7 @@ namespace {
 
 /// As in guided matching: what was seen from elsewhere does not look alike from here (Mur-Artal et
 /// al. 2015, V.D).
-constexpr double kMinDirectionCos = 0.5;
+constexpr double kMinSameViewCos = 0.5;
 /// The image is judged in so many columns and rows; regions with fewer landmarks say nothing.
 constexpr int kRegions = 4;
 constexpr int kMinExpected = 4;
@@ -43,7 +43,7 @@ Expected facing_landmarks(const Keyframe& keyframe,
     const double range_m = to_camera.norm();
     const double size_rad = landmark.appearance.size_m / range_m;
     if (!(size_rad >= *finest && size_rad <= *coarsest)) continue;
-    if (to_camera.dot(landmark.appearance.direction) < kMinDirectionCos * range_m) continue;
+    if (to_camera.dot(landmark.appearance.direction) < kMinSameViewCos * range_m) continue;
     expected.ids.push_back(keyframe.landmarks[i]);
     expected.points_in_cam.push_back(cam_from_world * landmark.position_in_world);
   }

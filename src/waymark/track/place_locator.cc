@@ -21,7 +21,7 @@ constexpr std::size_t kMinAgreeing = 8;
 /// Fewer matches, or fewer that agree on a pose, are chance more often than not.
 constexpr std::size_t kMinMatches = 20;
 constexpr std::size_t kMinConsensus = 15;
-constexpr double kMinInlierRatio = 0.2;
+constexpr double kMinPlaceInlierRatio = 0.2;
 /// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
 constexpr double kFirstRadiusPx = 12.0;
 constexpr double kSecondRadiusPx = 5.0;
@@ -179,7 +179,7 @@ std::optional<Rigid3> PlaceLocator::find_consensus(const Features& features,
   ransac_options.stream = stream;
   // A sparser consensus would be refused, so that it need not be found.
   ransac_options.min_inlier_ratio =
-      std::max(kMinInlierRatio,
+      std::max(kMinPlaceInlierRatio,
                static_cast<double>(kMinConsensus) / static_cast<double>(observations_.size()));
   const std::optional<PoseEstimate> estimate =
       waymark::locate(*rig_, observations_, PoseOptions{}, ransac_options, workspace_);

@@ -9,7 +9,7 @@ namespace {
 constexpr std::size_t kMinObservations = 20;
 constexpr double kMinInlierRatio = 0.5;
 /// A start's poses are off by what little parallax it had.
-constexpr double kSearchRadiusPx = 20.0;
+constexpr double kRefineRadiusPx = 20.0;
 
 SeenLandmark seen_by(const Features& features, std::uint32_t feature, LandmarkId landmark) {
   SeenLandmark seen;
@@ -71,7 +71,7 @@ std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
     if (id.is_valid()) set.add(id, map.landmarks().at(id));
   }
   const ProjectionMatches& matches =
-      matcher_.match(set, features, {}, rig_from_world, {.radius_px = kSearchRadiusPx});
+      matcher_.match(set, features, {}, rig_from_world, {.radius_px = kRefineRadiusPx});
   std::vector<SeenLandmark> seen;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;

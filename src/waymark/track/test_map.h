@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
+#include <cstdint>
 #include <map>
 #include <memory>
 #include <utility>
@@ -98,6 +100,11 @@ inline PointCloud cloud_ahead(int count = 1500) {
 
 inline Rigid3 pose_at(double x, double y = 0.0, double z = 0.0, double yaw_rad = 0.0) {
   return make_test_pose({x, y, z}, {0.0, yaw_rad, 0.0});
+}
+
+/// Half a metre apart; not on a line, along which an alignment could turn.
+inline Rigid3 row_pose(std::uint32_t keyframe) {
+  return pose_at(0.5 * keyframe, 0.2 * std::sin(2.0 * keyframe), 0.2 * std::cos(1.5 * keyframe));
 }
 
 }  // namespace waymark

@@ -41,7 +41,7 @@ ViewUpdate frame_update(std::uint32_t frame) {
   return update;
 }
 
-class Hub : public testing::Test {
+class Hub : public ::testing::Test {
  protected:
   void push(ViewUpdate update) { ASSERT_TRUE(channel_.updates.try_push(update)); }
   void tick() { hub_.tick(now_ += std::chrono::milliseconds(100)); }
