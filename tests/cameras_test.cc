@@ -15,6 +15,7 @@ namespace {
 
 constexpr int kNumCameraFrames = 60;
 constexpr int kCameraHeightPx = 300;
+constexpr double kDepthFactor = 5000.0;
 
 struct CameraCase {
   const char* camera;

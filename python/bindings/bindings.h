@@ -4,7 +4,12 @@
 
 #include <pybind11/pybind11.h>
 
+#include <functional>
 #include <memory>
+#include <stdexcept>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include "waymark/mapfile/map_file.h"
 
@@ -16,6 +21,53 @@ namespace py = pybind11;
 struct PythonMap {
   StoredMap stored;
   const Map& map() const { return *stored.map; }
+};
+
+/// Features of a frame beside the landmarks they show, and what keeps both in memory.
+struct PythonFeatures {
+  std::shared_ptr<const Features> features;
+  std::shared_ptr<const void> owner;  ///< Of the landmarks.
+  const std::vector<LandmarkId>* landmarks = nullptr;
+};
+
+/// The turn of one thread at an object that lets other Python threads run while it works: a second
+/// thread gets a RuntimeError rather than a race. Made and destroyed with the GIL held, which is
+/// what guards the flag.
+class Turn {
+ public:
+  Turn(bool& is_taken, const char* object) : is_taken_(is_taken) {
+    if (is_taken_) {
+      throw std::runtime_error(std::string(object) +
+                               ": is in use by another thread, expected one thread at a time");
+    }
+    is_taken_ = true;
+  }
+  ~Turn() { is_taken_ = false; }
+  Turn(const Turn&) = delete;
+  Turn& operator=(const Turn&) = delete;
+
+ private:
+  bool& is_taken_;
+};
+
+/// A class of Python whose properties are listed as name, docstring and getter.
+template <class T, class... Options>
+class Class : public py::class_<T, Options...> {
+ public:
+  using py::class_<T, Options...>::class_;
+
+  template <class... Arguments>
+  Class& def(Arguments&&... arguments) {
+    py::class_<T, Options...>::def(std::forward<Arguments>(arguments)...);
+    return *this;
+  }
+  /// A read-only property; getter: of what a const T& has, or one of its members.
+  template <class Getter>
+  Class& get(const char* name, const char* about, Getter getter) {
+    this->def_property_readonly(
+        name, [getter](const T& self) { return std::invoke(getter, self); }, about);
+    return *this;
+  }
 };
 
 // Each adds the classes and functions of the file of its name.

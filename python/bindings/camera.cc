@@ -52,39 +52,32 @@ py::tuple unproject(const RigCamera& self, const py::object& pixel_array) {
 }
 
 void bind_one_camera(py::module_& module) {
-  py::class_<RigCamera>(module, "Camera", R"(A camera of a rig.
+  Class<RigCamera>(module, "Camera", R"(A camera of a rig.
 
 Its frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel.)")
-      .def_property_readonly(
-          "model",
-          [](const RigCamera& self) { return std::string(self.camera->model()); },
-          "str: for example 'pinhole'.")
-      .def_property_readonly(
-          "width_px", [](const RigCamera& self) { return self.camera->width_px(); }, "int.")
-      .def_property_readonly(
-          "height_px", [](const RigCamera& self) { return self.camera->height_px(); }, "int.")
-      .def_property_readonly(
-          "cam_from_rig",
-          [](const RigCamera& self) { return array_of(self.cam_from_rig); },
-          "float64 array (4, 4): the camera from camera 0, in metres.")
-      .def_property_readonly(
-          "intrinsics",
-          [](const RigCamera& self) {
-            return self.description ? self.description->intrinsics : std::vector<double>();
-          },
-          "list of float: as in a camchain.")
-      .def_property_readonly(
-          "distortion_model",
-          [](const RigCamera& self) {
-            return self.description ? self.description->distortion_model : std::string("none");
-          },
-          "str: as in a camchain.")
-      .def_property_readonly(
-          "distortion_coeffs",
-          [](const RigCamera& self) {
-            return self.description ? self.description->distortion_coeffs : std::vector<double>();
-          },
-          "list of float: as in a camchain.")
+      .get("model",
+           "str: for example 'pinhole'.",
+           [](auto& self) { return std::string(self.camera->model()); })
+      .get("width_px", "int.", [](auto& self) { return self.camera->width_px(); })
+      .get("height_px", "int.", [](auto& self) { return self.camera->height_px(); })
+      .get("cam_from_rig",
+           "float64 array (4, 4): the camera from camera 0, in metres.",
+           [](auto& self) { return array_of(self.cam_from_rig); })
+      .get("intrinsics",
+           "list of float: as in a camchain.",
+           [](auto& self) {
+             return self.description ? self.description->intrinsics : std::vector<double>();
+           })
+      .get("distortion_model",
+           "str: as in a camchain.",
+           [](auto& self) {
+             return self.description ? self.description->distortion_model : std::string("none");
+           })
+      .get("distortion_coeffs",
+           "list of float: as in a camchain.",
+           [](auto& self) {
+             return self.description ? self.description->distortion_coeffs : std::vector<double>();
+           })
       .def("project", &project, py::arg("points_in_cam"), R"(project(self, points_in_cam)
 --
 
@@ -106,8 +99,7 @@ False where a pixel has none.)")
 
 void bind_camera(py::module_& module) {
   bind_one_camera(module);
-  py::class_<CameraChain>(
-      module, "Calibration", "The cameras of a rig, as a camchain describes them.")
+  Class<CameraChain>(module, "Calibration", "The cameras of a rig, as a camchain describes them.")
       .def(py::init([](const py::object& cameras) { return read_cameras(cameras); }),
            py::arg("cameras"),
            R"(__init__(self, cameras)
@@ -115,14 +107,13 @@ void bind_camera(py::module_& module) {
 
 cameras: path of a camchain, a dict of the same content, or a list of these (later ones override).
 InputError for what is malformed.)")
-      .def_property_readonly(
-          "cameras",
-          [](const CameraChain& self) { return make_rig(self).cameras; },
-          "list of Camera: camera 0 is the rig's origin.")
-      .def_readonly("depth_factor",
-                    &CameraChain::depth_factor,
-                    "float or None: units of the depth image per metre.")
-      .def_readonly("notes", &CameraChain::notes, "list of str: what was ignored, with its place.");
+      .get("cameras",
+           "list of Camera: camera 0 is the rig's origin.",
+           [](auto& self) { return make_rig(self).cameras; })
+      .get("depth_factor",
+           "float or None: units of the depth image per metre.",
+           &CameraChain::depth_factor)
+      .get("notes", "list of str: what was ignored, with its place.", &CameraChain::notes);
 }
 
 }  // namespace waymark::python

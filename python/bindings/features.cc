@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "features.h"
-
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -67,67 +65,53 @@ py::array landmark_ids(const PythonFeatures& self) {
 }
 
 void bind_frame_details(py::module_& module) {
-  py::class_<FrameDetails>(
-      module, "FrameDetails", "More of the newest frame, for those who show it.")
-      .def_property_readonly(
-          "frame",
-          [](const FrameDetails& self) { return optional_id(self.frame); },
-          "int or None: as keyframes of the map have it, which goes on from those of a map made "
-          "before.")
-      .def_property_readonly(
-          "features",
-          [](const FrameDetails& self) -> std::optional<PythonFeatures> {
-            if (!self.features) return std::nullopt;
-            const auto ids = std::make_shared<const std::vector<LandmarkId>>(self.landmarks);
-            return PythonFeatures{self.features, ids, ids.get()};
-          },
-          "Features or None: with the landmarks they show.");
+  Class<FrameDetails>(module, "FrameDetails", "More of the newest frame, for those who show it.")
+      .get("frame",
+           "int or None: as keyframes of the map have it, which goes on from those of a map made "
+           "before.",
+           [](auto& self) { return optional_id(self.frame); })
+      .get("features",
+           "Features or None: with the landmarks they show.",
+           [](auto& self) -> std::optional<PythonFeatures> {
+             if (!self.features) return std::nullopt;
+             const auto ids = std::make_shared<const std::vector<LandmarkId>>(self.landmarks);
+             return PythonFeatures{self.features, ids, ids.get()};
+           });
 }
 
 }  // namespace
 
 void bind_features(py::module_& module) {
-  py::class_<PythonFeatures>(module, "Features", R"(The features of a frame, as read-only arrays.
+  Class<PythonFeatures>(module, "Features", R"(The features of a frame, as read-only arrays.
 
 All arrays look at the engine's own memory, without a copy, and keep it alive. They run in parallel:
 first the num_primary features of camera 0, which have descriptors, then those that stereo search
 found in camera 1, which have none and belong to one of camera 0. len() gives their number N.)")
       .def("__len__", [](const PythonFeatures& self) { return self.features->size(); })
-      .def_property_readonly(
-          "num_primary",
-          [](const PythonFeatures& self) { return self.features->num_primary; },
-          "int: of camera 0.")
-      .def_property_readonly(
-          "pixels",
-          &pixels,
-          "float32 array (N, 2): x, y in the full image; (0, 0) is the centre of "
-          "the top-left pixel.")
-      .def_property_readonly("angles",
-                             keypoint_column(&Keypoint::angle_rad),
-                             "float32 array (N,): orientation in radians, clockwise.")
-      .def_property_readonly(
-          "responses", keypoint_column(&Keypoint::response), "float32 array (N,): corner score.")
-      .def_property_readonly(
-          "levels", keypoint_column(&Keypoint::level), "uint8 array (N,): pyramid level.")
-      .def_property_readonly(
-          "cameras", keypoint_column(&Keypoint::camera), "uint8 array (N,): index in the rig.")
-      .def_property_readonly(
-          "descriptors", &descriptors, "uint8 array (num_primary, 32): 256 bits of rotated BRIEF.")
-      .def_property_readonly(
-          "bearings", &bearings, "float32 array (N, 3): unit vectors in the feature's camera.")
-      .def_property_readonly(
-          "partners",
-          feature_column(&Features::partner),
-          "uint32 array (N,): the feature of the other camera that belongs to it, or NO_ID.")
-      .def_property_readonly(
-          "ranges",
-          feature_column(&Features::range_m),
-          "float32 array (num_primary,): distance along the bearing in metres, 0 "
-          "where unknown.")
-      .def_property_readonly("landmarks",
-                             &landmark_ids,
-                             "uint32 array (N,): id of the landmark that it shows, or NO_ID; of a "
-                             "frame's details empty where it recognised none.");
+      .get(
+          "num_primary", "int: of camera 0.", [](auto& self) { return self.features->num_primary; })
+      .get("pixels",
+           "float32 array (N, 2): x, y in the full image; (0, 0) is the centre of the top-left "
+           "pixel.",
+           &pixels)
+      .get("angles",
+           "float32 array (N,): orientation in radians, clockwise.",
+           keypoint_column(&Keypoint::angle_rad))
+      .get("responses", "float32 array (N,): corner score.", keypoint_column(&Keypoint::response))
+      .get("levels", "uint8 array (N,): pyramid level.", keypoint_column(&Keypoint::level))
+      .get("cameras", "uint8 array (N,): index in the rig.", keypoint_column(&Keypoint::camera))
+      .get("descriptors", "uint8 array (num_primary, 32): 256 bits of rotated BRIEF.", &descriptors)
+      .get("bearings", "float32 array (N, 3): unit vectors in the feature's camera.", &bearings)
+      .get("partners",
+           "uint32 array (N,): the feature of the other camera that belongs to it, or NO_ID.",
+           feature_column(&Features::partner))
+      .get("ranges",
+           "float32 array (num_primary,): distance along the bearing in metres, 0 where unknown.",
+           feature_column(&Features::range_m))
+      .get("landmarks",
+           "uint32 array (N,): id of the landmark that it shows, or NO_ID; of a frame's details "
+           "empty where it recognised none.",
+           &landmark_ids);
   bind_frame_details(module);
 }
 

@@ -13,7 +13,6 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "session_config.h"
-#include "turn.h"
 #include "waymark/base/check.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/input.h"
@@ -90,42 +89,35 @@ std::unique_ptr<PythonInput> open(const py::object& path,
 }
 
 void bind_frame(py::module_& module) {
-  py::class_<PythonFrame>(
-      module, "InputFrame", "The images of one moment, as System.feed() takes them.")
-      .def_readonly("index", &PythonFrame::index, "int: in the input, from 0 on.")
-      .def_readonly("timestamp_ns", &PythonFrame::timestamp_ns, "int: nanoseconds.")
-      .def_readonly(
-          "image0",
-          &PythonFrame::image0,
-          "uint8 array (H, W) or None: None where an image cannot be read or has the wrong "
-          "size; such frames are not fed.")
-      .def_readonly("image1", &PythonFrame::image1, "uint8 array (H, W) or None: of camera 1.")
-      .def_readonly(
-          "depth", &PythonFrame::depth, "uint16 array (H, W) or None: in units of the sensor.")
-      .def_readonly("mask", &PythonFrame::mask, "uint8 array (H, W) or None.");
+  Class<PythonFrame>(module, "InputFrame", "The images of one moment, as System.feed() takes them.")
+      .get("index", "int: in the input, from 0 on.", &PythonFrame::index)
+      .get("timestamp_ns", "int: nanoseconds.", &PythonFrame::timestamp_ns)
+      .get("image0",
+           "uint8 array (H, W) or None: None where an image cannot be read or has the wrong size; "
+           "such frames are not fed.",
+           &PythonFrame::image0)
+      .get("image1", "uint8 array (H, W) or None: of camera 1.", &PythonFrame::image1)
+      .get("depth", "uint16 array (H, W) or None: in units of the sensor.", &PythonFrame::depth)
+      .get("mask", "uint8 array (H, W) or None.", &PythonFrame::mask);
 }
 
 void bind_input(py::module_& module) {
-  py::class_<PythonInput>(
+  Class<PythonInput>(
       module, "Input", R"(A recorded sequence, read frame by frame: iterate over it.)")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__", &PythonInput::next)
-      .def_property_readonly(
-          "format",
-          [](const PythonInput& self) { return self.info().format; },
-          "str: 'euroc', 'kitti', 'tum', 'images' or 'video'.")
-      .def_property_readonly(
-          "setup",
-          [](const PythonInput& self) { return to_string(self.info().setup); },
-          "str: 'mono', 'stereo' or 'rgbd'.")
-      .def_property_readonly(
-          "num_frames",
-          [](const PythonInput& self) { return self.info().num_frames; },
-          "int or None: in all; None when a video does not say.")
-      .def_property_readonly(
-          "calibration",
-          [](const PythonInput& self) { return self.info().calibration; },
-          "Calibration or None: that given, else that of the data set, else None.");
+      .get("format",
+           "str: 'euroc', 'kitti', 'tum', 'images' or 'video'.",
+           [](auto& self) { return self.info().format; })
+      .get("setup",
+           "str: 'mono', 'stereo' or 'rgbd'.",
+           [](auto& self) { return to_string(self.info().setup); })
+      .get("num_frames",
+           "int or None: in all; None when a video does not say.",
+           [](auto& self) { return self.info().num_frames; })
+      .get("calibration",
+           "Calibration or None: that given, else that of the data set, else None.",
+           [](auto& self) { return self.info().calibration; });
 }
 
 }  // namespace

@@ -11,7 +11,6 @@
 #include "bindings.h"
 #include "frame_arguments.h"
 #include "session_config.h"
-#include "turn.h"
 
 namespace waymark::python {
 namespace {
@@ -29,7 +28,7 @@ class PythonLocalizer {
   TrackingResult track(const py::object& timestamp_ns, const ImageArguments& images) {
     const Turn turn(is_taken_, "Localizer");
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
-    const FrameInput input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+    const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
     const py::gil_scoped_release release;
     return localizer_.track(input);
   }
@@ -63,7 +62,7 @@ std::optional<PoseHint> hint_argument(const PythonMap& map,
   return hint;
 }
 
-using LocalizerClass = py::class_<PythonLocalizer>;
+using LocalizerClass = Class<PythonLocalizer>;
 
 void bind_locate(LocalizerClass& localizer) {
   localizer.def(
@@ -147,7 +146,7 @@ map's frame. One thread at a time; a second one gets a RuntimeError.)");
 map: a Map. The rest as for System. Ranges of stereo and depth count only in maps in metres.)");
   bind_locate(localizer);
   bind_track(localizer);
-  localizer.def_property_readonly("map", &PythonLocalizer::map, "Map: the one given.");
+  localizer.get("map", "Map: the one given.", &PythonLocalizer::map);
 }
 
 }  // namespace waymark::python

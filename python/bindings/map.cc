@@ -10,7 +10,6 @@
 
 #include "arrays.h"
 #include "bindings.h"
-#include "features.h"
 #include "frame_arguments.h"
 #include "session_config.h"
 #include "waymark/input/decode.h"
@@ -121,39 +120,31 @@ std::string describe_map(const PythonMap& self) {
 }
 
 void bind_keyframe(py::module_& module) {
-  py::class_<PythonKeyframe>(module, "Keyframe", "A frame that stays in the map.")
-      .def_property_readonly(
-          "id", [](const PythonKeyframe& self) { return self.id.value; }, "int: never reused.")
-      .def_property_readonly(
-          "frame",
-          [](const PythonKeyframe& self) { return self.get().frame.value; },
-          "int: unique in a map; a session that extends one counts on.")
-      .def_property_readonly(
-          "timestamp_ns",
-          [](const PythonKeyframe& self) { return self.get().timestamp_ns; },
-          "int: nanoseconds, as fed.")
-      .def_property_readonly(
-          "world_from_rig",
-          [](const PythonKeyframe& self) { return array_of(self.get().rig_from_world.inverse()); },
-          "float64 array (4, 4).")
-      .def_property_readonly(
-          "submap",
-          [](const PythonKeyframe& self) { return self.get().submap.value; },
-          "int: whose frame the pose is in.")
-      .def_property_readonly(
-          "parent",
-          [](const PythonKeyframe& self) { return optional_id(self.get().parent); },
-          "int or None: in the spanning tree; None for the root of a sub-map.")
-      .def_property_readonly(
-          "features",
-          [](const PythonKeyframe& self) {
-            return PythonFeatures{self.get().features, self.map, &self.get().landmarks};
-          },
-          "Features: with the landmarks they show.")
-      .def_property_readonly(
-          "cameras",
-          [](const PythonKeyframe& self) { return self.get().rig->cameras; },
-          "list of Camera: those that took it.")
+  Class<PythonKeyframe>(module, "Keyframe", "A frame that stays in the map.")
+      .get("id", "int: never reused.", [](auto& self) { return self.id.value; })
+      .get("frame",
+           "int: unique in a map; a session that extends one counts on.",
+           [](auto& self) { return self.get().frame.value; })
+      .get("timestamp_ns",
+           "int: nanoseconds, as fed.",
+           [](auto& self) { return self.get().timestamp_ns; })
+      .get("world_from_rig",
+           "float64 array (4, 4).",
+           [](auto& self) { return array_of(self.get().rig_from_world.inverse()); })
+      .get("submap",
+           "int: whose frame the pose is in.",
+           [](auto& self) { return self.get().submap.value; })
+      .get("parent",
+           "int or None: in the spanning tree; None for the root of a sub-map.",
+           [](auto& self) { return optional_id(self.get().parent); })
+      .get("features",
+           "Features: with the landmarks they show.",
+           [](auto& self) {
+             return PythonFeatures{self.get().features, self.map, &self.get().landmarks};
+           })
+      .get("cameras",
+           "list of Camera: those that took it.",
+           [](auto& self) { return self.get().rig->cameras; })
       .def("__repr__", [](const PythonKeyframe& self) {
         return "<Keyframe " + std::to_string(self.id.value) + " of " +
                std::to_string(self.get().features->size()) + " features>";
@@ -161,33 +152,27 @@ void bind_keyframe(py::module_& module) {
 }
 
 void bind_landmark(py::module_& module) {
-  py::class_<PythonLandmark>(module, "Landmark", "A point of the map.")
-      .def_property_readonly(
-          "id", [](const PythonLandmark& self) { return self.id.value; }, "int: never reused.")
-      .def_property_readonly(
-          "submap",
-          [](const PythonLandmark& self) { return self.get().submap.value; },
-          "int: whose frame the position is in.")
-      .def_property_readonly(
-          "position_in_world",
-          [](const PythonLandmark& self) {
-            const Eigen::Vector3d& position = self.get().position_in_world;
-            return array_of(std::vector<double>(position.begin(), position.end()));
-          },
-          "float64 array (3,): metres (map units for one camera).")
-      .def_property_readonly(
-          "observations",
-          &observations,
-          "uint32 array (N, 2): id of a keyframe and index of the feature in it, "
-          "ascending; a view without a copy.")
-      .def_property_readonly(
-          "num_visible",
-          [](const PythonLandmark& self) { return self.get().num_visible; },
-          "int: frames in which it should have been seen.")
-      .def_property_readonly(
-          "num_found",
-          [](const PythonLandmark& self) { return self.get().num_found; },
-          "int: frames in which it was.")
+  Class<PythonLandmark>(module, "Landmark", "A point of the map.")
+      .get("id", "int: never reused.", [](auto& self) { return self.id.value; })
+      .get("submap",
+           "int: whose frame the position is in.",
+           [](auto& self) { return self.get().submap.value; })
+      .get("position_in_world",
+           "float64 array (3,): metres (map units for one camera).",
+           [](auto& self) {
+             const Eigen::Vector3d& position = self.get().position_in_world;
+             return array_of(std::vector<double>(position.begin(), position.end()));
+           })
+      .get("observations",
+           "uint32 array (N, 2): id of a keyframe and index of the feature in it, ascending; a "
+           "view without a copy.",
+           &observations)
+      .get("num_visible",
+           "int: frames in which it should have been seen.",
+           [](auto& self) { return self.get().num_visible; })
+      .get("num_found",
+           "int: frames in which it was.",
+           [](auto& self) { return self.get().num_found; })
       .def("__repr__", [](const PythonLandmark& self) {
         return "<Landmark " + std::to_string(self.id.value) + " of " +
                std::to_string(self.get().observations.size()) + " observations>";
@@ -195,64 +180,48 @@ void bind_landmark(py::module_& module) {
 }
 
 void bind_parts(py::module_& module) {
-  py::class_<PythonSubmap>(module, "Submap", "A connected part of a map with its own frame.")
-      .def_readonly("id", &PythonSubmap::id, "int.")
-      .def_property_readonly(
-          "is_metric",
-          [](const PythonSubmap& self) { return self.submap.is_metric; },
-          "bool: False where the scale is free.")
-      .def_property_readonly(
-          "root",
-          [](const PythonSubmap& self) { return optional_id(self.submap.root); },
-          "int or None: its first keyframe; None once joined.")
-      .def_property_readonly(
-          "joined_into",
-          [](const PythonSubmap& self) { return optional_id(self.submap.joined_into); },
-          "int or None: the sub-map that it is a part of now.");
-  py::class_<LoopEdge>(module, "LoopEdge", "Two keyframes that were found to show the same place.")
-      .def_property_readonly(
-          "from_keyframe", [](const LoopEdge& self) { return self.from.value; }, "int.")
-      .def_property_readonly(
-          "to_keyframe", [](const LoopEdge& self) { return self.to.value; }, "int.")
-      .def_property_readonly(
-          "to_from_from",
-          [](const LoopEdge& self) {
-            return array_of(Rigid3(self.to_from_from.rotation, self.to_from_from.translation));
-          },
-          "float64 array (4, 4): rotation and translation between the rigs, as measured.")
-      .def_property_readonly(
-          "scale",
-          [](const LoopEdge& self) { return self.to_from_from.scale; },
-          "float: lengths around to_keyframe by those around from_keyframe; 1 in metres.");
+  Class<PythonSubmap>(module, "Submap", "A connected part of a map with its own frame.")
+      .get("id", "int.", &PythonSubmap::id)
+      .get("is_metric",
+           "bool: False where the scale is free.",
+           [](auto& self) { return self.submap.is_metric; })
+      .get("root",
+           "int or None: its first keyframe; None once joined.",
+           [](auto& self) { return optional_id(self.submap.root); })
+      .get("joined_into", "int or None: the sub-map that it is a part of now.", [](auto& self) {
+        return optional_id(self.submap.joined_into);
+      });
+  Class<LoopEdge>(module, "LoopEdge", "Two keyframes that were found to show the same place.")
+      .get("from_keyframe", "int.", [](auto& self) { return self.from.value; })
+      .get("to_keyframe", "int.", [](auto& self) { return self.to.value; })
+      .get("to_from_from",
+           "float64 array (4, 4): rotation and translation between the rigs, as measured.",
+           [](auto& self) {
+             return array_of(Rigid3(self.to_from_from.rotation, self.to_from_from.translation));
+           })
+      .get("scale",
+           "float: lengths around to_keyframe by those around from_keyframe; 1 in metres.",
+           [](auto& self) { return self.to_from_from.scale; });
 }
 
-using MapClass = py::class_<PythonMap, std::shared_ptr<PythonMap>>;
+using MapClass = Class<PythonMap, std::shared_ptr<PythonMap>>;
 
 void bind_whole(MapClass& map) {
   map.def_static("load", &load, py::arg("path"), R"(load(path)
 --
 
-Reads a map file (.wmap) of any version. InputError for one that is missing or damaged.)")
-      .def("save", &save, py::arg("path"), R"(save(self, path)
+Reads a map file (.wmap) of any version. InputError for one that is missing or damaged.)");
+  map.def("save", &save, py::arg("path"), R"(save(self, path)
 --
 
 Writes a map file, whole or not at all. OutputError when that fails.)")
-      .def_property_readonly(
-          "is_metric",
-          [](const PythonMap& self) { return is_metric(self.map()); },
-          "bool: whether all sub-maps have a scale in metres.")
-      .def_property_readonly(
-          "num_keyframes",
-          [](const PythonMap& self) { return self.map().keyframes().size(); },
-          "int.")
-      .def_property_readonly(
-          "num_landmarks",
-          [](const PythonMap& self) { return self.map().landmarks().size(); },
-          "int.")
-      .def_property_readonly(
-          "settings",
-          [](const PythonMap& self) { return self.stored.settings; },
-          "str: those used, as YAML.");
+      .get("is_metric",
+           "bool: whether all sub-maps have a scale in metres.",
+           [](auto& self) { return is_metric(self.map()); })
+      .get("num_keyframes", "int.", [](auto& self) { return self.map().keyframes().size(); })
+      .get("num_landmarks", "int.", [](auto& self) { return self.map().landmarks().size(); })
+      .get(
+          "settings", "str: those used, as YAML.", [](auto& self) { return self.stored.settings; });
 }
 
 void bind_access(MapClass& map) {

@@ -14,6 +14,7 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "waymark/exchange/export_scene.h"
+#include "waymark/map/parts.h"
 
 namespace waymark::python {
 namespace {
@@ -111,44 +112,40 @@ std::optional<py::array> landmark_colors(const PythonMap& self) {
 }
 
 void bind_keyframes(py::module_& module) {
-  py::class_<KeyframeTable>(
+  Class<KeyframeTable>(
       module, "Keyframes", "All keyframes of a map, by id, as arrays of the same length K.")
       .def("__len__", [](const KeyframeTable& self) { return self.ids.size(); })
-      .def_readonly("ids", &KeyframeTable::ids, "uint32 array (K,): ascending.")
-      .def_readonly("frames", &KeyframeTable::frames, "uint32 array (K,): Keyframe.frame.")
-      .def_readonly(
-          "timestamps_ns", &KeyframeTable::timestamps_ns, "int64 array (K,): nanoseconds, as fed.")
-      .def_readonly("world_from_rig", &KeyframeTable::world_from_rig, "float64 array (K, 4, 4).")
-      .def_readonly(
-          "submaps", &KeyframeTable::submaps, "uint32 array (K,): whose frame the pose is in.")
-      .def_readonly("parents",
-                    &KeyframeTable::parents,
-                    "uint32 array (K,): in the spanning tree; NO_ID for the root of a sub-map.");
+      .get("ids", "uint32 array (K,): ascending.", &KeyframeTable::ids)
+      .get("frames", "uint32 array (K,): Keyframe.frame.", &KeyframeTable::frames)
+      .get("timestamps_ns", "int64 array (K,): nanoseconds, as fed.", &KeyframeTable::timestamps_ns)
+      .get("world_from_rig", "float64 array (K, 4, 4).", &KeyframeTable::world_from_rig)
+      .get("submaps", "uint32 array (K,): whose frame the pose is in.", &KeyframeTable::submaps)
+      .get("parents",
+           "uint32 array (K,): in the spanning tree; NO_ID for the root of a sub-map.",
+           &KeyframeTable::parents);
 }
 
 void bind_landmarks(py::module_& module) {
-  py::class_<LandmarkTable>(
+  Class<LandmarkTable>(
       module, "Landmarks", "All landmarks of a map, by id, as arrays of the same length M.")
       .def("__len__", [](const LandmarkTable& self) { return self.ids.size(); })
-      .def_readonly("ids", &LandmarkTable::ids, "uint32 array (M,): ascending.")
-      .def_readonly("positions_in_world",
-                    &LandmarkTable::positions_in_world,
-                    "float64 array (M, 3): metres (map units for one camera).")
-      .def_readonly(
-          "submaps", &LandmarkTable::submaps, "uint32 array (M,): whose frame the position is in.")
-      .def_readonly("num_observers",
-                    &LandmarkTable::num_observers,
-                    "uint32 array (M,): keyframes that see it.")
-      .def_readonly("num_visible",
-                    &LandmarkTable::num_visible,
-                    "uint32 array (M,): frames in which it should have been seen.")
-      .def_readonly(
-          "num_found", &LandmarkTable::num_found, "uint32 array (M,): frames in which it was.");
+      .get("ids", "uint32 array (M,): ascending.", &LandmarkTable::ids)
+      .get("positions_in_world",
+           "float64 array (M, 3): metres (map units for one camera).",
+           &LandmarkTable::positions_in_world)
+      .get("submaps", "uint32 array (M,): whose frame the position is in.", &LandmarkTable::submaps)
+      .get("num_observers",
+           "uint32 array (M,): keyframes that see it.",
+           &LandmarkTable::num_observers)
+      .get("num_visible",
+           "uint32 array (M,): frames in which it should have been seen.",
+           &LandmarkTable::num_visible)
+      .get("num_found", "uint32 array (M,): frames in which it was.", &LandmarkTable::num_found);
 }
 
 }  // namespace
 
-void bind_map_tables(py::class_<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module) {
+void bind_map_tables(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module) {
   bind_keyframes(module);
   bind_landmarks(module);
   map.def("keyframes", &keyframes, "keyframes(self)\n--\n\nAll keyframes: Keyframes (copies).")

@@ -38,52 +38,40 @@ std::string describe_result(const TrackingResult& result) {
 }
 
 void bind_tracking_result(py::module_& module) {
-  py::class_<TrackingResult>(
+  Class<TrackingResult>(
       module, "TrackingResult", R"(What is known of a frame right after it was fed.
 
 A result without a pose says how far the search got: how many places were compared
 (num_candidates), and of the one that came closest the matches, the inliers and why it was
 refused (reason).)")
-      .def_property_readonly(
-          "frame",
-          [](const TrackingResult& self) { return self.frame.value; },
-          "int: of this session, from 0 on.")
-      .def_property_readonly(
-          "state",
-          [](const TrackingResult& self) { return to_string(self.state); },
-          "str: 'initializing', 'tracked', 'filled' or 'lost'.")
-      .def_property_readonly(
-          "reason",
-          [](const TrackingResult& self) { return to_string(self.reason); },
-          "str: why there is no pose, for example 'too_few_matches'; 'none' where there is one.")
-      .def_property_readonly(
-          "world_from_rig",
-          &pose_or_none,
-          "float64 array (4, 4) or None: where the rig (camera 0) is in the world "
-          "and how it stands, in metres (map units for one camera).")
-      .def_property_readonly(
-          "covariance",
-          [](const TrackingResult& self) { return array_of(self.covariance); },
-          "float64 array (6, 6): of the pose, for perturbations exp(xi) * rig_from_world, xi = "
-          "(rho, "
-          "phi) in (m, rad); zeros where there is no pose.")
-      .def_readonly("num_matches", &TrackingResult::num_matches, "int: landmarks recognised.")
-      .def_readonly(
-          "num_inliers", &TrackingResult::num_inliers, "int: of these, that agree on the pose.")
-      .def_readonly("num_candidates",
-                    &TrackingResult::num_candidates,
-                    "int: places in the map compared when all else had failed.")
-      .def_readonly("is_keyframe", &TrackingResult::is_keyframe, "bool: goes into the map.")
-      .def_property_readonly(
-          "submap",
-          [](const TrackingResult& self) { return optional_id(self.submap); },
-          "int or None: the sub-map whose frame the pose is in.")
-      .def_property_readonly(
-          "stages_ms", &stages_ms, "dict of str to float: milliseconds by stage, in order.")
-      .def_property_readonly(
-          "tracking_ms",
-          [](const TrackingResult& self) { return self.stages.tracking_ms(); },
-          "float: from image to pose, without waiting for the mapper.")
+      .get("frame", "int: of this session, from 0 on.", [](auto& self) { return self.frame.value; })
+      .get("state",
+           "str: 'initializing', 'tracked', 'filled' or 'lost'.",
+           [](auto& self) { return to_string(self.state); })
+      .get("reason",
+           "str: why there is no pose, for example 'too_few_matches'; 'none' where there is one.",
+           [](auto& self) { return to_string(self.reason); })
+      .get("world_from_rig",
+           "float64 array (4, 4) or None: where the rig (camera 0) is in the world and how it "
+           "stands, in metres (map units for one camera).",
+           &pose_or_none)
+      .get("covariance",
+           "float64 array (6, 6): of the pose, for perturbations exp(xi) * rig_from_world, xi = "
+           "(rho, phi) in (m, rad); zeros where there is no pose.",
+           [](auto& self) { return array_of(self.covariance); })
+      .get("num_matches", "int: landmarks recognised.", &TrackingResult::num_matches)
+      .get("num_inliers", "int: of these, that agree on the pose.", &TrackingResult::num_inliers)
+      .get("num_candidates",
+           "int: places in the map compared when all else had failed.",
+           &TrackingResult::num_candidates)
+      .get("is_keyframe", "bool: goes into the map.", &TrackingResult::is_keyframe)
+      .get("submap",
+           "int or None: the sub-map whose frame the pose is in.",
+           [](auto& self) { return optional_id(self.submap); })
+      .get("stages_ms", "dict of str to float: milliseconds by stage, in order.", &stages_ms)
+      .get("tracking_ms",
+           "float: from image to pose, without waiting for the mapper.",
+           [](auto& self) { return self.stages.tracking_ms(); })
       .def("__repr__", &describe_result);
 }
 
@@ -126,26 +114,21 @@ void write(const Trajectory& trajectory, const py::object& path, const std::stri
 }
 
 void bind_trajectory(py::module_& module) {
-  py::class_<Trajectory>(
+  Class<Trajectory>(
       module,
       "Trajectory",
       "The frames that have a pose, in order, as arrays of the same length N. len() gives N.")
-      .def_property_readonly(
-          "frames",
-          column_of([](const TrajectoryFrame& frame) { return frame.frame.value; }),
-          "uint32 array (N,): TrackingResult.frame.")
-      .def_property_readonly(
-          "timestamps_ns",
-          column_of([](const TrajectoryFrame& frame) { return frame.timestamp_ns; }),
-          "int64 array (N,): as fed.")
-      .def_property_readonly(
-          "world_from_rig", &matrices_of, "float64 array (N, 4, 4): metres (map units for mono).")
-      .def_property_readonly(
-          "submaps",
-          column_of([](const TrajectoryFrame& frame) { return frame.submap.value; }),
-          "uint32 array (N,): the sub-map whose frame the pose is in.")
-      .def_property_readonly(
-          "is_filled", &is_filled, "bool array (N,): True for poses found after the fact.")
+      .get("frames",
+           "uint32 array (N,): TrackingResult.frame.",
+           column_of([](const TrajectoryFrame& frame) { return frame.frame.value; }))
+      .get("timestamps_ns",
+           "int64 array (N,): as fed.",
+           column_of([](const TrajectoryFrame& frame) { return frame.timestamp_ns; }))
+      .get("world_from_rig", "float64 array (N, 4, 4): metres (map units for mono).", &matrices_of)
+      .get("submaps",
+           "uint32 array (N,): the sub-map whose frame the pose is in.",
+           column_of([](const TrajectoryFrame& frame) { return frame.submap.value; }))
+      .get("is_filled", "bool array (N,): True for poses found after the fact.", &is_filled)
       .def("of_submap", &Trajectory::of_submap, py::arg("submap"), R"(of_submap(self, submap)
 --
 
@@ -166,25 +149,23 @@ Writes a file: 'tum' (t tx ty tz qx qy qz qw), 'kitti' or 'euroc'. OutputError w
 }
 
 void bind_statistics(py::module_& module) {
-  py::class_<SystemStatistics>(module, "Statistics", "Totals of a session.")
-      .def_readonly("num_keyframes", &SystemStatistics::num_keyframes, "int.")
-      .def_readonly("num_landmarks", &SystemStatistics::num_landmarks, "int.")
-      .def_readonly("num_submaps", &SystemStatistics::num_submaps, "int: that are not joined.")
-      .def_readonly("num_loops", &SystemStatistics::num_loops, "int: loops closed.")
-      .def_readonly("num_relocalizations",
-                    &SystemStatistics::num_relocalizations,
-                    "int: times the lost camera was found again.")
-      .def_property_readonly(
-          "mapping_ms",
-          [](const SystemStatistics& self) { return array_of(self.mapping_ms); },
-          "float64 array: milliseconds of the mapper per keyframe.");
-  py::class_<FocalCheck>(
+  Class<SystemStatistics>(module, "Statistics", "Totals of a session.")
+      .get("num_keyframes", "int.", &SystemStatistics::num_keyframes)
+      .get("num_landmarks", "int.", &SystemStatistics::num_landmarks)
+      .get("num_submaps", "int: that are not joined.", &SystemStatistics::num_submaps)
+      .get("num_loops", "int: loops closed.", &SystemStatistics::num_loops)
+      .get("num_relocalizations",
+           "int: times the lost camera was found again.",
+           &SystemStatistics::num_relocalizations)
+      .get("mapping_ms", "float64 array: milliseconds of the mapper per keyframe.", [](auto& self) {
+        return array_of(self.mapping_ms);
+      });
+  Class<FocalCheck>(
       module, "FocalCheck", "What the residuals say of the calibration's focal length.")
-      .def_readonly(
-          "factor", &FocalCheck::factor, "float: the true focal length by that of the calibration.")
-      .def_readonly("sigma", &FocalCheck::sigma, "float: standard deviation of the factor.")
-      .def_property_readonly(
-          "is_off", &FocalCheck::is_off, "bool: off by more than 2 %, beyond doubt.");
+      .get(
+          "factor", "float: the true focal length by that of the calibration.", &FocalCheck::factor)
+      .get("sigma", "float: standard deviation of the factor.", &FocalCheck::sigma)
+      .get("is_off", "bool: off by more than 2 %, beyond doubt.", &FocalCheck::is_off);
 }
 
 }  // namespace

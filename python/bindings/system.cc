@@ -15,7 +15,6 @@
 #include "frame_arguments.h"
 #include "session_config.h"
 #include "trajectory.h"
-#include "turn.h"
 
 namespace waymark::python {
 namespace {
@@ -80,7 +79,7 @@ TrackingResult PythonSystem::feed(const py::object& timestamp_ns, const ImageArg
   if (config_.setup == Setup::kRgbd && !frame.has_depth() && system_.frame_states().empty()) {
     fail_value("depth", images.depth, "the depth of the first frame in setup rgbd");
   }
-  const FrameInput input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+  const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
   TrackingResult result;
   {
     const py::gil_scoped_release release;
@@ -170,7 +169,7 @@ std::unique_ptr<PythonSystem> make_system(const py::object& cameras,
   return std::make_unique<PythonSystem>(std::move(config), mode, std::move(map));
 }
 
-using SystemClass = py::class_<PythonSystem>;
+using SystemClass = Class<PythonSystem>;
 
 void bind_feed(SystemClass& system) {
   system.def(
@@ -233,8 +232,7 @@ Off: the camera is followed in the map, which stays as it is. On at first.)")
 --
 
 Writes the newest map to a file (.wmap), whole or not at all. OutputError when that fails.)")
-      .def_property_readonly(
-          "is_finished", &PythonSystem::is_finished, "bool: finish() was called.")
+      .get("is_finished", "bool: finish() was called.", &PythonSystem::is_finished)
       .def("__enter__", [](const py::object& self) { return self; })
       .def("__exit__", [](PythonSystem& self, const py::args& args) {
         if (args[0].is_none()) self.finish();

@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include "waymark/camera/image_plane.h"
-#include "waymark/camera/max_angle.h"
 #include "waymark/camera/model_camera.h"
 
 namespace waymark {

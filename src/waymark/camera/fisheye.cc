@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "waymark/camera/max_angle.h"
+#include "waymark/camera/image_plane.h"
 
 namespace waymark {
 

@@ -8,9 +8,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "waymark/camera/division.h"
-#include "waymark/camera/double_sphere.h"
 #include "waymark/camera/equirectangular.h"
-#include "waymark/camera/extended_unified.h"
 #include "waymark/camera/fisheye.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/camera/testing/camera_test.h"

@@ -7,11 +7,16 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <sstream>
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/camera/builtin_models.h"
+#include "waymark/camera/division.h"
+#include "waymark/camera/equirectangular.h"
+#include "waymark/camera/fisheye.h"
+#include "waymark/camera/perspective.h"
+#include "waymark/camera/unified.h"
 
 namespace waymark {
 namespace {
@@ -28,6 +33,179 @@ void expect_finite(const CameraDescription& description,
       description.fail(fmt::format("{} holds {}, expected finite numbers", name, value));
     }
   }
+}
+
+// Part of the image that may lie beyond a field of view of less than 180 degrees: extreme corners,
+// where polynomials are least certain.
+constexpr double kMaxInvalidPart = 0.05;
+// Images of wider cameras have a circle with black corners, on the sensors in use often a half.
+constexpr double kMaxInvalidPartWide = 0.6;
+// 360 degree images are twice as wide as high, save for rounding.
+constexpr double kMaxAspectError = 0.01;
+
+using CameraPointer = std::shared_ptr<const Camera>;
+
+/// Part of the image's pixels that have no direction.
+double invalid_part(const Camera& camera) {
+  constexpr int kNumPerAxis = 40;
+  std::vector<Eigen::Vector2d> pixels;
+  for (int i = 0; i < kNumPerAxis * kNumPerAxis; ++i) {
+    const double column = (i % kNumPerAxis + 0.5) / kNumPerAxis;
+    const double row = (i / kNumPerAxis + 0.5) / kNumPerAxis;
+    pixels.emplace_back(camera.width_px() * column - 0.5, camera.height_px() * row - 0.5);
+  }
+  std::vector<Eigen::Vector3d> bearings(pixels.size());
+  std::vector<std::uint8_t> is_valid(pixels.size());
+  camera.unproject(pixels, bearings, is_valid);
+  const auto num_invalid = std::count(is_valid.begin(), is_valid.end(), 0);
+  return static_cast<double>(num_invalid) / static_cast<double>(pixels.size());
+}
+
+/// The camera of a model, unless it folds back inside the image, which only wrong numbers do.
+template <class Model>
+CameraPointer make_unfolded(const CameraDescription& description,
+                            Model model,
+                            std::string_view cause) {
+  const double end_rad = model.max_angle_rad();
+  auto camera = std::make_shared<const ModelCamera<Model>>(
+      std::move(model), description.width_px, description.height_px);
+  const double most = end_rad < 0.5 * std::numbers::pi ? kMaxInvalidPart : kMaxInvalidPartWide;
+  const double part = invalid_part(*camera);
+  if (part <= most) return camera;
+  const Model& made = camera->parameters();
+  const double inside_rad = end_rad * (1.0 - 1e-9);
+  const auto end = made.project({std::sin(inside_rad), 0.0, std::cos(inside_rad)});
+  const auto center = made.project({0.0, 0.0, 1.0});
+  description.fail(fmt::format(
+      "{} fold the image back at {:.0f} px from the principal point, {:.0f} degrees off the axis, "
+      "which leaves {:.0f} % of the pixels without a direction, expected at most {:.0f} %",
+      cause,
+      end && center ? (*end - *center).norm() : 0.0,
+      end_rad * 180.0 / std::numbers::pi,
+      100.0 * part,
+      100.0 * most));
+}
+
+void expect_num_coeffs(const CameraDescription& description, bool is_right, std::string_view what) {
+  if (is_right) return;
+  description.fail(fmt::format(
+      "distortion_coeffs has {} numbers, expected {}", description.distortion_coeffs.size(), what));
+}
+
+void expect_range(const CameraDescription& description,
+                  std::size_t index,
+                  bool is_right,
+                  std::string_view what) {
+  if (is_right) return;
+  description.fail(
+      fmt::format("intrinsics[{}] is {}, expected {}", index, description.intrinsics[index], what));
+}
+
+/// The last four intrinsics: fu fv pu pv.
+ImagePlane plane_of(const CameraDescription& description) {
+  const std::vector<double>& values = description.intrinsics;
+  const std::size_t first = values.size() - 4;
+  return {{values[first], values[first + 1]}, {values[first + 2], values[first + 3]}};
+}
+
+void expect_radial_tangential(const CameraDescription& description) {
+  const std::size_t count = description.distortion_coeffs.size();
+  expect_num_coeffs(description,
+                    count == 4 || count == 5 || count == 8,
+                    "4, 5 or 8 for radtan: k1 k2 p1 p2 [k3 [k4 k5 k6]]");
+}
+
+CameraPointer make_fisheye(const CameraDescription& description) {
+  const std::vector<double>& coeffs = description.distortion_coeffs;
+  expect_num_coeffs(description, coeffs.size() == 4, "4 for equidistant: k1 k2 k3 k4");
+  const FisheyeModel model(plane_of(description), {coeffs[0], coeffs[1], coeffs[2], coeffs[3]});
+  return make_unfolded(description, model, "distortion_coeffs");
+}
+
+CameraPointer make_pinhole(const CameraDescription& description) {
+  expect_intrinsics(description, "fu fv pu pv");
+  if (description.distortion_model == "equidistant") return make_fisheye(description);
+  if (description.distortion_model == "radtan") {
+    expect_radial_tangential(description);
+  } else if (description.distortion_model == "none") {
+    expect_no_distortion(description);
+  } else {
+    description.fail(fmt::format("distortion_model is {}, expected radtan, equidistant or none",
+                                 description.distortion_model));
+  }
+  const ImagePlane plane = plane_of(description);
+  const PerspectiveModel model(plane.focal_px, plane.center_px, description.distortion_coeffs);
+  return make_unfolded(description, model, "distortion_coeffs");
+}
+
+CameraPointer make_omni(const CameraDescription& description) {
+  expect_intrinsics(description, "xi fu fv pu pv");
+  const double xi = description.intrinsics[0];
+  expect_range(description, 0, xi >= 0.0, "xi of at least 0");
+  if (description.distortion_model == "radtan") {
+    expect_radial_tangential(description);
+  } else if (description.distortion_model == "none") {
+    expect_no_distortion(description);
+  } else {
+    description.fail(fmt::format("distortion_model is {}, expected radtan or none",
+                                 description.distortion_model));
+  }
+  const UnifiedModel model(xi, plane_of(description), description.distortion_coeffs);
+  return make_unfolded(description, model, "xi and distortion_coeffs");
+}
+
+CameraPointer make_eucm(const CameraDescription& description) {
+  expect_intrinsics(description, "alpha beta fu fv pu pv");
+  expect_no_distortion(description);
+  const double alpha = description.intrinsics[0], beta = description.intrinsics[1];
+  expect_range(description, 0, alpha >= 0.0 && alpha <= 1.0, "alpha from 0 to 1");
+  expect_range(description, 1, beta > 0.0, "beta of more than 0");
+  return make_unfolded(
+      description, ExtendedUnifiedModel(alpha, beta, plane_of(description)), "alpha and beta");
+}
+
+CameraPointer make_ds(const CameraDescription& description) {
+  expect_intrinsics(description, "xi alpha fu fv pu pv");
+  expect_no_distortion(description);
+  const double xi = description.intrinsics[0], alpha = description.intrinsics[1];
+  expect_range(description, 0, xi > -1.0 && xi <= 1.0, "xi of more than -1 and at most 1");
+  expect_range(description, 1, alpha >= 0.0 && alpha <= 1.0, "alpha from 0 to 1");
+  return make_unfolded(
+      description, DoubleSphereModel(xi, alpha, plane_of(description)), "xi and alpha");
+}
+
+CameraPointer make_division(const CameraDescription& description) {
+  expect_intrinsics(description, "fu fv pu pv");
+  if (description.distortion_model != "none" && description.distortion_model != "division") {
+    description.fail(fmt::format("distortion_model is {}, expected none for camera_model division",
+                                 description.distortion_model));
+  }
+  const std::vector<double>& coeffs = description.distortion_coeffs;
+  expect_num_coeffs(description, coeffs.size() == 1, "1 for camera_model division");
+  return make_unfolded(
+      description, DivisionModel(plane_of(description), coeffs[0]), "distortion_coeffs");
+}
+
+CameraPointer make_equirectangular(const CameraDescription& description) {
+  if (!description.intrinsics.empty()) {
+    description.fail(fmt::format("intrinsics has {} numbers, expected none for camera_model {}",
+                                 description.intrinsics.size(),
+                                 description.camera_model));
+  }
+  expect_no_distortion(description);
+  const double height = 0.5 * description.width_px;
+  if (std::abs(description.height_px - height) > kMaxAspectError * height) {
+    description.fail(
+        fmt::format("resolution is [{}, {}], expected twice the height as width for "
+                    "camera_model {}: 360 by 180 degrees",
+                    description.width_px,
+                    description.height_px,
+                    description.camera_model));
+  }
+  return std::make_shared<const EquirectangularCamera>(
+      EquirectangularModel(description.width_px, description.height_px),
+      description.width_px,
+      description.height_px);
 }
 
 }  // namespace
@@ -49,7 +227,12 @@ void CameraDescription::fail(const std::string& what) const {
 
 CameraRegistry CameraRegistry::with_builtin_models() {
   CameraRegistry registry;
-  add_builtin_models(registry);
+  registry.add("pinhole", make_pinhole);
+  registry.add("omni", make_omni);
+  registry.add("eucm", make_eucm);
+  registry.add("ds", make_ds);
+  registry.add("division", make_division);
+  registry.add("equirectangular", make_equirectangular);
   return registry;
 }
 

@@ -20,7 +20,7 @@ using CameraFactory = std::function<std::shared_ptr<const Camera>(const CameraDe
 /// The camera models that descriptions may name. A value: extend a copy and hand it on.
 class CameraRegistry {
  public:
-  /// The models of this library (builtin_models.h).
+  /// The models of this library.
   static CameraRegistry with_builtin_models();
 
   /// Adds a model; its name must be new.

@@ -144,18 +144,4 @@ std::vector<PosePair> associate(std::span<const std::int64_t> timestamps_a_ns,
   return pairs;
 }
 
-std::optional<Sim3> align_trajectories(const TimedPoses& a,
-                                       const TimedPoses& b,
-                                       std::int64_t max_difference_ns,
-                                       bool is_scale_free) {
-  WAYMARK_CHECK(a.timestamps_ns.size() == a.world_from_rig.size());
-  WAYMARK_CHECK(b.timestamps_ns.size() == b.world_from_rig.size());
-  std::vector<Eigen::Vector3d> positions_a, positions_b;
-  for (const PosePair& pair : associate(a.timestamps_ns, b.timestamps_ns, max_difference_ns)) {
-    positions_a.push_back(a.world_from_rig[pair.a].translation);
-    positions_b.push_back(b.world_from_rig[pair.b].translation);
-  }
-  return align(positions_a, positions_b, {}, is_scale_free);
-}
-
 }  // namespace waymark

@@ -47,11 +47,4 @@ std::vector<PosePair> associate(std::span<const std::int64_t> timestamps_a_ns,
                                 std::span<const std::int64_t> timestamps_b_ns,
                                 std::int64_t max_difference_ns);
 
-/// Similarity or rigid motion world_b_from_world_a of the positions of two trajectories, associated
-/// by time. Nothing if fewer than three poses pair up or their positions lie on a line.
-std::optional<Sim3> align_trajectories(const TimedPoses& a,
-                                       const TimedPoses& b,
-                                       std::int64_t max_difference_ns,
-                                       bool is_scale_free);
-
 }  // namespace waymark

@@ -144,27 +144,5 @@ TEST(Associate, PairsEachPoseWithTheNearestOnce) {
   EXPECT_TRUE(associate({}, b, 5).empty());
 }
 
-TEST(AlignTrajectories, RecoversTheChangeOfWorld) {
-  Rng rng(5, 0);
-  const Sim3 b_from_a = random_similarity(rng);
-  std::vector<std::int64_t> times_a, times_b;
-  std::vector<Rigid3> poses_a, poses_b;
-  for (int i = 0; i < 40; ++i) {
-    const Rigid3 pose = random_pose(rng, 0.5, rng.uniform(1.0, 9.0));
-    times_a.push_back(1000 * i);
-    poses_a.push_back(pose);
-    if (i % 3 == 0) continue;  // b lacks some frames
-    times_b.push_back(1000 * i + 7);
-    poses_b.emplace_back(b_from_a.rotation * pose.rotation, b_from_a * pose.translation);
-  }
-  const auto estimate = align_trajectories({times_a, poses_a}, {times_b, poses_b}, 20, true);
-  ASSERT_TRUE(estimate);
-  expect_near(*estimate, b_from_a, 1e-8);
-  EXPECT_FALSE(align_trajectories({times_a, poses_a}, {times_b, poses_b}, 2, true));
-  const auto rigid = align_trajectories({times_a, poses_a}, {times_b, poses_b}, 20, false);
-  ASSERT_TRUE(rigid);
-  EXPECT_EQ(rigid->scale, 1.0);
-}
-
 }  // namespace
 }  // namespace waymark

@@ -23,24 +23,6 @@ using testing::random_direction;
 using testing::random_pose;
 using testing::random_vector;
 
-// Point -> pixels of a camera of 500 px, as the W of a feature.
-Eigen::Matrix<double, 2, 3> pixel_from_bearing(const Eigen::Vector3d& bearing) {
-  return 500.0 * tangent_basis(bearing).transpose();
-}
-
-std::vector<PointSighting> sight(const Eigen::Vector3d& point,
-                                 int num_views,
-                                 double sigma_rad,
-                                 Rng& rng) {
-  std::vector<PointSighting> sightings;
-  for (int i = 0; i < num_views; ++i) {
-    const Rigid3 cam_from_world = random_pose(rng, rng.uniform(0.0, 3.0), 1.0);
-    const Eigen::Vector3d bearing = disturb((cam_from_world * point).normalized(), sigma_rad, rng);
-    sightings.push_back({cam_from_world, bearing, pixel_from_bearing(bearing)});
-  }
-  return sightings;
-}
-
 TEST(Bearing, AngleIsExactForTinyAngles) {
   for (const double angle : {1e-12, 1e-6, 0.3, 2.0, 3.14}) {
     const Eigen::Vector3d turned(std::cos(angle), std::sin(angle), 0.0);
@@ -141,82 +123,6 @@ TEST(TriangulateTwoViews, HasSmallerAngularErrorThanOpenCv) {
   }
   EXPECT_GT(ours, 0.0);
   EXPECT_LT(ours, 1.02 * theirs);
-}
-
-TEST(TriangulateManyViews, FindsTheExactPoint) {
-  Rng rng(5, 0);
-  for (int num_views = 2; num_views < 8; ++num_views) {
-    const Eigen::Vector3d point = 3.0 * random_direction(rng);
-    const auto sightings = sight(point, num_views, 0.0, rng);
-    const auto estimate = triangulate(sightings, 0.001);
-    ASSERT_TRUE(estimate);
-    EXPECT_LT((*estimate - point).norm(), 1e-9);
-  }
-}
-
-TEST(TriangulateManyViews, RefusesWhatItCannotDetermine) {
-  Rng rng(6, 0);
-  EXPECT_FALSE(triangulate({}, 0.0));
-  auto sightings = sight(Eigen::Vector3d(0, 0, 5), 1, 0.0, rng);
-  EXPECT_FALSE(triangulate(sightings, 0.0));
-  sightings.push_back(sightings[0]);  // the same view twice
-  EXPECT_FALSE(triangulate(sightings, 0.0));
-  EXPECT_FALSE(refine_point(sightings, Eigen::Vector3d(0, 0, 5)));
-  auto behind = sight(Eigen::Vector3d(0, 0, 5), 3, 0.0, rng);
-  for (PointSighting& sighting : behind) sighting.bearing = -sighting.bearing;
-  EXPECT_FALSE(triangulate(behind, 0.0));
-  EXPECT_FALSE(refine_point(behind, Eigen::Vector3d(0, 0, 5)));
-}
-
-TEST(PointResidual, JacobianMatchesNumericDerivative) {
-  Rng rng(7, 0);
-  for (int i = 0; i < 50; ++i) {
-    const Eigen::Vector3d point = 3.0 * random_vector(rng);
-    const PointSighting sighting = sight(point, 1, 0.01, rng)[0];
-    const double step = 1e-6;
-    Eigen::Matrix<double, 2, 3> numeric;
-    for (int k = 0; k < 3; ++k) {
-      const Eigen::Vector3d delta = step * Eigen::Vector3d::Unit(k);
-      numeric.col(k) = (point_residual(sighting, point + delta).value_px -
-                        point_residual(sighting, point - delta).value_px) /
-                       (2.0 * step);
-    }
-    const auto& jacobian = point_residual(sighting, point).jacobian;
-    EXPECT_LT((jacobian - numeric).norm(), 1e-6 * (1.0 + jacobian.norm()));
-  }
-}
-
-TEST(RefinePoint, ReachesTheMinimumFromAPoorStart) {
-  Rng rng(8, 0);
-  for (int i = 0; i < 50; ++i) {
-    const Eigen::Vector3d point = 4.0 * random_direction(rng);
-    const auto sightings = sight(point, 4, 1.0 / 500.0, rng);
-    const auto estimate = refine_point(sightings, 1.4 * point);
-    ASSERT_TRUE(estimate);
-    Eigen::Vector3d gradient = Eigen::Vector3d::Zero();
-    for (const PointSighting& sighting : sightings) {
-      const PointResidual residual = point_residual(sighting, estimate->point_in_world);
-      gradient += residual.jacobian.transpose() * residual.value_px;
-    }
-    EXPECT_LT(gradient.norm(), 1e-2);
-  }
-}
-
-// The errors over many noisy trials, whitened by the covariance, have unit variance.
-TEST(RefinePoint, CovarianceIsThatOfTheErrors) {
-  Rng rng(9, 0);
-  const Eigen::Vector3d point(1.0, -2.0, 4.0);
-  double sum = 0.0;
-  constexpr int kTrials = 400;
-  for (int i = 0; i < kTrials; ++i) {
-    const auto sightings = sight(point, 4, 1.0 / 500.0, rng);
-    const auto estimate = refine_point(sightings, point);
-    ASSERT_TRUE(estimate);
-    const Eigen::Vector3d error = estimate->point_in_world - point;
-    sum += error.dot(estimate->covariance.inverse() * error);
-  }
-  // Chi-squared of 3 degrees of freedom; four standard deviations of its mean.
-  EXPECT_NEAR(sum / kTrials, 3.0, 4.0 * std::sqrt(6.0 / kTrials));
 }
 
 }  // namespace

@@ -20,7 +20,7 @@ namespace waymark {
 namespace {
 
 // The cost of a match that contradicts a motion, in squared standard deviations.
-constexpr double kOutlierCost = EssentialEstimator::kMaxSquaredError;
+constexpr double kOutlierCost = kMaxSquaredEpipolarError;
 // With less support than this share of the matches, agreement may be chance.
 constexpr double kMinInlierRatio = 0.4;
 // Parallax in standard deviations from which a point counts as behind, and angles of its triangle

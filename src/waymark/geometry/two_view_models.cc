@@ -5,7 +5,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
 #include <limits>
+#include <span>
+#include <vector>
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/geometry/bearing.h"
@@ -24,6 +27,11 @@ std::array<Eigen::Vector3d, kSize> gather(std::span<const Eigen::Vector3d> beari
   return result;
 }
 
+std::vector<Eigen::Matrix3d> as_list(const std::optional<Eigen::Matrix3d>& model) {
+  if (!model) return {};
+  return {*model};
+}
+
 // Every k-th of the indices such that about this many remain: local optimisation needs no more to
 // find the right basin (Lebeda, Matas & Chum 2012, Fixing the Locally Optimized RANSAC).
 std::vector<std::uint32_t> thin_out(std::span<const std::uint32_t> indices) {
@@ -33,6 +41,93 @@ std::vector<std::uint32_t> thin_out(std::span<const std::uint32_t> indices) {
   for (std::size_t i = 0; i < indices.size(); i += stride) result.push_back(indices[i]);
   return result;
 }
+
+// The three models as estimators for ransac(). Thresholds are the 95 % quantiles of chi-squared of
+// 1 and 2 degrees of freedom.
+
+template <std::size_t kSize>
+struct MatchEstimator {
+  using Model = Eigen::Matrix3d;
+  static constexpr std::size_t kSampleSize = kSize;
+  using Sample = std::span<const std::uint32_t, kSize>;
+  using Indices = std::span<const std::uint32_t>;
+
+  std::size_t num_data() const { return matches.size(); }
+
+  BearingMatches matches;
+};
+
+// Essential matrices of any scene seen from two places.
+struct EssentialEstimator : MatchEstimator<5> {
+  static constexpr double kMaxSquaredError = kMaxSquaredEpipolarError;
+
+  std::vector<Eigen::Matrix3d> fit(Sample sample) const {
+    const auto bearings_a = gather(matches.bearings_a, sample);
+    return solve_five_point(bearings_a, gather(matches.bearings_b, sample));
+  }
+
+  double squared_error(const Eigen::Matrix3d& essential, std::size_t index) const {
+    return squared_epipolar_error(essential, matches, index);
+  }
+
+  std::optional<Eigen::Matrix3d> refine(const Eigen::Matrix3d& essential, Indices nearby) const {
+    if (nearby.size() <= kSampleSize) return std::nullopt;
+    // The epipolar error is the same for all four poses of an essential matrix.
+    const Rigid3 b_from_a = decompose_essential(essential).front();
+    return essential_from_pose(
+        refine_relative_pose(b_from_a, matches, thin_out(nearby), {.max_iterations = 6}));
+  }
+};
+
+// Homographies of a plane seen from two places.
+struct HomographyEstimator : MatchEstimator<4> {
+  static constexpr double kMaxSquaredError = 5.99;
+
+  std::vector<Eigen::Matrix3d> fit(Sample sample) const {
+    const auto bearings_a = gather(matches.bearings_a, sample);
+    return as_list(solve_four_point(bearings_a, gather(matches.bearings_b, sample)));
+  }
+
+  double squared_error(const Eigen::Matrix3d& homography, std::size_t index) const {
+    return squared_homography_error(homography, matches, index);
+  }
+
+  std::optional<Eigen::Matrix3d> refine(const Eigen::Matrix3d& homography, Indices nearby) const {
+    return refine_homography(homography, matches, thin_out(nearby));
+  }
+};
+
+// Rotations of any scene seen from one place, or of a scene far away.
+struct RotationEstimator : MatchEstimator<2> {
+  static constexpr double kMaxSquaredError = 5.99;
+
+  std::vector<Eigen::Matrix3d> fit(Sample sample) const {
+    const auto bearings_a = gather(matches.bearings_a, sample);
+    return as_list(align_directions(bearings_a, gather(matches.bearings_b, sample)));
+  }
+
+  double squared_error(const Eigen::Matrix3d& rotation, std::size_t index) const {
+    return (rotation * matches.bearings_a[index] - matches.bearings_b[index]).squaredNorm() /
+           variance(index);
+  }
+
+  std::optional<Eigen::Matrix3d> refine(const Eigen::Matrix3d& rotation, Indices nearby) const {
+    std::vector<Eigen::Vector3d> directions_a, directions_b;
+    std::vector<double> weights;
+    for (const std::uint32_t index : nearby) {
+      directions_a.push_back(matches.bearings_a[index]);
+      directions_b.push_back(matches.bearings_b[index]);
+      weights.push_back(geman_mcclure_weight(squared_error(rotation, index), kMaxSquaredError) /
+                        variance(index));
+    }
+    return align_directions(directions_a, directions_b, weights);
+  }
+
+  double variance(std::size_t index) const {
+    return matches.sigmas_rad_a[index] * matches.sigmas_rad_a[index] +
+           matches.sigmas_rad_b[index] * matches.sigmas_rad_b[index];
+  }
+};
 
 struct ModelSize {
   int dimension;       // of the surface of all matches that fit, of 4 for any pair of directions
@@ -48,7 +143,7 @@ template <class Estimator>
 double gric(const Estimator& estimator, const std::optional<TwoViewFit>& fit, ModelSize size) {
   if (!fit) return std::numeric_limits<double>::infinity();
   const double per_dimension = std::log(4.0);
-  const double outlier_cost = EssentialEstimator::kMaxSquaredError + 3.0 * per_dimension;
+  const double outlier_cost = kMaxSquaredEpipolarError + 3.0 * per_dimension;
   const double num_matches = static_cast<double>(estimator.num_data());
   double sum = size.num_parameters * std::log(4.0 * num_matches);
   for (std::size_t i = 0; i < estimator.num_data(); ++i) {
@@ -60,82 +155,10 @@ double gric(const Estimator& estimator, const std::optional<TwoViewFit>& fit, Mo
 
 }  // namespace
 
-std::vector<Eigen::Matrix3d> EssentialEstimator::fit(
-    std::span<const std::uint32_t, kSampleSize> sample) const {
-  const auto bearings_a = gather(matches_.bearings_a, sample);
-  const auto bearings_b = gather(matches_.bearings_b, sample);
-  return solve_five_point(bearings_a, bearings_b);
-}
-
-double EssentialEstimator::squared_error(const Eigen::Matrix3d& essential,
-                                         std::size_t index) const {
-  return squared_epipolar_error(essential, matches_, index);
-}
-
-std::optional<Eigen::Matrix3d> EssentialEstimator::refine(
-    const Eigen::Matrix3d& essential, std::span<const std::uint32_t> nearby) const {
-  if (nearby.size() <= kSampleSize) return std::nullopt;
-  // The epipolar error is the same for all four poses of an essential matrix.
-  const Rigid3 b_from_a = decompose_essential(essential).front();
-  return essential_from_pose(
-      refine_relative_pose(b_from_a, matches_, thin_out(nearby), {.max_iterations = 6}));
-}
-
-std::vector<Eigen::Matrix3d> HomographyEstimator::fit(
-    std::span<const std::uint32_t, kSampleSize> sample) const {
-  const auto bearings_a = gather(matches_.bearings_a, sample);
-  const auto bearings_b = gather(matches_.bearings_b, sample);
-  const std::optional<Eigen::Matrix3d> homography = solve_four_point(bearings_a, bearings_b);
-  if (!homography) return {};
-  return {*homography};
-}
-
-double HomographyEstimator::squared_error(const Eigen::Matrix3d& homography,
-                                          std::size_t index) const {
-  return squared_homography_error(homography, matches_, index);
-}
-
-std::optional<Eigen::Matrix3d> HomographyEstimator::refine(
-    const Eigen::Matrix3d& homography, std::span<const std::uint32_t> nearby) const {
-  return refine_homography(homography, matches_, thin_out(nearby));
-}
-
-std::vector<Eigen::Matrix3d> RotationEstimator::fit(
-    std::span<const std::uint32_t, kSampleSize> sample) const {
-  const auto bearings_a = gather(matches_.bearings_a, sample);
-  const auto bearings_b = gather(matches_.bearings_b, sample);
-  const std::optional<Eigen::Matrix3d> rotation = align_directions(bearings_a, bearings_b);
-  if (!rotation) return {};
-  return {*rotation};
-}
-
-double RotationEstimator::squared_error(const Eigen::Matrix3d& rotation, std::size_t index) const {
-  return (rotation * matches_.bearings_a[index] - matches_.bearings_b[index]).squaredNorm() /
-         variance(index);
-}
-
-std::optional<Eigen::Matrix3d> RotationEstimator::refine(
-    const Eigen::Matrix3d& rotation, std::span<const std::uint32_t> nearby) const {
-  std::vector<Eigen::Vector3d> directions_a, directions_b;
-  std::vector<double> weights;
-  for (const std::uint32_t index : nearby) {
-    directions_a.push_back(matches_.bearings_a[index]);
-    directions_b.push_back(matches_.bearings_b[index]);
-    weights.push_back(geman_mcclure_weight(squared_error(rotation, index), kMaxSquaredError) /
-                      variance(index));
-  }
-  return align_directions(directions_a, directions_b, weights);
-}
-
-double RotationEstimator::variance(std::size_t index) const {
-  return matches_.sigmas_rad_a[index] * matches_.sigmas_rad_a[index] +
-         matches_.sigmas_rad_b[index] * matches_.sigmas_rad_b[index];
-}
-
 TwoViewModels fit_two_view_models(const BearingMatches& matches, RansacOptions options) {
-  const EssentialEstimator essential(matches);
-  const HomographyEstimator homography(matches);
-  const RotationEstimator rotation(matches);
+  const EssentialEstimator essential{{matches}};
+  const HomographyEstimator homography{{matches}};
+  const RotationEstimator rotation{{matches}};
   TwoViewModels models;
   models.essential = ransac(essential, options);
   if (models.essential) {

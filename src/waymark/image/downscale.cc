@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/image/downscale.h"
 
-#include <algorithm>
 #include <array>
 
 #undef HWY_TARGET_INCLUDE
@@ -18,8 +17,6 @@ namespace {
 
 // Weight of the second of two neighbours, 15 fractional bits; phase 5 has no result.
 inline constexpr std::array<std::int16_t, 6> kWeights{3277, 9830, 16384, 22938, 29491, 0};
-
-inline int interpolate(int a, int b, int weight) { return a + (((b - a) * weight + 16384) >> 15); }
 
 }  // namespace
 }  // namespace waymark
@@ -128,22 +125,6 @@ void downscale(const PaddedImage& source, DownscaleWorkspace& workspace, PaddedI
   result.resize(source.width_px() * 5 / 6, source.height_px() * 5 / 6);
   reserve(source.width_px(), workspace);
   HWY_DYNAMIC_DISPATCH(downscale_rows)(source, workspace, result);
-}
-
-void downscale_reference(const PaddedImage& source, PaddedImage& result) {
-  result.resize(source.width_px() * 5 / 6, source.height_px() * 5 / 6);
-  for (int y = 0; y < result.height_px(); ++y) {
-    const std::uint8_t* above = source.row(y / 5 * 6 + y % 5);
-    const std::uint8_t* below = above + source.stride();
-    const int weight_below = kWeights[static_cast<std::size_t>(y % 5)];
-    for (int x = 0; x < result.width_px(); ++x) {
-      const int x0 = x / 5 * 6 + x % 5;
-      const int left = interpolate(above[x0] << 7, below[x0] << 7, weight_below);
-      const int right = interpolate(above[x0 + 1] << 7, below[x0 + 1] << 7, weight_below);
-      const int value = interpolate(left, right, kWeights[static_cast<std::size_t>(x % 5)]);
-      result.row(y)[x] = static_cast<std::uint8_t>((value + 64) >> 7);
-    }
-  }
 }
 
 }  // namespace waymark

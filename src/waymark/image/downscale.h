@@ -21,7 +21,4 @@ struct DownscaleWorkspace {
 /// The result has floor(5/6 of the size) pixels, all of them inside of the source.
 void downscale(const PaddedImage& source, DownscaleWorkspace& workspace, PaddedImage& result);
 
-/// The same, one pixel at a time; defines the result bit by bit.
-void downscale_reference(const PaddedImage& source, PaddedImage& result);
-
 }  // namespace waymark

@@ -199,22 +199,5 @@ void fast_score_patches(const PaddedImage& image,
   HWY_DYNAMIC_DISPATCH(score_patches)(image, corners, patches.data());
 }
 
-int fast_score_reference(ImageView image, int x, int y) {
-  const int centre = image.at(x, y);
-  int score = 0;
-  for (int start = 0; start < kRingSize; ++start) {
-    int brighter = 255;
-    int darker = 255;
-    for (int i = start; i < start + kArc; ++i) {
-      const RingOffset offset = kRing[static_cast<std::size_t>(i % kRingSize)];
-      const int difference = image.at(x + offset.x, y + offset.y) - centre;
-      brighter = std::min(brighter, difference);
-      darker = std::min(darker, -difference);
-    }
-    score = std::max({score, brighter, darker});
-  }
-  return score;
-}
-
 }  // namespace waymark
 #endif

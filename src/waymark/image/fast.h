@@ -41,7 +41,4 @@ void fast_score_patches(const PaddedImage& image,
                         std::span<const Corner> corners,
                         std::span<ScorePatch> patches);
 
-/// Score of one pixel; defines it.
-int fast_score_reference(ImageView image, int x, int y);
-
 }  // namespace waymark

@@ -126,30 +126,5 @@ void gaussian_blur(const PaddedImage& source, BlurWorkspace& workspace, PaddedIm
   HWY_DYNAMIC_DISPATCH(blur)(source, workspace.row.data(), result);
 }
 
-void gaussian_blur_reference(const PaddedImage& source, PaddedImage& result) {
-  const int width = source.width_px();
-  const int height = source.height_px();
-  result.resize(width, height);
-  for (int y = 0; y < height; ++y) {
-    const auto column_sum = [&](int x) {
-      int sum = kTaps[0] * source.row(y)[x];
-      for (int i = 1; i <= kRadius; ++i) {
-        sum += kTaps[static_cast<std::size_t>(i)] *
-               (source.row(mirrored(y - i, height))[x] + source.row(mirrored(y + i, height))[x]);
-      }
-      return sum;
-    };
-    for (int x = 0; x < width; ++x) {
-      int sum = kRounding + ((column_sum(x) * kTaps[0]) >> 8);
-      for (int i = 1; i <= kRadius; ++i) {
-        const int left = column_sum(mirrored(x - i, width));
-        const int right = column_sum(mirrored(x + i, width));
-        sum += (((left + right + 1) >> 1) * kTaps[static_cast<std::size_t>(i)]) >> 7;
-      }
-      result.row(y)[x] = static_cast<std::uint8_t>(sum >> 8);
-    }
-  }
-}
-
 }  // namespace waymark
 #endif

@@ -21,7 +21,4 @@ struct BlurWorkspace {
 /// 0.52. The image must be at least 4 pixels wide and high.
 void gaussian_blur(const PaddedImage& source, BlurWorkspace& workspace, PaddedImage& result);
 
-/// The same, one pixel at a time; defines the result bit by bit.
-void gaussian_blur_reference(const PaddedImage& source, PaddedImage& result);
-
 }  // namespace waymark

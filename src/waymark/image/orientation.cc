@@ -124,18 +124,5 @@ void orient(const PaddedImage& image,
   HWY_DYNAMIC_DISPATCH(orient_all)(image, corners, angles_rad.data());
 }
 
-float orientation_reference(ImageView image, int x, int y) {
-  int moment_x = 0;
-  int moment_y = 0;
-  for (int v = -kOrientationRadius; v <= kOrientationRadius; ++v) {
-    const int half_width = kHalfWidths[static_cast<std::size_t>(std::abs(v))];
-    for (int u = -half_width; u <= half_width; ++u) {
-      moment_x += u * image.at(x + u, y + v);
-      moment_y += v * image.at(x + u, y + v);
-    }
-  }
-  return std::atan2(static_cast<float>(moment_y), static_cast<float>(moment_x));
-}
-
 }  // namespace waymark
 #endif

@@ -17,7 +17,4 @@ inline constexpr int kOrientationRadius = 15;
 /// Corners must be at least kOrientationRadius from the border.
 void orient(const PaddedImage& image, std::span<const Corner> corners, std::span<float> angles_rad);
 
-/// The same for one corner, pixel by pixel.
-float orientation_reference(ImageView image, int x, int y);
-
 }  // namespace waymark

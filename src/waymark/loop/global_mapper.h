@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/loop/link_finder.h"
-#include "waymark/loop/loop_finder.h"
 #include "waymark/loop/settings.h"
+#include "waymark/loop/verify.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
+#include "waymark/place/place_index.h"
 #include "waymark/track/map_snapshot.h"
 
 namespace waymark {
@@ -50,17 +50,18 @@ class GlobalMapper {
 
  private:
   void update_places(const Mapper::Changes& changes);
-  bool close_loop_at(KeyframeId query);
-  void look_for_links(std::size_t max_count);
+  bool close_alike(KeyframeId query);
+  bool close_beside(KeyframeId query);
+  bool close(const std::optional<Revisit>& revisit);
+  void consolidate(std::size_t max_count);
 
   const LoopSettings settings_;
   Mapper mapper_;
   PlaceIndex places_;
-  LoopFinder finder_;
-  LinkFinder link_finder_;
+  RevisitVerifier verifier_;
   ProjectionMatcher projection_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
-  std::vector<KeyframeId> unlinked_;  ///< Where to look for links yet, the last one first.
+  std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
 };

@@ -6,10 +6,10 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/loop/link_finder.h"
-#include "waymark/loop/loop_closing.h"
-#include "waymark/loop/loop_finder.h"
-#include "waymark/loop/overlaps.h"
+#include "waymark/loop/close.h"
+#include "waymark/loop/consolidate.h"
+#include "waymark/loop/find.h"
+#include "waymark/loop/verify.h"
 #include "waymark/map/parts.h"
 #include "waymark/mapping/mapper.h"
 
@@ -18,6 +18,7 @@ namespace {
 
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
+constexpr BesideOptions kMergeBeside = {.num_known_steps = 5, .distance = 0.8, .angle_rad = 0.7};
 
 class MapMerger {
  public:
@@ -26,8 +27,7 @@ class MapMerger {
       : first_(first),
         rig_(both.keyframes().at(first).rig),
         mapper_(rig_, {}),
-        finder_(rig_, seed),
-        link_finder_(rig_, seed),
+        verifier_(rig_, seed),
         projection_(rig_) {
     mapper_.take_over(both);
     both.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
@@ -52,7 +52,8 @@ class MapMerger {
 
  private:
   void look_for_place_of(KeyframeId query) {
-    const std::optional<Revisit> revisit = finder_.find(mapper_.map(), places_, query);
+    const std::optional<Revisit> revisit =
+        verifier_.verify_alike(mapper_.map(), query, find_alike(mapper_.map(), places_, query));
     if (!revisit) return;
     bool is_join = false;
     mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
@@ -68,10 +69,12 @@ class MapMerger {
     mapper_.map().keyframes().for_each(
         [&](KeyframeId id, const Keyframe&) { queries.push_back(id); });
     for (const KeyframeId query : queries) {
-      const std::optional<Revisit> link = link_finder_.find(mapper_.map(), query);
+      const std::optional<Revisit> link = verifier_.verify_beside(
+          mapper_.map(), query, find_beside(mapper_.map(), query, kMergeBeside));
       if (!link) continue;
-      mapper_.change(
-          [&](Map& map, DirtyLandmarks& dirty) { close_loop(map, *link, projection_, dirty); });
+      mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+        close_revisit(map, places_, *link, projection_, dirty);
+      });
       ++merged_.num_loops;
     }
     mapper_.change(
@@ -83,8 +86,7 @@ class MapMerger {
   const std::shared_ptr<const Rig> rig_;
   Mapper mapper_;
   PlaceIndex places_;
-  LoopFinder finder_;
-  LinkFinder link_finder_;
+  RevisitVerifier verifier_;
   ProjectionMatcher projection_;
   MergedMaps merged_;
 };

@@ -7,55 +7,10 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
-#include "waymark/simulate/sequence.h"
+#include "waymark/system/test_sequence.h"
 
 namespace waymark {
 namespace {
-
-constexpr int kNumFrames = 25;
-
-SequenceSpec small_spec() {
-  CameraDescription camera;
-  camera.camera_model = "pinhole";
-  camera.intrinsics = {210.0, 210.0, 159.5, 119.5};
-  camera.width_px = 320;
-  camera.height_px = 240;
-  SequenceSpec spec;
-  spec.name = "small";
-  spec.motion = "slide";
-  spec.seed = 3;
-  spec.num_frames = kNumFrames;
-  spec.chain = rgbd_chain(camera, 1000.0);
-  return spec;
-}
-
-/// Rendered once for all tests.
-const std::vector<SimulatedFrame>& frames() {
-  static const std::vector<SimulatedFrame> rendered = [] {
-    SimulatedSequence sequence(small_spec());
-    std::vector<SimulatedFrame> result;
-    for (int i = 0; i < kNumFrames; ++i) result.push_back(sequence.frame(i));
-    return result;
-  }();
-  return rendered;
-}
-
-Rig small_rig() { return SimulatedSequence(small_spec()).rig(); }
-
-Settings small_settings() {
-  Settings settings;
-  settings.features.count = 500;
-  settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
-  return settings;
-}
-
-FrameInput input_of(const SimulatedFrame& frame) {
-  FrameInput input;
-  input.timestamp_ns = frame.timestamp_ns;
-  input.image0 = frame.images[0].view();
-  input.depth = frame.depth.view();
-  return input;
-}
 
 struct Played {
   std::vector<TrackingResult> results;
@@ -193,7 +148,7 @@ TEST(System, TimeStampsMustIncrease) {
 TEST(System, ImagesMustHaveTheSizeOfTheCalibration) {
   System system(small_rig(), small_settings(), Timing::kInline);
   const Image small(160, 120);
-  FrameInput input = input_of(frames()[0]);
+  FrameImages input = input_of(frames()[0]);
   input.image0 = small.view();
   EXPECT_THROW(system.feed(input), InputError);
   input.image0 = {};
@@ -205,7 +160,7 @@ TEST(System, AnImageWithoutFeaturesIsLostAndTheNextIsFoundAgain) {
   System system(small_rig(), small_settings(), Timing::kLockstep);
   for (int i = 0; i < 3; ++i) system.feed(input_of(frames()[static_cast<std::size_t>(i)]));
   const Image black(320, 240);
-  FrameInput blind = input_of(frames()[3]);
+  FrameImages blind = input_of(frames()[3]);
   blind.image0 = black.view();
   const TrackingResult lost = system.feed(blind);
   EXPECT_EQ(lost.state, FrameState::kLost);
@@ -274,7 +229,7 @@ TEST(System, TakesNoRangesIntoAMapWithoutScale) {
   map.add_submap(false);
   System system(small_rig(), small_settings(), Timing::kInline, map.freeze());
   EXPECT_THROW(system.feed(input_of(frames()[0])), InputError);
-  FrameInput grey = input_of(frames()[0]);
+  FrameImages grey = input_of(frames()[0]);
   grey.depth = {};
   EXPECT_EQ(system.feed(grey).state, FrameState::kLost);
 }

@@ -15,6 +15,6 @@ namespace waymark {
 std::string encode_preview(const Image& image);
 
 /// The `frame` message.
-Message encode_frame(const FrameImage& frame, std::int64_t start_ns);
+Message encode_frame(const DrawnFrame& frame, std::int64_t start_ns);
 
 }  // namespace waymark
