@@ -14,7 +14,7 @@
 namespace waymark {
 namespace {
 
-Eigen::Vector3d random_vector(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
+Eigen::Vector3d small_vector(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
 
 // Angles on both sides of every change of formula, up to almost pi.
 std::vector<double> angles() {
@@ -23,14 +23,14 @@ std::vector<double> angles() {
 
 TEST(So3, SkewIsTheCrossProduct) {
   Rng rng(1, 0);
-  const Eigen::Vector3d a = random_vector(rng), b = random_vector(rng);
+  const Eigen::Vector3d a = small_vector(rng), b = small_vector(rng);
   EXPECT_TRUE((skew(a) * b).isApprox(a.cross(b)));
 }
 
 TEST(So3, ExpIsTheMatrixExponential) {
   Rng rng(2, 0);
   for (const double angle : angles()) {
-    const Eigen::Vector3d phi = angle * random_vector(rng).normalized();
+    const Eigen::Vector3d phi = angle * small_vector(rng).normalized();
     const Eigen::Matrix3d oracle = skew(phi).exp();
     EXPECT_LT((so3_exp(phi).toRotationMatrix() - oracle).norm(), 1e-14) << angle;
   }
@@ -39,7 +39,7 @@ TEST(So3, ExpIsTheMatrixExponential) {
 TEST(So3, LogInvertsExpForBothSignsOfTheQuaternion) {
   Rng rng(3, 0);
   for (const double angle : angles()) {
-    const Eigen::Vector3d phi = angle * random_vector(rng).normalized();
+    const Eigen::Vector3d phi = angle * small_vector(rng).normalized();
     const Eigen::Quaterniond q = so3_exp(phi);
     EXPECT_LT((so3_log(q) - phi).norm(), 1e-14 * (1.0 + angle)) << angle;
     EXPECT_LT((so3_log(Eigen::Quaterniond(-q.coeffs())) - phi).norm(), 1e-14 * (1.0 + angle));
@@ -53,7 +53,7 @@ TEST(So3, LogOfHalfATurnHasAngleOfPi) {
 TEST(So3, LeftJacobianMatchesNumericDerivative) {
   Rng rng(4, 0);
   for (const double angle : angles()) {
-    const Eigen::Vector3d phi = angle * random_vector(rng).normalized();
+    const Eigen::Vector3d phi = angle * small_vector(rng).normalized();
     Eigen::Matrix3d numeric;
     const double step = 1e-6;
     for (int i = 0; i < 3; ++i) {
@@ -74,7 +74,7 @@ TEST(Rigid3, ExpIsTheMatrixExponentialAndLogInvertsIt) {
   Rng rng(5, 0);
   for (const double angle : angles()) {
     Vector6d xi;
-    xi << random_vector(rng), angle * random_vector(rng).normalized();
+    xi << small_vector(rng), angle * small_vector(rng).normalized();
     Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
     generator.topLeftCorner<3, 3>() = skew(xi.tail<3>());
     generator.topRightCorner<3, 1>() = xi.head<3>();
@@ -87,10 +87,10 @@ TEST(Rigid3, ExpIsTheMatrixExponentialAndLogInvertsIt) {
 TEST(Rigid3, ComposesAndInverts) {
   Rng rng(6, 0);
   Vector6d xi_ba, xi_cb;
-  xi_ba << random_vector(rng), random_vector(rng);
-  xi_cb << random_vector(rng), random_vector(rng);
+  xi_ba << small_vector(rng), small_vector(rng);
+  xi_cb << small_vector(rng), small_vector(rng);
   const Rigid3 b_from_a = Rigid3::exp(xi_ba), c_from_b = Rigid3::exp(xi_cb);
-  const Eigen::Vector3d point_in_a = random_vector(rng);
+  const Eigen::Vector3d point_in_a = small_vector(rng);
   EXPECT_TRUE(((c_from_b * b_from_a) * point_in_a).isApprox(c_from_b * (b_from_a * point_in_a)));
   EXPECT_TRUE((b_from_a.inverse() * (b_from_a * point_in_a)).isApprox(point_in_a));
   EXPECT_LT((b_from_a * b_from_a.origin_in_source()).norm(), 1e-14);
@@ -99,8 +99,8 @@ TEST(Rigid3, ComposesAndInverts) {
 TEST(Rigid3, AdjointMovesAPerturbationToTheOtherSide) {
   Rng rng(7, 0);
   Vector6d xi_ba, xi_a;
-  xi_ba << random_vector(rng), random_vector(rng);
-  xi_a << random_vector(rng), random_vector(rng);
+  xi_ba << small_vector(rng), small_vector(rng);
+  xi_a << small_vector(rng), small_vector(rng);
   const Rigid3 b_from_a = Rigid3::exp(xi_ba);
   const Rigid3 left = Rigid3::exp(b_from_a.adjoint() * xi_a) * b_from_a;
   EXPECT_TRUE(left.matrix().isApprox((b_from_a * Rigid3::exp(xi_a)).matrix(), 1e-12));
@@ -111,7 +111,7 @@ TEST(Sim3, ExpIsTheMatrixExponentialAndLogInvertsIt) {
   for (const double angle : angles()) {
     for (const double sigma : {-3.0, -0.1, -1e-9, 0.0, 1e-5, 0.7, 3.0}) {
       Vector7d xi;
-      xi << random_vector(rng), angle * random_vector(rng).normalized(), sigma;
+      xi << small_vector(rng), angle * small_vector(rng).normalized(), sigma;
       Eigen::Matrix4d generator = Eigen::Matrix4d::Zero();
       generator.topLeftCorner<3, 3>() =
           skew(xi.segment<3>(3)) + sigma * Eigen::Matrix3d::Identity();
@@ -130,17 +130,17 @@ TEST(Sim3, ExpIsTheMatrixExponentialAndLogInvertsIt) {
 TEST(Sim3, ComposesAndInverts) {
   Rng rng(9, 0);
   Vector7d xi_ba, xi_cb;
-  xi_ba << random_vector(rng), random_vector(rng), 0.4;
-  xi_cb << random_vector(rng), random_vector(rng), -0.9;
+  xi_ba << small_vector(rng), small_vector(rng), 0.4;
+  xi_cb << small_vector(rng), small_vector(rng), -0.9;
   const Sim3 b_from_a = Sim3::exp(xi_ba), c_from_b = Sim3::exp(xi_cb);
-  const Eigen::Vector3d point_in_a = random_vector(rng);
+  const Eigen::Vector3d point_in_a = small_vector(rng);
   EXPECT_TRUE(((c_from_b * b_from_a) * point_in_a).isApprox(c_from_b * (b_from_a * point_in_a)));
   EXPECT_TRUE((b_from_a.inverse() * (b_from_a * point_in_a)).isApprox(point_in_a));
 }
 
 Sim3 random_sim3(Rng& rng, double angle, double sigma) {
   Vector7d xi;
-  xi << random_vector(rng), angle * random_vector(rng).normalized(), sigma;
+  xi << small_vector(rng), angle * small_vector(rng).normalized(), sigma;
   return Sim3::exp(xi);
 }
 
@@ -149,7 +149,7 @@ TEST(Sim3, AdjointMovesAPerturbationToTheOtherSide) {
   for (int i = 0; i < 20; ++i) {
     const Sim3 b_from_a = random_sim3(rng, 1.5, rng.normal());
     Vector7d xi_a;
-    xi_a << random_vector(rng), random_vector(rng), 0.5 * rng.normal();
+    xi_a << small_vector(rng), small_vector(rng), 0.5 * rng.normal();
     const Sim3 left = Sim3::exp(b_from_a.adjoint() * xi_a) * b_from_a;
     const Sim3 right = b_from_a * Sim3::exp(xi_a);
     EXPECT_LT((left * right.inverse()).log().norm(), 1e-12);
