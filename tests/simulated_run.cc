@@ -13,8 +13,6 @@
 namespace waymark {
 namespace {
 
-constexpr double kDepthFactor = 5000.0;
-
 CameraDescription small_camera() {
   CameraDescription camera;
   camera.camera_model = "pinhole";

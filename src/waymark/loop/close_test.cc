@@ -53,7 +53,9 @@ double median_residual(const Map& map) {
   return median(residuals);
 }
 
-Vector7d drift_of(const Eigen::Vector3d& translation, const Eigen::Vector3d& turn, double scale) {
+Vector7d whole_drift(const Eigen::Vector3d& translation,
+                     const Eigen::Vector3d& turn,
+                     double scale) {
   Vector7d drift;
   drift << translation, turn, std::log(scale);
   return drift;
@@ -72,7 +74,7 @@ class LoopClosingTest : public ::testing::Test {
 
 TEST_F(LoopClosingTest, ClosesALoopWithDriftOfTheScale) {
   LoopScene scene(
-      cloud_all_round(kNumPoints), false, drift_of({0.3, 0.1, 0.0}, {0.02, 0.1, -0.02}, 1.3));
+      cloud_all_round(kNumPoints), false, whole_drift({0.3, 0.1, 0.0}, {0.02, 0.1, -0.02}, 1.3));
   const Revisit revisit = walk_until_found(scene, 0);
   const double error_before = error_of(scene);
   const double residual_before = median_residual(scene.map);
@@ -90,7 +92,7 @@ TEST_F(LoopClosingTest, ClosesALoopWithDriftOfTheScale) {
 }
 
 TEST_F(LoopClosingTest, SpreadsTheDriftEvenly) {
-  LoopScene scene(cloud_all_round(kNumPoints), false, drift_of({0, 0, 0}, {0, 0, 0}, 1.3));
+  LoopScene scene(cloud_all_round(kNumPoints), false, whole_drift({0, 0, 0}, {0, 0, 0}, 1.3));
   const Revisit revisit = walk_until_found(scene, 0);
   const MapCorrection correction =
       spread_drift(scene.map, {revisit.match, revisit.query, revisit.query_from_match});
@@ -104,7 +106,7 @@ TEST_F(LoopClosingTest, SpreadsTheDriftEvenly) {
 
 TEST_F(LoopClosingTest, ClosesALoopOfAMetricMapWithoutResizingIt) {
   LoopScene scene(
-      cloud_all_round(kNumPoints), true, drift_of({0.3, 0.1, 0.2}, {0.02, 0.08, -0.02}, 1.0));
+      cloud_all_round(kNumPoints), true, whole_drift({0.3, 0.1, 0.2}, {0.02, 0.08, -0.02}, 1.0));
   const Revisit revisit = walk_until_found(scene, 0);
   const double error_before = error_of(scene);
   close(scene, revisit);
@@ -114,7 +116,7 @@ TEST_F(LoopClosingTest, ClosesALoopOfAMetricMapWithoutResizingIt) {
 }
 
 TEST_F(LoopClosingTest, FusesWhatIsSeenFromBothSides) {
-  LoopScene scene(cloud_all_round(kNumPoints), false, drift_of({0.3, 0, 0}, {0, 0.1, 0}, 1.1));
+  LoopScene scene(cloud_all_round(kNumPoints), false, whole_drift({0.3, 0, 0}, {0, 0.1, 0}, 1.1));
   const Revisit revisit = walk_until_found(scene, 0);
   const std::size_t num_before = scene.map.landmarks().size();
   EXPECT_TRUE(scene.map.covisible(revisit.query).back().keyframe.value > 20u);
@@ -134,7 +136,7 @@ TEST_F(LoopClosingTest, FusesWhatIsSeenFromBothSides) {
 }
 
 TEST_F(LoopClosingTest, KeepsOldLoopsClosed) {
-  LoopScene scene(cloud_all_round(kNumPoints), false, drift_of({0.3, 0, 0}, {0, 0.1, 0}, 1.2));
+  LoopScene scene(cloud_all_round(kNumPoints), false, whole_drift({0.3, 0, 0}, {0, 0.1, 0}, 1.2));
   close(scene, walk_until_found(scene, 0));
   const double error_before = error_of(scene);
   // The same loop again, measured a little differently.

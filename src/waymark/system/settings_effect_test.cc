@@ -35,7 +35,7 @@ std::shared_ptr<const Features> features_with(const std::vector<std::string>& as
   return system.details().features;
 }
 
-struct Session {
+struct EffectRun {
   std::vector<TrackingResult> results;           ///< Per frame.
   std::vector<std::shared_ptr<const Map>> maps;  ///< What each frame saw.
   std::shared_ptr<const Map> map;                ///< At the end.
@@ -52,9 +52,9 @@ struct Session {
 
 enum class Sensor { kDepth, kMono };
 
-Session play(const std::vector<std::string>& assignments, Sensor sensor = Sensor::kDepth) {
+EffectRun play(const std::vector<std::string>& assignments, Sensor sensor = Sensor::kDepth) {
   System system(small_rig(), settings_with(assignments), Timing::kInline);
-  Session session;
+  EffectRun session;
   for (const SimulatedFrame& frame : frames()) {
     FrameImages input = input_of(frame);
     if (sensor == Sensor::kMono) input.depth = {};
@@ -67,7 +67,7 @@ Session play(const std::vector<std::string>& assignments, Sensor sensor = Sensor
   return session;
 }
 
-bool same_bits(const Session& a, const Session& b) {
+bool same_bits(const EffectRun& a, const EffectRun& b) {
   return std::equal(a.trajectory.begin(),
                     a.trajectory.end(),
                     b.trajectory.begin(),
@@ -78,7 +78,7 @@ bool same_bits(const Session& a, const Session& b) {
 }
 
 TEST(SettingsEffect, SeedChangesWhatIsDrawn) {
-  const Session first = play({"seed=1"}, Sensor::kMono);
+  const EffectRun first = play({"seed=1"}, Sensor::kMono);
   ASSERT_GT(first.trajectory.size(), 15u);
   EXPECT_TRUE(same_bits(first, play({"seed=1"}, Sensor::kMono)));
   const bool differs = !same_bits(first, play({"seed=2"}, Sensor::kMono)) ||
@@ -88,7 +88,7 @@ TEST(SettingsEffect, SeedChangesWhatIsDrawn) {
 
 TEST(SettingsEffect, MapLatencySaysWhenAKeyframeShows) {
   for (const int latency : {1, 2, 5}) {
-    const Session session = play({"map_latency=" + std::to_string(latency)});
+    const EffectRun session = play({"map_latency=" + std::to_string(latency)});
     const std::vector<int> keyframes = session.keyframes();
     ASSERT_GE(keyframes.size(), 3u);
     // The first begins the map, which is needed at once.
@@ -182,14 +182,14 @@ TEST(SettingsEffect, ViewSaysWhereFeaturesMayBe) {
 }
 
 TEST(SettingsEffect, MinInliersIsWhatAPoseMustRestOn) {
-  const Session usual = play({});
+  const EffectRun usual = play({});
   int fewest = 1000;
   for (std::size_t i = 1; i < usual.results.size(); ++i) {
     ASSERT_EQ(usual.results[i].state, FrameState::kTracked) << i;
     fewest = std::min(fewest, usual.results[i].num_inliers);
   }
   ASSERT_LT(fewest, 480);
-  const Session strict = play({"tracking.min_inliers=490"});
+  const EffectRun strict = play({"tracking.min_inliers=490"});
   for (std::size_t i = 1; i < strict.results.size(); ++i) {
     if (strict.results[i].state != FrameState::kTracked) continue;
     EXPECT_GE(strict.results[i].num_inliers, 490);
@@ -227,7 +227,7 @@ TEST(SettingsEffect, KeyframesComeAtLastWhileTheCameraMoves) {
 }
 
 /// The last frame at which a keyframe's pose in the map changed.
-int last_move(const Session& session, KeyframeId id) {
+int last_move(const EffectRun& session, KeyframeId id) {
   int last = -1;
   for (std::size_t i = 1; i < session.maps.size(); ++i) {
     const auto& before = session.maps[i - 1]->keyframes();
@@ -241,14 +241,14 @@ int last_move(const Session& session, KeyframeId id) {
 
 TEST(SettingsEffect, WindowKeyframesAreThoseThatMove) {
   const std::string often = "tracking.keyframe_parallax_px=3";
-  const Session narrow = play({often, "mapping.window_keyframes=2"});
-  const Session wide = play({often, "mapping.window_keyframes=20"});
+  const EffectRun narrow = play({often, "mapping.window_keyframes=2"});
+  const EffectRun wide = play({often, "mapping.window_keyframes=20"});
   ASSERT_GE(narrow.keyframes().size(), 5u);
   EXPECT_LT(last_move(narrow, KeyframeId{1}) + 4, last_move(wide, KeyframeId{1}));
 }
 
 /// A mask that leaves the columns from first to end.
-Image columns(int first, int end) {
+Image mask_of_columns(int first, int end) {
   Image mask(320, 240);
   for (int v = 0; v < mask.height_px; ++v) std::fill(mask.row(v) + first, mask.row(v) + end, 255);
   return mask;
@@ -264,7 +264,7 @@ struct Reunion {
 /// Stands still at the end, so that nothing else happens.
 Reunion play_reunion(const std::vector<std::string>& assignments) {
   const Settings settings = settings_with(assignments);
-  const Image right = columns(150, 320), left = columns(0, 140);
+  const Image right = mask_of_columns(150, 320), left = mask_of_columns(0, 140);
   System first(small_rig(), settings, Timing::kInline);
   for (const SimulatedFrame& frame : frames()) {
     FrameImages input = input_of(frame);
