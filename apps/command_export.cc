@@ -13,11 +13,10 @@
 #include "commands.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/exchange/export_colmap.h"
-#include "waymark/exchange/export_nerfstudio.h"
-#include "waymark/exchange/export_ply.h"
 #include "waymark/exchange/export_scene.h"
 #include "waymark/exchange/export_split.h"
+#include "waymark/exchange/exports.h"
+#include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {

@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "commands.h"
-#include "map_tasks.h"
 #include "waymark/base/check.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/session/merging.h"
 
 namespace waymark {
 namespace {
@@ -102,6 +102,54 @@ void add_task(CLI::App& maps,
   CLI::App& added = *maps.add_subcommand(name, help);
   added.add_option("MAP", *path, "Map file (.wmap)")->required();
   added.callback([path, task, &command] { command = [path, task] { return task(*path); }; });
+}
+
+struct MergeOptions {
+  std::filesystem::path a;
+  std::filesystem::path b;
+  std::filesystem::path out;
+  std::uint64_t seed = 0;
+};
+
+void report(const MergeOptions& options, const MergedStored& merged) {
+  if (merged.num_joins == 0) {
+    fmt::print("{} and {}: no overlap found, kept as {} separate sub-maps\n",
+               options.a.string(),
+               options.b.string(),
+               merged.num_parts);
+    if (merged.is_incomparable) {
+      fmt::print("one is in metres, the scale of the other is free: map align makes it metres\n");
+    }
+  } else {
+    fmt::print("joined: {} sub-maps are {} now, {} further places were seen in both\n",
+               merged.num_parts_before,
+               merged.num_parts,
+               merged.num_loops);
+  }
+  fmt::print("{}: {} keyframes, {} landmarks, {} sub-map{}\n",
+             options.out.string(),
+             merged.stored.map->keyframes().size(),
+             merged.stored.map->landmarks().size(),
+             merged.num_parts,
+             merged.num_parts == 1 ? "" : "s");
+}
+
+int merge_files(const MergeOptions& options) {
+  const MergedStored merged = merge_stored(load_map(options.a), load_map(options.b), options.seed);
+  save_map(options.out, merged.stored);
+  report(options, merged);
+  return kDone;
+}
+
+void add_merge_task(CLI::App& maps, Command& command) {
+  const auto options = std::make_shared<MergeOptions>();
+  CLI::App& merge = *maps.add_subcommand(
+      "merge", "Put two maps into one file and join what shows the same places");
+  merge.add_option("A", options->a, "Map file (.wmap); the result is in its frame")->required();
+  merge.add_option("B", options->b, "Map file (.wmap)")->required();
+  merge.add_option("-o,--out", options->out, "Map file to write")->required();
+  merge.add_option("--seed", options->seed, "Of random numbers [0]");
+  merge.callback([options, &command] { command = [options] { return merge_files(*options); }; });
 }
 
 }  // namespace

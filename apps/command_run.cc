@@ -18,7 +18,6 @@
 #include "waymark/session/autosave.h"
 #include "waymark/session/image_keeper.h"
 #include "waymark/session/live_input.h"
-#include "waymark/session/paced_input.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
 
@@ -71,27 +70,6 @@ void report_focal_check(Reporter& reporter, const FocalCheck& check) {
   }
 }
 
-/// An input at its own pace, if it has one or is given one.
-class TimedInput {
- public:
-  TimedInput(Input& input, double pace, Timing timing, const std::atomic<bool>& is_paused)
-      : input_(&input) {
-    const auto is_halted = [&is_paused] { return is_paused.load(std::memory_order_relaxed); };
-    if (pace > 0.0) input_ = &paced_.emplace(*input_, pace, is_interrupted, is_halted);
-    const bool has_own_time = pace > 0.0 || input.info().is_live;
-    if (has_own_time && timing == Timing::kRealtime) {
-      input_ = &arriving_.emplace(*input_, is_interrupted, is_halted);
-    }
-  }
-
-  Input& get() { return *input_; }
-
- private:
-  Input* input_;
-  std::optional<PacedInput> paced_;
-  std::optional<LiveInput> arriving_;
-};
-
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
 FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
   return
@@ -116,7 +94,7 @@ SessionResults map_input(
   hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
-    hooks.on_result = [live](const FrameInput& frame, const TrackingResult& result) {
+    hooks.on_result = [live](const FrameImages& frame, const TrackingResult& result) {
       live->show(frame, result);
     };
     hooks.on_input_end = [live] { live->finishing(); };
@@ -170,7 +148,11 @@ int run(RunOptions options, Reporter& reporter) {
     remove_abandoned_parts(options.map_out);
   }
   std::atomic<bool> is_paused{false};
-  TimedInput input(*session.input, options.pace, options.session.timing, is_paused);
+  TimedInput input(*session.input,
+                   options.pace,
+                   options.session.timing == Timing::kRealtime,
+                   is_interrupted,
+                   [&is_paused] { return is_paused.load(std::memory_order_relaxed); });
   ImageKeeper images(
       input.get(), [&] { return session.system->map(); }, std::move(session.images));
   Autosave autosave(options.map_out,

@@ -37,4 +37,7 @@ inline constexpr int kCouldNotFinish = 1;  ///< Internal failure, or output cann
 inline constexpr int kBadInput = 2;        ///< Bad usage, settings or input.
 inline constexpr int kNoPose = 3;          ///< Ran, but found no pose at all.
 
+/// What `map` has besides; adds one subcommand to it.
+void add_align_task(CLI::App& maps, Command& command);
+
 }  // namespace waymark

@@ -74,7 +74,7 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
     const std::string state =
         fmt::format("{}{}{}{}",
                     to_string(frame.state),
-                    frame.submap ? fmt::format(" in sub-map {}", *frame.submap) : "",
+                    frame.submap.is_valid() ? fmt::format(" in sub-map {}", frame.submap.value) : "",
                     has_reason ? ": " : "",
                     has_reason ? to_string(frame.reason) : "");
     if (frame.state == FrameState::kUnreadable) {

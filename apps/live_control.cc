@@ -25,14 +25,14 @@ LiveControl::LiveControl(const ViewerOptions& options,
       viewer_(options, std::move(info)),
       publisher_(viewer_, num_frames) {}
 
-void LiveControl::show(const FrameInput& input, const TrackingResult& result) {
+void LiveControl::show(const FrameImages& input, const TrackingResult& result) {
   publisher_.tell(system_, input, result);
 }
 
 void LiveControl::show(const FrameRecord& record) {
   const bool was_fed =
       record.state != FrameState::kUnreadable && record.state != FrameState::kDropped;
-  if (!was_fed) publisher_.skip(record.state, record.reason);
+  if (!was_fed) publisher_.skip(record);
 }
 
 bool LiveControl::should_stop(const std::function<bool()>& is_interrupted) {

@@ -32,7 +32,7 @@ class LiveControl {
 
   std::string url() const { return viewer_.url(); }
   /// A frame was fed.
-  void show(const FrameInput& input, const TrackingResult& result);
+  void show(const FrameImages& input, const TrackingResult& result);
   /// A frame is done; for those that were not fed.
   void show(const FrameRecord& record);
   /// Does what was asked for since; while paused it only returns to say that all is over.

@@ -11,11 +11,11 @@
 #include <tuple>
 #include <vector>
 
-#include "map_tasks.h"
+#include "commands.h"
 #include "waymark/base/check.h"
-#include "waymark/exchange/export_scene.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
+#include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
@@ -30,13 +30,6 @@ struct AlignOptions {
   std::filesystem::path trajectory;
   std::vector<double> up;
 };
-
-/// Moves a sub-map; it is in metres from then on if it was or gets its scale now.
-Map moved(Map map, SubmapId submap, const Sim3& new_from_old, bool gives_scale) {
-  transform_submap(map, submap, new_from_old);
-  if (!gives_scale || map.submaps()[submap.value].is_metric) return map;
-  return declare_metric(map, submap);
-}
 
 SubmapId submap_of(const Map& map, std::uint32_t id) {
   const Keyframe* keyframe = map.keyframes().find(KeyframeId{id});
@@ -75,53 +68,34 @@ Map scale(Map map, const AlignOptions& options) {
   if (!factor)
     throw InputError("--distance", "is between keyframes at the same place, expected two");
   fmt::print("sub-map {}: scaled by {:.6g}, now in metres\n", submap->value, *factor);
-  return moved(std::move(map),
-               *submap,
-               {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor},
-               true);
-}
-
-/// What was read, in the form that the fit takes.
-struct TrajectoryColumns {
-  std::vector<std::int64_t> timestamps_ns;
-  std::vector<Rigid3> poses;
-};
-
-TrajectoryColumns read(const std::filesystem::path& path) {
-  TrajectoryColumns trajectory;
-  for (const StampedPose& pose : read_trajectory(path)) {
-    trajectory.timestamps_ns.push_back(pose.timestamp_ns);
-    trajectory.poses.push_back(pose.world_from_camera);
-  }
-  return trajectory;
+  return put_into_metres(
+      std::move(map), *submap, {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor});
 }
 
 Map fit(Map map, const AlignOptions& options) {
-  const TrajectoryColumns trajectory = read(options.trajectory);
-  std::string report;
-  int num_aligned = 0;
-  for (const SubmapId submap : submaps_by_size(map)) {
-    const auto found = fit_trajectory(map,
-                                      submap,
-                                      {trajectory.timestamps_ns, trajectory.poses},
-                                      kMaxDifferenceNs,
-                                      !has_measured_ranges(map, submap));
-    if (!found) {
-      report += fmt::format(
-          "sub-map {}: stays as it is, no three of its keyframes off a line have a pose\n",
-          submap.value);
-      continue;
-    }
-    report +=
-        fmt::format("sub-map {}: {} keyframes with a pose, {:.3g} m rms off, scaled by {:.6g}\n",
-                    submap.value,
-                    found->num_keyframes,
-                    found->rms_m,
-                    found->trajectory_from_map.scale);
-    map = moved(std::move(map), submap, found->trajectory_from_map, true);
-    ++num_aligned;
+  std::vector<std::int64_t> timestamps_ns;
+  std::vector<Rigid3> poses;
+  for (const StampedPose& pose : read_trajectory(options.trajectory)) {
+    timestamps_ns.push_back(pose.timestamp_ns);
+    poses.push_back(pose.world_from_camera);
   }
-  if (num_aligned == 0) {
+  std::string report;
+  bool has_fit = false;
+  for (const auto& [submap, found] : fit_submaps(map, {timestamps_ns, poses}, kMaxDifferenceNs)) {
+    has_fit = has_fit || found;
+    report +=
+        found
+            ? fmt::format(
+                  "sub-map {}: {} keyframes with a pose, {:.3g} m rms off, scaled by {:.6g}\n",
+                  submap.value,
+                  found->num_keyframes,
+                  found->rms_m,
+                  found->trajectory_from_map.scale)
+            : fmt::format(
+                  "sub-map {}: stays as it is, no three of its keyframes off a line have a pose\n",
+                  submap.value);
+  }
+  if (!has_fit) {
     throw InputError(options.trajectory.string(),
                      "has no poses at the times of keyframes, expected three or more, not all on a "
                      "line, within 0.02 s");
@@ -141,7 +115,8 @@ Map level(Map map, const AlignOptions& options) {
   for (std::size_t i = 1; i < submaps.size(); ++i) {
     fmt::print("sub-map {}: stays as it is, having a frame of its own\n", submaps[i].value);
   }
-  return moved(std::move(map), submaps[0], {turn_upright(up), Eigen::Vector3d::Zero(), 1.0}, false);
+  transform_submap(map, submaps[0], {turn_upright(up), Eigen::Vector3d::Zero(), 1.0});
+  return map;
 }
 
 int align(const AlignOptions& options) {

@@ -7,7 +7,9 @@ find_package(yaml-cpp REQUIRED)
 find_package(fmt REQUIRED)
 find_package(CLI11 REQUIRED)
 find_package(nlohmann_json REQUIRED)
-find_path(MSGPACK_INCLUDE_DIR msgpack.hpp REQUIRED) # Its CMake package has another name in each distribution.
+if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_FUZZERS)
+  find_path(MSGPACK_INCLUDE_DIR msgpack.hpp REQUIRED) # Its CMake package has another name in each distribution.
+endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
 if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_BENCHMARKS)

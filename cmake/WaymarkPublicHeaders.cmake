@@ -11,20 +11,16 @@ set(roots
   camera/rig.h
   camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
   evaluate/evaluation.h
-  image/color.h # colour to grey
-  image/depth_units.h # depth from metres
-  image/image.h
-  input/decode.h # images
-  exchange/export_colmap.h
-  exchange/export_nerfstudio.h
-  exchange/export_ply.h
-  input/input.h # data sets, folders, video files and devices
-  input/listing.h
-  mapfile/map_file.h
-  input/mask.h
+  exchange/exports.h # COLMAP, nerfstudio, PLY
   exchange/results.h
   exchange/trajectory.h
+  image/convert.h # colour to grey, depth from metres
+  image/image.h
+  input/decode.h # images
+  input/input.h # data sets, folders, video files and devices
+  input/listing.h
   map/map.h
+  mapfile/map_file.h
   simulate/sequence.h # rendered sequences with their truth, to test with
   system/localizer.h
   system/settings.h

@@ -72,7 +72,7 @@ int follow(const char* path, const char* camchain) {
   std::shared_ptr<const Map> map = system.map();
   while (const std::optional<InputFrame> images = input->next()) {
     if (images->fault != FrameFault::kNone) continue;
-    FrameInput frame;
+    FrameImages frame;
     frame.timestamp_ns = images->timestamp_ns;
     frame.image0 = images->images[0].view();
     if (images->images.size() > 1) frame.image1 = images->images[1].view();

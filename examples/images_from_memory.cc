@@ -59,7 +59,7 @@ int map_stream(const char* camchain, double rate_hz) {
   System system(rig, Settings(), Timing::kLockstep);
 
   std::vector<std::uint8_t> pixels(static_cast<std::size_t>(width_px * height_px));
-  FrameInput frame;
+  FrameImages frame;
   // An own image type needs no copy: a pointer, the size, and how far apart rows begin.
   frame.image0 = ImageView{pixels.data(), width_px, height_px, width_px};
   const auto interval_ns = static_cast<std::int64_t>(1e9 / rate_hz);

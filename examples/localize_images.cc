@@ -59,7 +59,7 @@ int localize(const char* map, const char* camchain, std::span<char*> images) {
   for (const char* path : images) {
     const std::optional<Image> image = read_grey_image(path);
     if (!image) throw InputError(path, "is missing or no image, expected png, jpg or the like");
-    FrameInput frame;
+    FrameImages frame;
     frame.image0 = image->view();
     // For a stream track() is better, which looks near the frame before first.
     const TrackingResult result = localizer.locate(frame);

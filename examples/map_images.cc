@@ -33,7 +33,7 @@ int map_images(const char* folder, const char* camchain) {
   // kLockstep maps in a thread of its own and still gives the same bits in every run.
   System system(make_rig(*chain), Settings(), Timing::kLockstep);
 
-  FrameInput frame;
+  FrameImages frame;
   for (const std::filesystem::path& path : list_images(folder)) {
     frame.timestamp_ns += kFrameIntervalNs;
     const std::optional<Image> image = read_grey_image(path);

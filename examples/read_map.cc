@@ -11,8 +11,8 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/exchange/export_ply.h"
 #include "waymark/exchange/export_scene.h"
+#include "waymark/exchange/exports.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace {

@@ -56,7 +56,7 @@ int map_simulated(int num_frames) {
   for (int i = 0; i < num_frames; ++i) {
     const SimulatedFrame simulated = sequence.frame(i);
     truth.push_back({simulated.timestamp_ns, simulated.world_from_rig});
-    FrameInput frame;
+    FrameImages frame;
     frame.timestamp_ns = simulated.timestamp_ns;
     frame.image0 = simulated.images[0].view();
     frame.image1 = simulated.images[1].view();  // With depth images it would be frame.depth.

@@ -24,7 +24,7 @@ std::optional<FocalCheck> check_with(const char* name, double factor) {
   recording.rig = make_rig(mono_chain(camera));
   System system(recording.rig, recording.settings, Timing::kLockstep);
   for (const InputFrame& frame : recording.frames) {
-    FrameInput input;
+    FrameImages input;
     input.timestamp_ns = frame.timestamp_ns;
     input.image0 = frame.images[0].view();
     system.feed(input);

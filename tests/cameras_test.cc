@@ -15,7 +15,6 @@ namespace {
 
 constexpr int kNumCameraFrames = 60;
 constexpr int kCameraHeightPx = 300;
-constexpr double kDepthFactor = 5000.0;
 
 struct CameraCase {
   const char* camera;

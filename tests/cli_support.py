@@ -1,7 +1,9 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """What the tests of the command line share: running the program, and small sequences to feed it."""
+import atexit
 import csv
+import functools
 import json
 import os
 import pathlib
@@ -56,11 +58,39 @@ def truncate(path):
     path.write_bytes(path.read_bytes()[:path.stat().st_size // 2])
 
 
-class CliTest(unittest.TestCase):
-    """A folder per test, and simulated sequences made once per program run."""
+@functools.cache
+def shared_folder():
+    """For what programs of tests share during one run of ctest, or for this program alone."""
+    shared = os.environ.get("WAYMARK_SHARED")
+    if not shared:
+        shared = tempfile.mkdtemp(prefix="waymark_sequences_")
+        atexit.register(shutil.rmtree, shared)
+    folder = pathlib.Path(shared)
+    folder.mkdir(parents=True, exist_ok=True)
+    return folder
 
-    _shared = None
-    _sequences = {}
+
+def shared_sequence(setup):
+    """A short simulated sequence, made by the first test that needs it; not to be changed."""
+    made = shared_folder() / setup
+    if not made.exists():
+        own = pathlib.Path(tempfile.mkdtemp(dir=shared_folder()))
+        camera = own / "camera.yaml"
+        camera.write_text(CAMERA)
+        done = waymark("simulate", "room", "--motion", "slide", "--camera", camera, "--setup", setup,
+                       "--frames", NUM_FRAMES, "-o", own / setup)
+        assert done.returncode == 0, done.stderr
+        try:
+            os.rename(own / setup, made)
+        except OSError:  # Another program has just made it, too.
+            if not made.exists():
+                raise
+        shutil.rmtree(own)
+    return made
+
+
+class CliTest(unittest.TestCase):
+    """A folder per test, and simulated sequences made once for all programs of tests."""
 
     def setUp(self):
         self._folder = tempfile.TemporaryDirectory(prefix="waymark_test_")
@@ -72,18 +102,8 @@ class CliTest(unittest.TestCase):
 
     def sequence(self, setup):
         """A copy, free to be damaged, of a simulated sequence."""
-        if CliTest._shared is None:
-            CliTest._shared = tempfile.TemporaryDirectory(prefix="waymark_sequences_")
-        if setup not in CliTest._sequences:
-            made = pathlib.Path(CliTest._shared.name) / setup
-            camera = pathlib.Path(CliTest._shared.name) / "camera.yaml"
-            camera.write_text(CAMERA)
-            done = waymark("simulate", "room", "--motion", "slide", "--camera", camera, "--setup",
-                           setup, "--frames", NUM_FRAMES, "-o", made)
-            self.assertEqual(done.returncode, 0, done.stderr)
-            CliTest._sequences[setup] = made
         copy = self.folder / f"input_{setup}"
-        shutil.copytree(CliTest._sequences[setup], copy)
+        shutil.copytree(shared_sequence(setup), copy)
         return copy
 
     def images(self, folder):

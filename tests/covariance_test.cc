@@ -24,7 +24,7 @@ std::vector<ReportedPose> track(const Recording& recording) {
   std::vector<ReportedPose> poses;
   for (std::size_t i = 0; i < recording.frames.size(); ++i) {
     const InputFrame& frame = recording.frames[i];
-    FrameInput input;
+    FrameImages input;
     input.timestamp_ns = frame.timestamp_ns;
     input.image0 = frame.images[0].view();
     if (frame.images.size() > 1) input.image1 = frame.images[1].view();

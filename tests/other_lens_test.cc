@@ -126,7 +126,7 @@ std::shared_ptr<const Map> map_frames(const Rig& rig,
                                       const std::vector<AtriumFrame>& frames) {
   System system(rig, settings, Timing::kLockstep);
   for (const AtriumFrame& frame : frames) {
-    FrameInput input;
+    FrameImages input;
     input.timestamp_ns = frame.timestamp_ns;
     input.image0 = frame.image.view();
     system.feed(input);
@@ -185,8 +185,8 @@ class Score {
   std::vector<double> errors_deg_;
 };
 
-FrameInput input_of(const AtriumFrame& frame, const Image& image) {
-  FrameInput input;
+FrameImages input_of(const AtriumFrame& frame, const Image& image) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = image.view();
   return input;

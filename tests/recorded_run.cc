@@ -33,8 +33,7 @@ RecordedResults map_recorded(const std::filesystem::path& folder,
   Session session = open_session(options);
 
   RecordedResults results;
-  results.session = run_session(
-      *session.input, *session.system, [] { return false; }, [](const FrameRecord&) {});
+  results.session = run_session(*session.input, *session.system);
   EvaluationOptions evaluation;
   evaluation.alignment =
       setup == Setup::kMono ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSe3;

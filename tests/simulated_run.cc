@@ -13,8 +13,6 @@
 namespace waymark {
 namespace {
 
-constexpr double kDepthFactor = 5000.0;
-
 CameraDescription small_camera() {
   CameraDescription camera;
   camera.camera_model = "pinhole";
@@ -135,8 +133,7 @@ Recording simulate(const CameraDescription& camera, const Motion& motion) {
 SessionResults map_recording(const Recording& recording, Timing timing) {
   RecordingInput input(recording);
   System system(recording.rig, recording.settings, timing);
-  return run_session(
-      input, system, [] { return false; }, [](const FrameRecord&) {});
+  return run_session(input, system);
 }
 
 double coverage(const SessionResults& results) {

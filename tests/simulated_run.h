@@ -17,6 +17,9 @@
 
 namespace waymark {
 
+/// Units of depth per metre in the sequences here.
+constexpr double kDepthFactor = 5000.0;
+
 /// A sequence held in memory, with its truth.
 struct Recording {
   Rig rig;

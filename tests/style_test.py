@@ -25,7 +25,9 @@ class Style(unittest.TestCase):
         self.root = pathlib.Path(folder.name)
         self.write("CMakeLists.txt", "foreach(module base map track\n    simulate)\nendforeach()\n")
         self.write("src/waymark/map/CMakeLists.txt", "waymark_module(map SOURCES map.cc TESTS map_test.cc\n"
-                   "  LINK waymark_base\n  TEST_LINK opencv_core waymark_simulate)\n")
+                   "  LINK waymark_base\n  TEST_LINK opencv_core waymark_simulated_points)\n")
+        self.write("src/waymark/simulate/CMakeLists.txt", "waymark_module(simulate SOURCES world.cc)\n"
+                   "add_library(waymark_simulated_points STATIC testing/points.cc)\n")
         self.write("src/waymark/map/map.h", HEADER + '#include "waymark/base/id.h"\n\nstruct Map {\n  int size;\n};\n')
 
     def write(self, name, text):

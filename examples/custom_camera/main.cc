@@ -40,7 +40,7 @@ Evaluation map_simulated(SimulatedSequence& sequence, const Settings& settings) 
   for (int i = 0; i < sequence.num_frames(); ++i) {
     const SimulatedFrame frame = sequence.frame(i);
     truth.push_back({frame.timestamp_ns, frame.world_from_rig});
-    FrameInput input;
+    FrameImages input;
     input.timestamp_ns = frame.timestamp_ns;
     input.image0 = frame.images[0].view();
     system.feed(input);

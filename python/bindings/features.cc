@@ -58,7 +58,7 @@ py::array bearings(const PythonFeatures& self) {
   return view_of(first, {static_cast<py::ssize_t>(values.size()), 3}, self.features);
 }
 
-py::array landmarks(const PythonFeatures& self) {
+py::array landmark_ids(const PythonFeatures& self) {
   const auto& ids = *self.landmarks;
   const std::uint32_t* first = ids.empty() ? nullptr : &ids.front().value;
   return view_of(first, {static_cast<py::ssize_t>(ids.size())}, self.owner);
@@ -111,7 +111,7 @@ found in camera 1, which have none and belong to one of camera 0. len() gives th
       .get("landmarks",
            "uint32 array (N,): id of the landmark that it shows, or NO_ID; of a frame's details "
            "empty where it recognised none.",
-           &landmarks);
+           &landmark_ids);
   bind_frame_details(module);
 }
 

@@ -6,8 +6,7 @@
 #include <string>
 
 #include "arrays.h"
-#include "waymark/image/color.h"
-#include "waymark/image/depth_units.h"
+#include "waymark/image/convert.h"
 
 namespace waymark::python {
 namespace {
@@ -81,8 +80,8 @@ FrameArguments::FrameArguments(const ImageArguments& images,
   if (!images.mask.is_none()) input_.mask = add_mask(images.mask);
 }
 
-FrameInput FrameArguments::input(std::int64_t timestamp_ns) const {
-  FrameInput input = input_;
+FrameImages FrameArguments::input(std::int64_t timestamp_ns) const {
+  FrameImages input = input_;
   input.timestamp_ns = timestamp_ns;
   return input;
 }

@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/image/color.h"
+#include "waymark/image/convert.h"
 #include "waymark/image/depth.h"
 #include "waymark/input/input.h"
 #include "waymark/system/system.h"
@@ -40,7 +40,7 @@ class FrameArguments {
   FrameArguments(const FrameArguments&) = delete;
   FrameArguments& operator=(const FrameArguments&) = delete;
 
-  FrameInput input(std::int64_t timestamp_ns) const;
+  FrameImages input(std::int64_t timestamp_ns) const;
   bool has_depth() const { return !input_.depth.is_empty(); }
 
  private:
@@ -51,7 +51,7 @@ class FrameArguments {
   std::vector<py::array> borrowed_;
   std::vector<Image> grey_;
   DepthImage depth_;
-  FrameInput input_;
+  FrameImages input_;
 };
 
 }  // namespace waymark::python

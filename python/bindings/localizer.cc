@@ -28,7 +28,7 @@ class PythonLocalizer {
   TrackingResult track(const py::object& timestamp_ns, const ImageArguments& images) {
     const Turn turn(is_taken_, "Localizer");
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
-    const FrameInput input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+    const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
     const py::gil_scoped_release release;
     return localizer_.track(input);
   }

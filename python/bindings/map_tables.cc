@@ -14,6 +14,7 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "waymark/exchange/export_scene.h"
+#include "waymark/map/parts.h"
 
 namespace waymark::python {
 namespace {

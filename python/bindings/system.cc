@@ -79,7 +79,7 @@ TrackingResult PythonSystem::feed(const py::object& timestamp_ns, const ImageArg
   if (config_.setup == Setup::kRgbd && !frame.has_depth() && system_.frame_states().empty()) {
     fail_value("depth", images.depth, "the depth of the first frame in setup rgbd");
   }
-  const FrameInput input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+  const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
   TrackingResult result;
   {
     const py::gil_scoped_release release;

@@ -4,6 +4,8 @@
 
 #include <string_view>
 
+#include "waymark/base/id.h"
+
 namespace waymark {
 
 /// What became of one input frame.
@@ -28,6 +30,17 @@ enum class FrameReason {
   kUnreadableImage,
   kWrongSize,
   kLate,
+};
+
+/// What became of a frame, in short.
+struct FrameStatus {
+  FrameState state = FrameState::kLost;     ///< What became of it.
+  FrameReason reason = FrameReason::kNone;  ///< Why it has no pose.
+  /// Landmarks found in the image; without a pose, of the place in the map that came closest.
+  int num_matches = 0;
+  int num_inliers = 0;     ///< Those that agree with the pose; the same.
+  int num_candidates = 0;  ///< Places in the map compared when all else had failed.
+  SubmapId submap = {};    ///< Whose frame the pose is in; invalid without one.
 };
 
 /// Names as written to result files, for example "initializing", "too_few_matches".

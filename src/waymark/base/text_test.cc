@@ -8,10 +8,6 @@
 #include "waymark/base/rng.h"
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/exchange/trajectory.h"
-#include "waymark/input/euroc.h"
-#include "waymark/input/kitti.h"
-#include "waymark/input/tum_rgbd.h"
 
 namespace waymark {
 namespace {
@@ -151,36 +147,6 @@ TEST(ReadTextFile, NamesWhatIsMissing) {
   EXPECT_THAT(testing::input_error_of([&] { read_text_file(folder / "big.txt", "a list", 99); }),
               HasSubstr("larger than"));
   EXPECT_EQ(read_text_file(folder / "big.txt", "a list", 100).size(), 100u);
-}
-
-/// Damaged versions of good files: every parser either reads them or throws InputError.
-TEST(Parsers, SurviveDamagedText) {
-  const std::string good =
-      "#timestamp [ns],filename\n1403636584763555584,1403636584763555584.png\n"
-      "1403636584813555456,1403636584813555456.png\n1305031229.528748 rgb/1305031229.528748.png\n"
-      "P0: 7.1e+02 0 6.0e+02 0 0 7.1e+02 1.8e+02 0 0 0 1 0\nP1: 7 0 6 -386 0 7 1 0 0 0 1 0\n"
-      "1.0 2 3 4 0 0 0 1\n1e5,1,2,3,1,0,0,0\n1 0 0 5 0 1 0 6 0 0 1 7\n";
-  for (std::uint64_t round = 0; round < 3000; ++round) {
-    Rng rng(7, round);
-    std::string text = good.substr(rng.below(static_cast<std::uint32_t>(good.size())));
-    for (std::uint32_t i = rng.below(8); i > 0; --i) {
-      text[rng.below(static_cast<std::uint32_t>(text.size()))] = static_cast<char>(rng.below(256));
-    }
-    const auto try_it = [](const auto& parse) {
-      try {
-        parse();
-      } catch (const InputError& error) {
-        EXPECT_THAT(error.what(), HasSubstr("f"));
-      }
-    };
-    try_it([&] { parse_tum_images(text, "f"); });
-    try_it([&] { parse_euroc_images(text, "f"); });
-    try_it([&] { parse_kitti_calibration(text, "f", 2); });
-    try_it([&] { parse_times(text, "f"); });
-    try_it([&] { parse_tum_trajectory(text, "f"); });
-    try_it([&] { parse_euroc_trajectory(text, "f"); });
-    try_it([&] { parse_kitti_poses(text, "f"); });
-  }
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "waymark/base/check.h"
@@ -17,6 +18,9 @@ namespace {
 
 constexpr std::size_t kMinPairs = 3;
 constexpr double kDegPerRad = 57.29577951308232;
+/// Of the segments of the KITTI odometry benchmark.
+constexpr std::array<double, 8> kSegmentLengths = {100, 200, 300, 400, 500, 600, 700, 800};
+constexpr std::size_t kSegmentStartStep = 10;
 
 /// Poses of pair i at index i of both.
 struct PairedPoses {
@@ -68,12 +72,28 @@ ErrorStatistics summarize(const std::vector<PositionError>& errors) {
   return statistics;
 }
 
-double path_length(std::span<const Rigid3> poses) {
-  double length = 0.0;
+/// From the first pose to each.
+std::vector<double> path_lengths(std::span<const Rigid3> poses) {
+  std::vector<double> lengths(poses.size(), 0.0);
   for (std::size_t i = 1; i < poses.size(); ++i) {
-    length += (poses[i].translation - poses[i - 1].translation).norm();
+    lengths[i] = lengths[i - 1] + (poses[i].translation - poses[i - 1].translation).norm();
   }
-  return length;
+  return lengths;
+}
+
+void add(SegmentError& sum, const SegmentError& other) {
+  sum.length_m += other.length_m;
+  sum.translation_percent += other.translation_percent;
+  sum.rotation_deg_per_100m += other.rotation_deg_per_100m;
+  sum.num_segments += other.num_segments;
+}
+
+SegmentError mean_of(const SegmentError& sum) {
+  const double n = static_cast<double>(sum.num_segments);
+  return {sum.length_m / n,
+          sum.translation_percent / n,
+          sum.rotation_deg_per_100m / n,
+          sum.num_segments};
 }
 
 /// Difference of the motions between consecutive pairs, each motion seen from its first camera.
@@ -104,6 +124,35 @@ std::string_view to_string(TrajectoryAlignment alignment) {
       return "sim3";
   }
   fail_check("known TrajectoryAlignment", __FILE__, __LINE__);
+}
+
+std::optional<SegmentErrors> segment_errors(std::span<const Rigid3> estimate,
+                                            std::span<const Rigid3> groundtruth) {
+  WAYMARK_CHECK(estimate.size() == groundtruth.size());
+  const std::vector<double> lengths = path_lengths(groundtruth);
+  SegmentErrors errors;
+  for (double length : kSegmentLengths) {
+    SegmentError sum;
+    for (std::size_t first = 0; first < groundtruth.size(); first += kSegmentStartStep) {
+      const auto end = std::upper_bound(lengths.begin(), lengths.end(), lengths[first] + length);
+      if (end == lengths.end()) break;
+      const std::size_t last = static_cast<std::size_t>(end - lengths.begin());
+      const Rigid3 true_motion = groundtruth[first].inverse() * groundtruth[last];
+      const Rigid3 motion = estimate[first].inverse() * estimate[last];
+      const Rigid3 error = motion.inverse() * true_motion;
+      add(sum,
+          {length,
+           100.0 * error.translation.norm() / length,
+           100.0 * kDegPerRad * so3_log(error.rotation).norm() / length,
+           1});
+    }
+    if (sum.num_segments == 0) continue;
+    add(errors.all, sum);
+    errors.by_length.push_back(mean_of(sum));
+  }
+  if (errors.by_length.empty()) return std::nullopt;
+  errors.all = mean_of(errors.all);
+  return errors;
 }
 
 Rigid3 aligned_pose(const Sim3& groundtruth_from_estimate, const Rigid3& world_from_camera) {
@@ -143,7 +192,7 @@ Evaluation evaluate(std::span<const StampedPose> estimate,
     const double error_m = (aligned.back().translation - pairs.groundtruth[i].translation).norm();
     evaluation.errors.push_back({estimate[matches[i].estimate].timestamp_ns, error_m});
   }
-  evaluation.path_length_m = path_length(pairs.groundtruth);
+  evaluation.path_length_m = path_lengths(pairs.groundtruth).back();
   evaluation.ate_m = summarize(evaluation.errors);
   if (evaluation.path_length_m > 0.0) {
     evaluation.ate_percent = 100.0 * evaluation.ate_m.rmse / evaluation.path_length_m;

@@ -9,7 +9,6 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/evaluate/segments.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/sim3.h"
 
@@ -44,6 +43,20 @@ struct PositionError {
   double error_m = 0.0;           ///< In units of the ground truth.
 };
 
+/// Mean relative error over path segments of one length.
+struct SegmentError {
+  double length_m = 0.0;               ///< Along the true path.
+  double translation_percent = 0.0;    ///< Position error at the end, in percent of the length.
+  double rotation_deg_per_100m = 0.0;  ///< Angle error at the end, per 100 m of length.
+  std::size_t num_segments = 0;        ///< That the mean is over.
+};
+
+/// The measure of the KITTI odometry benchmark (Geiger et al. 2012).
+struct SegmentErrors {
+  SegmentError all;                     ///< Mean over all segments; its length is the mean length.
+  std::vector<SegmentError> by_length;  ///< 100, 200, ... 800 m, those that occur.
+};
+
 /// What a comparison gives. Lengths are in the unit of the ground truth, which is taken for metres.
 struct Evaluation {
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;  ///< That of the options.
@@ -68,6 +81,12 @@ struct Evaluation {
 Evaluation evaluate(std::span<const StampedPose> estimate,
                     std::span<const StampedPose> groundtruth,
                     const EvaluationOptions& options);
+
+/// Poses world_from_camera, paired one to one, both metric in the same unit. Every tenth pose
+/// starts a segment of each length along the true path. Nothing when the path is shorter than 100
+/// m.
+std::optional<SegmentErrors> segment_errors(std::span<const Rigid3> estimate,
+                                            std::span<const Rigid3> groundtruth);
 
 /// A pose of the estimate in the frame and scale of the ground truth.
 Rigid3 aligned_pose(const Sim3& groundtruth_from_estimate, const Rigid3& world_from_camera);

@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What is exported is read back by readers of their own, and projected by OpenCV.
-#include "waymark/exchange/export_colmap.h"
-
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -11,6 +9,7 @@
 #include <opencv2/calib3d.hpp>
 
 #include "waymark/base/testing/temporary_folder.h"
+#include "waymark/exchange/exports.h"
 #include "waymark/exchange/testing/colmap_reader.h"
 #include "waymark/exchange/testing/openvslam_document.h"
 

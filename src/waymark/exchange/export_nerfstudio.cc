@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/export_nerfstudio.h"
-
 #include <fmt/format.h>
 
 #include <array>
@@ -9,6 +7,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/exchange/exports.h"
 
 namespace waymark {
 namespace {

@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/export_ply.h"
-
 #include <fmt/format.h>
 
 #include "waymark/base/atomic_file.h"
+#include "waymark/exchange/exports.h"
 #include "waymark/exchange/little_endian.h"
 
 namespace waymark {

@@ -12,12 +12,9 @@
 #include "waymark/camera/description.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/map/map.h"
-#include "waymark/mapfile/keyframe_images.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
-
-/// The sub-maps that have keyframes, that with most of them first, of equal ones the older.
-std::vector<SubmapId> submaps_by_size(const Map& map);
 
 /// Camera 0 of the keyframes of a sub-map in the world, by time.
 std::vector<StampedPose> keyframe_trajectory(const Map& map, SubmapId submap);

@@ -12,8 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/exchange/export_colmap.h"
-#include "waymark/exchange/export_nerfstudio.h"
+#include "waymark/exchange/exports.h"
 #include "waymark/exchange/testing/colmap_reader.h"
 #include "waymark/exchange/testing/openvslam_document.h"
 #include "waymark/input/decode.h"

@@ -10,12 +10,11 @@
 #include "waymark/base/check.h"
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/exchange/export_colmap.h"
-#include "waymark/exchange/export_nerfstudio.h"
-#include "waymark/exchange/export_ply.h"
+#include "waymark/exchange/exports.h"
 #include "waymark/exchange/openvslam_map.h"
 #include "waymark/exchange/testing/colmap_reader.h"
 #include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/map/parts.h"
 
 namespace waymark {
 namespace {

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <bit>
 #include <cmath>
 #include <utility>
 
@@ -14,43 +13,29 @@
 namespace waymark {
 namespace {
 
-// First bytes of values, by the table of formats of the specification.
-enum Format : std::uint8_t {
-  kNil = 0xc0,
-  kNeverUsed = 0xc1,
-  kFalse = 0xc2,
-  kTrue = 0xc3,
-  kBin8 = 0xc4,
-  kExt8 = 0xc7,
-  kFloat32 = 0xca,
-  kFloat64 = 0xcb,
-  kUint8 = 0xcc,
-  kInt8 = 0xd0,
-  kFixExt1 = 0xd4,
-  kStr8 = 0xd9,
-  kArray16 = 0xdc,
-  kArray32 = 0xdd,
-  kMap16 = 0xde,
-  kMap32 = 0xdf,
-};
-
-bool is_fixed_integer(std::uint8_t first) { return first < 0x80 || first >= 0xe0; }
-bool is_fixed_map(std::uint8_t first) { return (first & 0xf0) == 0x80; }
-bool is_fixed_array(std::uint8_t first) { return (first & 0xf0) == 0x90; }
-bool is_fixed_string(std::uint8_t first) { return (first & 0xe0) == 0xa0; }
-bool is_unsigned(std::uint8_t first) { return first >= kUint8 && first < kInt8; }
-bool is_signed(std::uint8_t first) { return first >= kInt8 && first < kFixExt1; }
+using Kind = MsgpackValue::Kind;
 
 /// What people call a value.
-std::string describe_format(std::uint8_t first) {
-  if (is_fixed_integer(first) || is_unsigned(first) || is_signed(first)) return "an integer";
-  if (is_fixed_map(first) || first >= kMap16) return "a map";
-  if (is_fixed_array(first) || first >= kArray16) return "an array";
-  if (is_fixed_string(first) || first >= kStr8) return "a string";
-  if (first == kFloat32 || first == kFloat64) return "a number";
-  if (first == kNil) return "nil";
-  if (first == kFalse || first == kTrue) return "a truth value";
-  return "bytes";
+const char* name_of(Kind kind) {
+  switch (kind) {
+    case Kind::kNil:
+      return "nil";
+    case Kind::kFlag:
+      return "a truth value";
+    case Kind::kUnsigned:
+    case Kind::kNegative:
+      return "an integer";
+    case Kind::kFloat:
+      return "a number";
+    case Kind::kText:
+      return "a string";
+    case Kind::kArray:
+      return "an array";
+    case Kind::kMap:
+      return "a map";
+    default:
+      return "bytes";
+  }
 }
 
 }  // namespace
@@ -72,10 +57,6 @@ void MsgpackReader::fail(const std::string& what) const {
   throw InputError(path.empty() ? name_ : name_ + ": " + path, what);
 }
 
-void MsgpackReader::fail_type(const char* expected) const {
-  fail(fmt::format("is {}, expected {}", describe_format(peek()), expected));
-}
-
 void MsgpackReader::expect_size(std::size_t size, std::size_t expected) const {
   if (size != expected) fail(fmt::format("has {} elements, expected {}", size, expected));
 }
@@ -85,150 +66,72 @@ void MsgpackReader::expect_end() const {
   fail(fmt::format("goes on after its end at byte {}, expected one MessagePack object", at_));
 }
 
-std::string_view MsgpackReader::take(std::size_t count) {
-  if (count > bytes_.size() - at_) {
-    fail(fmt::format("truncated: needs {} bytes at byte {}, expected them before the end at {}",
-                     count,
+MsgpackValue MsgpackReader::peek(std::size_t& end) const {
+  MsgpackValue value;
+  end = at_;
+  if (!read_msgpack(bytes_, end, value)) {
+    fail(fmt::format("truncated: its value at byte {} goes on, expected it to end before byte {}",
                      at_,
                      bytes_.size()));
   }
-  const std::string_view taken = bytes_.substr(at_, count);
-  at_ += count;
-  return taken;
-}
-
-std::uint8_t MsgpackReader::peek() const {
-  if (at_ < bytes_.size()) return static_cast<std::uint8_t>(bytes_[at_]);
-  fail(fmt::format("truncated at byte {}, expected a value", at_));
-}
-
-std::uint8_t MsgpackReader::take_byte() { return static_cast<std::uint8_t>(take(1)[0]); }
-
-std::uint64_t MsgpackReader::take_unsigned(std::size_t num_bytes) {
-  std::uint64_t value = 0;
-  for (const char byte : take(num_bytes)) value = value << 8 | static_cast<std::uint8_t>(byte);
+  if (value.kind == Kind::kNone) {
+    fail("holds the byte 0xc1, expected MessagePack, which has no such");
+  }
   return value;
 }
 
-/// A number of values, each of which takes so many bytes at least: no more than are left.
-std::size_t MsgpackReader::take_size(std::size_t num_bytes, std::size_t min_bytes_each) {
-  const std::uint64_t size = take_unsigned(num_bytes);
-  const std::size_t left = bytes_.size() - at_;
-  if (size > left / min_bytes_each) {
-    fail(
-        fmt::format("truncated: claims {} elements at byte {}, expected no more than {} bytes hold",
-                    size,
-                    at_,
-                    left));
-  }
-  return static_cast<std::size_t>(size);
+MsgpackValue MsgpackReader::take(Kind kind, const char* expected) {
+  std::size_t end = at_;
+  const MsgpackValue value = peek(end);
+  if (value.kind != kind) fail(fmt::format("is {}, expected {}", name_of(value.kind), expected));
+  at_ = end;
+  return value;
 }
 
-std::size_t MsgpackReader::map_size() {
-  const std::uint8_t first = peek();
-  if (!is_fixed_map(first) && first != kMap16 && first != kMap32) fail_type("a map");
-  ++at_;
-  if (is_fixed_map(first)) return first & 0x0f;
-  return take_size(first == kMap16 ? 2 : 4, 2);
-}
-
-std::size_t MsgpackReader::array_size() {
-  const std::uint8_t first = peek();
-  if (!is_fixed_array(first) && first != kArray16 && first != kArray32) fail_type("an array");
-  ++at_;
-  if (is_fixed_array(first)) return first & 0x0f;
-  return take_size(first == kArray16 ? 2 : 4, 1);
-}
-
-std::string_view MsgpackReader::read_string() {
-  const std::uint8_t first = peek();
-  if (!is_fixed_string(first) && (first < kStr8 || first >= kArray16)) fail_type("a string");
-  ++at_;
-  if (is_fixed_string(first)) return take(first & 0x1f);
-  return take(static_cast<std::size_t>(take_unsigned(std::size_t{1} << (first - kStr8))));
-}
+std::string_view MsgpackReader::read_string() { return take(Kind::kText, "a string").bytes; }
 
 bool MsgpackReader::is_number() const {
-  const std::uint8_t first = peek();
-  return is_fixed_integer(first) || is_unsigned(first) || is_signed(first) || first == kFloat32 ||
-         first == kFloat64;
+  std::size_t end = at_;
+  const Kind kind = peek(end).kind;
+  return kind == Kind::kUnsigned || kind == Kind::kNegative || kind == Kind::kFloat;
 }
 
 double MsgpackReader::read_number(double max) {
-  const std::uint8_t first = peek();
-  double value = 0.0;
-  if (first == kFloat32) {
-    ++at_;
-    value = std::bit_cast<float>(static_cast<std::uint32_t>(take_unsigned(4)));
-  } else if (first == kFloat64) {
-    ++at_;
-    value = std::bit_cast<double>(take_unsigned(8));
+  std::size_t end = at_;
+  const MsgpackValue value = peek(end);
+  double number = value.number;
+  if (value.kind == Kind::kUnsigned) {
+    number = static_cast<double>(value.whole);
+  } else if (value.kind == Kind::kNegative) {
+    number = static_cast<double>(value.negative);
   } else {
-    if (!is_number()) fail_type("a number");
-    value = static_cast<double>(read_integer(INT64_MIN, INT64_MAX));
+    take(Kind::kFloat, "a number");
   }
-  if (!(std::abs(value) <= max)) {
-    fail(fmt::format("is {}, expected a number between -{:g} and {:g}", value, max, max));
+  at_ = end;
+  if (!(std::abs(number) <= max)) {
+    fail(fmt::format("is {}, expected a number between -{:g} and {:g}", number, max, max));
   }
-  return value;
+  return number;
 }
 
 std::int64_t MsgpackReader::read_integer(std::int64_t low, std::int64_t high) {
-  const std::uint8_t first = peek();
-  if (!is_fixed_integer(first) && !is_unsigned(first) && !is_signed(first)) {
-    fail_type("an integer");
+  std::size_t end = at_;
+  const MsgpackValue value = peek(end);
+  if (value.kind != Kind::kNegative) take(Kind::kUnsigned, "an integer");
+  at_ = end;
+  const bool is_negative = value.kind == Kind::kNegative;
+  const bool is_within = is_negative ? value.negative >= low && value.negative <= high
+                                     : std::cmp_greater_equal(value.whole, low) &&
+                                           std::cmp_less_equal(value.whole, high);
+  if (!is_within) {
+    fail(fmt::format("is {}, expected an integer from {} to {}", describe(value), low, high));
   }
-  ++at_;
-  std::int64_t value = static_cast<std::int8_t>(first);
-  bool is_too_large = false;
-  if (is_unsigned(first)) {
-    const std::uint64_t bits = take_unsigned(std::size_t{1} << (first - kUint8));
-    value = static_cast<std::int64_t>(bits);
-    is_too_large = value < 0;
-  } else if (is_signed(first)) {
-    const std::size_t num_bytes = std::size_t{1} << (first - kInt8);
-    const std::size_t shift = 64 - 8 * num_bytes;  // Extends the sign.
-    value = static_cast<std::int64_t>(take_unsigned(num_bytes) << shift) >> shift;
-  }
-  if (is_too_large || value < low || value > high) {
-    fail(fmt::format(
-        "is {}, expected an integer from {} to {}",
-        is_too_large ? fmt::to_string(static_cast<std::uint64_t>(value)) : fmt::to_string(value),
-        low,
-        high));
-  }
-  return value;
-}
-
-std::size_t MsgpackReader::skip_one() {
-  const std::uint8_t first = peek();
-  if (is_fixed_map(first) || first == kMap16 || first == kMap32) return 2 * map_size();
-  if (is_fixed_array(first) || first == kArray16 || first == kArray32) return array_size();
-  if (is_fixed_string(first) || (first >= kStr8 && first < kArray16)) {
-    read_string();
-    return 0;
-  }
-  if (first == kNeverUsed) fail("holds the byte 0xc1, expected MessagePack, which has no such");
-  ++at_;
-  if (is_unsigned(first)) {
-    take(std::size_t{1} << (first - kUint8));
-  } else if (is_signed(first)) {
-    take(std::size_t{1} << (first - kInt8));
-  } else if (first == kFloat32 || first == kFloat64) {
-    take(first == kFloat32 ? 4 : 8);
-  } else if (first >= kFixExt1 && first < kStr8) {
-    take(1 + (std::size_t{1} << (first - kFixExt1)));
-  } else if (first >= kExt8 && first < kFloat32) {
-    const std::uint64_t size = take_unsigned(std::size_t{1} << (first - kExt8));
-    take(1 + static_cast<std::size_t>(size));
-  } else if (first >= kBin8 && first < kExt8) {
-    take(static_cast<std::size_t>(take_unsigned(std::size_t{1} << (first - kBin8))));
-  }
-  return 0;
+  return is_negative ? value.negative : static_cast<std::int64_t>(value.whole);
 }
 
 void MsgpackReader::skip() {
-  for (std::size_t left = 1; left > 0; --left) left += skip_one();
+  std::size_t end = 0;
+  if (!skip_msgpack(bytes_, at_)) peek(end);  // Which says what is wrong there.
 }
 
 void MsgpackReader::read_record(std::span<const Field> fields) {

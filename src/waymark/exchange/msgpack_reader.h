@@ -10,6 +10,8 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/mapfile/msgpack.h"
+
 namespace waymark {
 
 /// Reads one MessagePack object (msgpack.org, the specification of 2013) front to back, value by
@@ -60,17 +62,11 @@ class MsgpackReader {
     std::size_t index = 0;  ///< Of an array where the key is empty.
   };
 
-  std::size_t map_size();
-  std::size_t array_size();
-  std::uint8_t take_byte();
-  std::string_view take(std::size_t count);
-  std::uint64_t take_unsigned(std::size_t num_bytes);
-  std::size_t take_size(std::size_t num_bytes, std::size_t min_bytes_each);
-  std::uint8_t peek() const;
+  /// The value that comes next, which stays; what it holds follows from `end` on.
+  MsgpackValue peek(std::size_t& end) const;
+  /// Consumes a value of one kind, of an array or map all but what is in it.
+  MsgpackValue take(MsgpackValue::Kind kind, const char* expected);
   void expect_size(std::size_t size, std::size_t expected) const;
-  /// Header of any value: consumes it with its scalar or bytes, gives the number of values inside.
-  std::size_t skip_one();
-  [[noreturn]] void fail_type(const char* expected) const;
 
   std::string_view bytes_;
   std::size_t at_ = 0;
@@ -80,7 +76,7 @@ class MsgpackReader {
 
 template <class Visit>
 void MsgpackReader::read_map(Visit visit) {
-  const std::size_t size = map_size();
+  const std::size_t size = take(MsgpackValue::Kind::kMap, "a map").size;
   for (std::size_t i = 0; i < size; ++i) {
     const std::string_view key = read_string();
     path_.push_back({key, i});
@@ -91,7 +87,7 @@ void MsgpackReader::read_map(Visit visit) {
 
 template <class Resize, class Visit>
 void MsgpackReader::read_array(std::size_t max_size, Resize resize, Visit visit) {
-  const std::size_t size = array_size();
+  const std::size_t size = take(MsgpackValue::Kind::kArray, "an array").size;
   if (size > max_size) {
     fail("has " + std::to_string(size) + " elements, expected at most " + std::to_string(max_size));
   }

@@ -104,7 +104,7 @@ std::string format_frames_csv(const FrameTable& table) {
                    to_string(frame.reason));
     fmt::format_to(
         out, "{},{},{},", frame.num_matches, frame.num_inliers, frame.is_keyframe ? 1 : 0);
-    if (frame.submap) fmt::format_to(out, "{}", *frame.submap);
+    if (frame.submap.is_valid()) fmt::format_to(out, "{}", frame.submap.value);
     WAYMARK_CHECK(frame.stage_ms.empty() || frame.stage_ms.size() == table.stages.size());
     for (std::size_t i = 0; i < table.stages.size(); ++i) {
       fmt::format_to(out, ",{:.4f}", frame.stage_ms.empty() ? 0.0 : frame.stage_ms[i]);

@@ -18,16 +18,10 @@
 namespace waymark {
 
 /// One row of frames.csv.
-struct FrameRecord {
-  std::size_t index = 0;                    ///< In the whole INPUT.
-  std::int64_t timestamp_ns = 0;            ///< Of the input.
-  FrameState state = FrameState::kLost;     ///< What became of it.
-  FrameReason reason = FrameReason::kNone;  ///< Why it has no pose.
-  int num_matches = 0;                      ///< Landmarks found in the image.
-  int num_inliers = 0;                      ///< Those that agree with the pose.
-  int num_candidates = 0;    ///< Places compared while relocalising; for people, not in the file.
-  bool is_keyframe = false;  ///< Whether it was sent to the map.
-  std::optional<std::uint32_t> submap;  ///< Empty field when the frame belongs to none.
+struct FrameRecord : FrameStatus {
+  std::size_t index = 0;          ///< In the whole INPUT.
+  std::int64_t timestamp_ns = 0;  ///< Of the input.
+  bool is_keyframe = false;       ///< Whether it was sent to the map.
   /// In the order of the table's stages; empty for a frame that was not processed.
   std::vector<double> stage_ms;
 };

@@ -41,7 +41,7 @@ FrameTable make_table() {
   table.frames[2].num_matches = 120;
   table.frames[2].num_inliers = 90;
   table.frames[2].is_keyframe = true;
-  table.frames[2].submap = 3;
+  table.frames[2].submap = SubmapId{3};
   table.frames[2].stage_ms = {4.5, 0.25};
   table.frames[6].stage_ms = {5.5, 0.75};
   return table;

@@ -13,7 +13,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/euroc.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {

@@ -4,10 +4,12 @@
 
 #include <gmock/gmock.h>
 
+#include "waymark/base/check.h"
 #include "waymark/base/rng.h"
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {
@@ -98,6 +100,36 @@ TEST(Trajectory, NamesFileAndLineOfWhatIsWrong) {
   EXPECT_THAT(error("1 0 0 5 0 1 0 6 0 0 1 7\n"), HasSubstr("times.txt: 2 times, expected 1"));
   EXPECT_THAT(error("1 0 0 5 0 1 0 6 0 0 2 7\n"), HasSubstr("t.txt:1: the matrix is no rotation"));
   EXPECT_THAT(error("1 0 0 5 0 1 0 6 0 0 -1 7\n"), HasSubstr("t.txt:1: the matrix is no rotation"));
+}
+
+/// Damaged versions of good files: every parser either reads them or throws InputError.
+TEST(Parsers, SurviveDamagedText) {
+  const std::string good =
+      "#timestamp [ns],filename\n1403636584763555584,1403636584763555584.png\n"
+      "1403636584813555456,1403636584813555456.png\n1305031229.528748 rgb/1305031229.528748.png\n"
+      "P0: 7.1e+02 0 6.0e+02 0 0 7.1e+02 1.8e+02 0 0 0 1 0\nP1: 7 0 6 -386 0 7 1 0 0 0 1 0\n"
+      "1.0 2 3 4 0 0 0 1\n1e5,1,2,3,1,0,0,0\n1 0 0 5 0 1 0 6 0 0 1 7\n";
+  for (std::uint64_t round = 0; round < 3000; ++round) {
+    Rng rng(7, round);
+    std::string text = good.substr(rng.below(static_cast<std::uint32_t>(good.size())));
+    for (std::uint32_t i = rng.below(8); i > 0; --i) {
+      text[rng.below(static_cast<std::uint32_t>(text.size()))] = static_cast<char>(rng.below(256));
+    }
+    const auto try_it = [](const auto& parse) {
+      try {
+        parse();
+      } catch (const InputError& error) {
+        EXPECT_THAT(error.what(), HasSubstr("f"));
+      }
+    };
+    try_it([&] { parse_tum_images(text, "f"); });
+    try_it([&] { parse_euroc_images(text, "f"); });
+    try_it([&] { parse_kitti_calibration(text, "f", 2); });
+    try_it([&] { parse_times(text, "f"); });
+    try_it([&] { parse_tum_trajectory(text, "f"); });
+    try_it([&] { parse_euroc_trajectory(text, "f"); });
+    try_it([&] { parse_kitti_poses(text, "f"); });
+  }
 }
 
 }  // namespace

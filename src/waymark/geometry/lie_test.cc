@@ -10,11 +10,12 @@
 #include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/sim3.h"
 #include "waymark/geometry/so3.h"
+#include "waymark/geometry/test_scenes.h"
 
 namespace waymark {
 namespace {
 
-Eigen::Vector3d random_vector(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
+using testing::random_vector;
 
 // Angles on both sides of every change of formula, up to almost pi.
 std::vector<double> angles() {

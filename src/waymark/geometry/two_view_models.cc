@@ -42,8 +42,8 @@ std::vector<std::uint32_t> thin_out(std::span<const std::uint32_t> indices) {
   return result;
 }
 
-// The three models as estimators for ransac(). Thresholds are the 95 % quantiles of chi-squared of 1
-// and 2 degrees of freedom.
+// The three models as estimators for ransac(). Thresholds are the 95 % quantiles of chi-squared of
+// 1 and 2 degrees of freedom.
 
 template <std::size_t kSize>
 struct MatchEstimator {

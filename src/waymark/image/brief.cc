@@ -127,24 +127,5 @@ void describe(const PaddedImage& smooth,
   HWY_DYNAMIC_DISPATCH(describe_all)(smooth, corners, angles_rad.data(), descriptors.data());
 }
 
-Descriptor describe_reference(ImageView smooth, int x, int y, float angle_rad) {
-  const Rotation rotation = rotation_by(angle_rad);
-  const auto times = [](int a, int b) { return (a * b + (1 << 14)) >> 15; };
-  const auto grey = [&](std::size_t point) {
-    const int px = kPattern.x[point];
-    const int py = kPattern.y[point];
-    const int u = times(px, rotation.cos) - times(py, rotation.sin);
-    const int v = times(px, rotation.sin) + times(py, rotation.cos);
-    const int half = 1 << (kFraction - 1);
-    return smooth.at(x + ((u + half) >> kFraction), y + ((v + half) >> kFraction));
-  };
-  Descriptor descriptor{};
-  for (std::size_t i = 0; i < kTests; ++i) {
-    const bool is_darker = grey(i) < grey(i + kTests);
-    descriptor[i / 64] |= static_cast<std::uint64_t>(is_darker) << (i % 64);
-  }
-  return descriptor;
-}
-
 }  // namespace waymark
 #endif

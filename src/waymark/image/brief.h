@@ -22,7 +22,4 @@ void describe(const PaddedImage& smooth,
               std::span<const float> angles_rad,
               std::span<Descriptor> descriptors);
 
-/// The same for one pixel, test by test.
-Descriptor describe_reference(ImageView smooth, int x, int y, float angle_rad);
-
 }  // namespace waymark

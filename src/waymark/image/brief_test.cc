@@ -16,7 +16,7 @@
 #include "waymark/image/hamming.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/orientation.h"
-#include "waymark/image/testing/references.h"
+#include "waymark/image/test_references.h"
 
 namespace waymark {
 namespace {
@@ -51,7 +51,7 @@ TEST(Orientation, KernelIsEqualToReference) {
   orient(image, corners, angles);
   ASSERT_GT(corners.size(), 50u);
   for (std::size_t i = 0; i < corners.size(); ++i) {
-    EXPECT_EQ(angles[i], orientation_reference(image.view(), corners[i].x_px, corners[i].y_px));
+    EXPECT_EQ(angles[i], testing::orientation(image.view(), corners[i].x_px, corners[i].y_px));
   }
 }
 
@@ -88,7 +88,7 @@ TEST(Orientation, AgreesWithOpenCv) {
   for (const cv::KeyPoint& k : keypoints) {
     const auto x = static_cast<int>(k.pt.x);
     const auto y = static_cast<int>(k.pt.y);
-    const double angle_deg = orientation_reference(image.view(), x, y) * kDegPerRad;
+    const double angle_deg = testing::orientation(image.view(), x, y) * kDegPerRad;
     // OpenCV approximates the arc tangent to about 0.3 degrees.
     EXPECT_NEAR(std::remainder(angle_deg - k.angle, 360.0), 0.0, 0.3);
   }
@@ -105,11 +105,12 @@ TEST(Brief, KernelIsEqualToReference) {
   describe(smooth, corners, angles, descriptors);
   for (std::size_t i = 0; i < corners.size(); ++i) {
     EXPECT_EQ(descriptors[i],
-              describe_reference(smooth.view(), corners[i].x_px, corners[i].y_px, angles[i]));
+              testing::descriptor(smooth.view(), corners[i].x_px, corners[i].y_px, angles[i]));
   }
 }
 
 TEST(Brief, StaysWithinItsRadius) {
+  const PaddedImage smooth = testing::make_noise(2 * kBriefRadius + 1, 2 * kBriefRadius + 1, 1);
   for (int step = 0; step < 720; ++step) {
     const auto angle = static_cast<float>(step * std::numbers::pi / 360.0);
     for (const BriefTest& test : kBriefPattern) {

@@ -11,7 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/fast.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/testing/references.h"
+#include "waymark/image/test_references.h"
 
 namespace waymark {
 namespace {
@@ -33,7 +33,7 @@ std::vector<Corner> find(const PaddedImage& image, int min_contrast, double dens
 
 // By the definition.
 std::vector<Corner> find_reference(const PaddedImage& image, int min_contrast) {
-  const auto score = [&](int x, int y) { return fast_score_reference(image.view(), x, y); };
+  const auto score = [&](int x, int y) { return testing::fast_score(image.view(), x, y); };
   std::vector<Corner> corners;
   for (int y = kBorder; y < image.height_px() - kBorder; ++y) {
     for (int x = kBorder; x < image.width_px() - kBorder; ++x) {

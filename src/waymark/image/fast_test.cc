@@ -12,7 +12,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/testing/references.h"
+#include "waymark/image/test_references.h"
 
 namespace waymark {
 namespace {
@@ -40,7 +40,7 @@ TEST_P(Fast, ScoresAreEqualToReference) {
       ASSERT_EQ(scores.height_px(), window.height_px);
       for (int y = 0; y < window.height_px; ++y) {
         for (int x = 0; x < window.width_px; ++x) {
-          const int score = fast_score_reference(image.view(), window.x_px + x, window.y_px + y);
+          const int score = testing::fast_score(image.view(), window.x_px + x, window.y_px + y);
           ASSERT_EQ(scores.row(y)[x], score > min_contrast_ ? score : 0) << x << ", " << y;
         }
       }
@@ -83,7 +83,7 @@ TEST(FastScorePatches, AreEqualToReference) {
   for (std::size_t i = 0; i < corners.size(); ++i) {
     for (int k = 0; k < 9; ++k) {
       EXPECT_EQ(patches[i][static_cast<std::size_t>(k)],
-                fast_score_reference(
+                testing::fast_score(
                     image.view(), corners[i].x_px + k % 3 - 1, corners[i].y_px + k / 3 - 1));
     }
   }

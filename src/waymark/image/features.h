@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "waymark/camera/camera.h"
+#include "waymark/camera/measurement.h"
 #include "waymark/image/feature_grid.h"
 
 namespace waymark {
@@ -28,12 +28,6 @@ using Descriptor = std::array<std::uint64_t, 4>;
 
 /// In place of the index of a feature: none.
 inline constexpr std::uint32_t kNoFeature = UINT32_MAX;
-
-/// Inverse of a measured range and its standard deviation in 1/m; both 0 where none was measured.
-struct MeasuredRange {
-  float inverse = 0.0f;        ///< In 1/m.
-  float inverse_sigma = 0.0f;  ///< In 1/m.
-};
 
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
@@ -59,10 +53,15 @@ struct Features {
   /// Features of both cameras.
   std::size_t size() const { return keypoints.size(); }
 
-  /// What the depth image says of a feature; nothing of those of camera 1.
-  MeasuredRange measured_range(std::uint32_t feature) const {
-    if (feature >= num_primary || !(inverse_range_sigma[feature] > 0.0f)) return {};
-    return {1.0f / range_m[feature], inverse_range_sigma[feature]};
+  /// What a feature measures; those of camera 1 have no range from the depth image.
+  Measurement measurement(std::uint32_t feature) const {
+    Measurement measured{
+        keypoints[feature].camera, bearings[feature], level_pixel_from_bearing[feature]};
+    if (feature < num_primary && inverse_range_sigma[feature] > 0.0f) {
+      measured.inverse_range = 1.0f / range_m[feature];
+      measured.inverse_range_sigma = inverse_range_sigma[feature];
+    }
+    return measured;
   }
 };
 

@@ -12,6 +12,7 @@
 #include "waymark/image/depth.h"
 #include "waymark/image/extractor.h"
 #include "waymark/image/features.h"
+#include "waymark/image/frame_images.h"
 #include "waymark/image/image.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/image/seam.h"
@@ -25,14 +26,6 @@ struct FrameSettings {
   StereoSettings stereo = {};
   DepthSettings depth = {};
   ViewSettings view = {};
-};
-
-/// The images of one moment. Borrowed for the call only.
-struct FrameImages {
-  ImageView image0 = {};
-  ImageView image1 = {};  ///< Empty unless stereo.
-  DepthView depth = {};   ///< Registered to image0; empty unless RGB-D.
-  ImageView mask = {};    ///< Of image0: features where it is not 0; may be empty.
 };
 
 /// Throws InputError where the size of an image is not that of its camera in the rig.

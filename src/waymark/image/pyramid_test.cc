@@ -7,9 +7,10 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
+#include "waymark/image/pyramid.h"
 #include "waymark/image/gaussian.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/testing/references.h"
+#include "waymark/image/test_references.h"
 
 namespace waymark {
 namespace {
@@ -40,7 +41,7 @@ TEST(Downscale, KernelIsEqualToReference) {
   for (const auto& [width, height] : {std::pair(752, 48), {241, 37}, {64, 6}, {13, 13}, {7, 2}}) {
     const PaddedImage image = testing::make_noise(width, height, 3);
     downscale(image, workspace, result);
-    downscale_reference(image, reference);
+    testing::downscale(image, reference);
     expect_equal(result, reference);
   }
 }
@@ -121,7 +122,7 @@ TEST(GaussianBlur, KernelIsEqualToReference) {
   for (const auto& [width, height] : {std::pair(320, 20), {37, 41}, {4, 4}}) {
     const PaddedImage image = testing::make_noise(width, height, 5);
     gaussian_blur(image, workspace, result);
-    gaussian_blur_reference(image, reference);
+    testing::gaussian_blur(image, reference);
     expect_equal(result, reference);
   }
 }

@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/camera_input.h"
-
 #include <fmt/format.h>
 
 #include <charconv>
@@ -13,6 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/input/calibration.h"
 #include "waymark/input/color_frame.h"
+#include "waymark/input/datasets.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/mask.h"
 #include "waymark/input/selection.h"

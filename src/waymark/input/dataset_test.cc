@@ -7,12 +7,9 @@
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/exchange/trajectory.h"
-#include "waymark/input/euroc.h"
-#include "waymark/input/groundtruth.h"
+#include "waymark/input/datasets.h"
 #include "waymark/input/input.h"
-#include "waymark/input/kitti.h"
 #include "waymark/input/testing/images.h"
-#include "waymark/input/tum_rgbd.h"
 
 namespace waymark {
 namespace {

@@ -7,7 +7,7 @@
 #include <string>
 #include <string_view>
 
-#include "waymark/image/color.h"
+#include "waymark/image/convert.h"
 #include "waymark/image/image.h"
 
 namespace waymark {

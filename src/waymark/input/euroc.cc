@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/euroc.h"
-
 #include <fmt/format.h>
 
 #include <cstdlib>
@@ -11,6 +9,7 @@
 #include "waymark/base/config_value.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {

@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/groundtruth.h"
-
 #include <array>
+
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 

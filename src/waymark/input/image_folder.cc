@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/image_folder.h"
-
 #include <fmt/format.h>
 
 #include "waymark/base/check.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {

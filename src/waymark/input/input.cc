@@ -6,14 +6,9 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/camera_input.h"
+#include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
-#include "waymark/input/euroc.h"
-#include "waymark/input/image_folder.h"
-#include "waymark/input/kitti.h"
 #include "waymark/input/listing_input.h"
-#include "waymark/input/tum_rgbd.h"
-#include "waymark/input/video_input.h"
 
 namespace waymark {
 namespace {

@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/kitti.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Core>
@@ -9,6 +7,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {

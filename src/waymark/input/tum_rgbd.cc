@@ -1,13 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/tum_rgbd.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {

@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/video_input.h"
-
 #include <fmt/format.h>
 
 #include <cmath>
@@ -14,6 +12,7 @@
 #include "waymark/base/text.h"
 #include "waymark/input/calibration.h"
 #include "waymark/input/color_frame.h"
+#include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/mask.h"

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "waymark/base/median.h"
-#include "waymark/loop/near_in_graph.h"
+#include "waymark/loop/find.h"
 
 namespace waymark {
 namespace {

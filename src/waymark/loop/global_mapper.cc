@@ -4,14 +4,18 @@
 
 #include <utility>
 
-#include "waymark/loop/loop_closing.h"
-#include "waymark/loop/overlaps.h"
+#include "waymark/loop/close.h"
+#include "waymark/loop/consolidate.h"
+#include "waymark/loop/find.h"
 
 namespace waymark {
 namespace {
 
 /// So many keyframes of a map are compared with what lies beside them per new keyframe.
-constexpr std::size_t kNumLinksPerKeyframe = 2;
+constexpr std::size_t kNumConsolidatedPerKeyframe = 2;
+/// Keyframes five steps away in the graph are known to each other well enough; of views further
+/// apart ORB features change too much.
+constexpr BesideOptions kBeside = {.num_known_steps = 5, .distance = 0.8, .angle_rad = 0.7};
 
 }  // namespace
 
@@ -19,11 +23,7 @@ GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            const MappingSettings& mapping,
                            const LoopSettings& loop,
                            std::uint64_t seed)
-    : settings_(loop),
-      mapper_(rig, mapping),
-      finder_(rig, seed),
-      link_finder_(rig, seed),
-      projection_(rig) {}
+    : settings_(loop), mapper_(rig, mapping), verifier_(rig, seed), projection_(rig) {}
 
 void GlobalMapper::take_over(const MapSnapshot& before) {
   mapper_.take_over(*before.map);
@@ -35,8 +35,8 @@ void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(mes
 void GlobalMapper::add(const NewKeyframe& message) {
   const Mapper::Changes changes = mapper_.add(message);
   update_places(changes);
-  if (!settings_.enabled || close_loop_at(changes.added.back())) return;
-  if (!unadjusted_.is_valid()) look_for_links(kNumLinksPerKeyframe);
+  if (!settings_.enabled || close_alike(changes.added.back())) return;
+  if (!unadjusted_.is_valid()) consolidate_some(kNumConsolidatedPerKeyframe);
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {
@@ -47,8 +47,7 @@ void GlobalMapper::update_places(const Mapper::Changes& changes) {
   for (const KeyframeId id : changes.erased) places_.erase(id);
 }
 
-bool GlobalMapper::close_loop_at(KeyframeId query) {
-  const std::optional<Revisit> revisit = finder_.find(mapper_.map(), places_, query);
+bool GlobalMapper::close(const std::optional<Revisit>& revisit) {
   if (!revisit) return false;
   bool is_join = false;
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
@@ -56,27 +55,33 @@ bool GlobalMapper::close_loop_at(KeyframeId query) {
   });
   num_loops_ += !is_join;
   ++num_closures_;
-  unadjusted_ = mapper_.map().keyframes().at(query).submap;
-  unlinked_.clear();
-  mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.submap == unadjusted_) unlinked_.push_back(id);
-  });
+  unadjusted_ = mapper_.map().keyframes().at(revisit->query).submap;
   return true;
 }
 
-/// A closure brings parts of the map together that may touch elsewhere, too.
-void GlobalMapper::look_for_links(std::size_t max_count) {
-  for (std::size_t i = 0; i < max_count && !unlinked_.empty(); ++i) {
-    const KeyframeId query = unlinked_.back();
-    unlinked_.pop_back();
-    if (!mapper_.map().keyframes().contains(query)) continue;
-    const std::optional<Revisit> link = link_finder_.find(mapper_.map(), query);
-    if (!link) continue;
-    mapper_.change(
-        [&](Map& map, DirtyLandmarks& dirty) { close_loop(map, *link, projection_, dirty); });
-    ++num_loops_;
-    ++num_closures_;
-    unadjusted_ = mapper_.map().keyframes().at(query).submap;
+bool GlobalMapper::close_alike(KeyframeId query) {
+  const std::vector<KeyframeId> alike = find_alike(mapper_.map(), places_, query);
+  if (!close(verifier_.verify_alike(mapper_.map(), query, alike))) return false;
+  unconsolidated_ = all_keyframes();
+  return true;
+}
+
+std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
+  std::vector<KeyframeId> ids;
+  mapper_.map().keyframes().for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
+  return ids;
+}
+
+bool GlobalMapper::close_beside(KeyframeId query) {
+  const std::vector<KeyframeId> beside = find_beside(mapper_.map(), query, kBeside);
+  return close(verifier_.verify_beside(mapper_.map(), query, beside));
+}
+
+void GlobalMapper::consolidate_some(std::size_t max_count) {
+  for (std::size_t i = 0; i < max_count && !unconsolidated_.empty(); ++i) {
+    const KeyframeId query = unconsolidated_.back();
+    unconsolidated_.pop_back();
+    if (mapper_.map().keyframes().contains(query)) close_beside(query);
   }
 }
 
@@ -98,13 +103,14 @@ void GlobalMapper::finish() {
     mapper_.refine_globally();
     return;
   }
-  if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_loop_at(KeyframeId{end - 1});
+  if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_alike(KeyframeId{end - 1});
+  if (num_closures_ == 0) unconsolidated_ = all_keyframes();
+  consolidate();
+}
+
+void GlobalMapper::consolidate() {
   mapper_.refine_globally();
-  if (num_closures_ == 0) {
-    mapper_.map().keyframes().for_each(
-        [&](KeyframeId id, const Keyframe&) { unlinked_.push_back(id); });
-  }
-  look_for_links(unlinked_.size());
+  consolidate_some(unconsolidated_.size());
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
   mapper_.refine_globally();
 }

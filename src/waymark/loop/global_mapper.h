@@ -7,11 +7,11 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/loop/link_finder.h"
-#include "waymark/loop/loop_finder.h"
 #include "waymark/loop/settings.h"
+#include "waymark/loop/verify.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
+#include "waymark/place/place_index.h"
 #include "waymark/track/map_snapshot.h"
 
 namespace waymark {
@@ -24,8 +24,8 @@ struct AdjustmentTask {
 };
 
 /// The mapper with all that reaches beyond the surroundings of the newest keyframe: finds places
-/// seen before, closes loops and joins sub-maps at once by a pose graph, and has the rest adjusted
-/// later by whoever runs the tasks it hands out.
+/// seen before, verifies and closes them at once, consolidates little by little, and has the rest
+/// adjusted later by whoever runs the tasks it hands out.
 class GlobalMapper {
  public:
   GlobalMapper(std::shared_ptr<const Rig> rig,
@@ -41,26 +41,34 @@ class GlobalMapper {
   std::optional<AdjustmentTask> take_task();
   /// Takes in what a task gave, unless a loop was closed meanwhile: then a new task follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
-  /// The end: looks for loops a last time and adjusts every sub-map.
+  /// The end: looks for loops a last time and consolidates.
   void finish();
+
+  /// Finds what looks like a keyframe, verifies and closes it; whether there was something.
+  bool close_alike(KeyframeId query);
+  /// A closure brings parts of the map together that may touch elsewhere, too: adjusts every
+  /// sub-map, closes what lies beside each other, fuses overlaps and adjusts again.
+  void consolidate();
 
   const Map& map() const { return mapper_.map(); }
   MapSnapshot snapshot();
   int num_loops() const { return num_loops_; }
+  int num_joins() const { return static_cast<int>(num_closures_) - num_loops_; }
 
  private:
   void update_places(const Mapper::Changes& changes);
-  bool close_loop_at(KeyframeId query);
-  void look_for_links(std::size_t max_count);
+  bool close_beside(KeyframeId query);
+  bool close(const std::optional<Revisit>& revisit);
+  void consolidate_some(std::size_t max_count);
+  std::vector<KeyframeId> all_keyframes() const;
 
   const LoopSettings settings_;
   Mapper mapper_;
   PlaceIndex places_;
-  LoopFinder finder_;
-  LinkFinder link_finder_;
+  RevisitVerifier verifier_;
   ProjectionMatcher projection_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
-  std::vector<KeyframeId> unlinked_;  ///< Where to look for links yet, the last one first.
+  std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
 };

@@ -83,6 +83,14 @@ class LoopScene {
     return frame * Sim3::exp(static_cast<double>(step) / kStepsPerRound * drift);
   }
 
+  /// The true relative pose of two steps, in the units that the map has at the first.
+  Sim3 true_motion(int query_step, int match_step) const {
+    const Rigid3 relative = true_pose(query_step).inverse() * true_pose(match_step);
+    const double query_scale = map_from_world(query_step).scale;
+    const double match_scale = map_from_world(match_step).scale;
+    return {relative.rotation, query_scale * relative.translation, query_scale / match_scale};
+  }
+
   KeyframeId add_keyframe(int step) {
     const Rigid3 world_from_rig = true_pose(step);
     const PointObservation view =

@@ -43,6 +43,12 @@ Map declare_metric(const Map& map, SubmapId submap) {
   return Map::restore(std::move(parts));
 }
 
+Map put_into_metres(Map map, SubmapId submap, const Sim3& new_from_old) {
+  transform_submap(map, submap, new_from_old);
+  if (map.submaps()[submap.value].is_metric) return map;
+  return declare_metric(map, submap);
+}
+
 Eigen::Vector3d camera_position(const Keyframe& keyframe) {
   return (keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world).origin_in_source();
 }
@@ -102,6 +108,19 @@ std::optional<TrajectoryFit> fit_trajectory(const Map& map,
   }
   fit.rms_m = std::sqrt(sum / static_cast<double>(in_map.size()));
   return fit;
+}
+
+std::vector<std::pair<SubmapId, std::optional<TrajectoryFit>>> fit_submaps(
+    Map& map, const TimedPoses& trajectory, std::int64_t max_difference_ns) {
+  std::vector<std::pair<SubmapId, std::optional<TrajectoryFit>>> fits;
+  for (const SubmapId submap : submaps_by_size(map)) {
+    const bool is_scale_free = !has_measured_ranges(map, submap);
+    fits.emplace_back(submap,
+                      fit_trajectory(map, submap, trajectory, max_difference_ns, is_scale_free));
+    const std::optional<TrajectoryFit>& fit = fits.back().second;
+    if (fit) map = put_into_metres(std::move(map), submap, fit->trajectory_from_map);
+  }
+  return fits;
 }
 
 }  // namespace waymark

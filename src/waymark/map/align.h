@@ -5,6 +5,8 @@
 #include <cstddef>
 #include <optional>
 #include <span>
+#include <utility>
+#include <vector>
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/map/map.h"
@@ -21,6 +23,9 @@ bool has_measured_ranges(const Map& map, SubmapId submap);
 
 /// The same map, the lengths of a sub-map (and of all that was joined into it) being metres.
 Map declare_metric(const Map& map, SubmapId submap);
+
+/// A sub-map brought into a frame in metres: moved, and metric from then on.
+Map put_into_metres(Map map, SubmapId submap, const Sim3& new_from_old);
 
 /// Where camera 0 of a keyframe is, in the world.
 Eigen::Vector3d camera_position(const Keyframe& keyframe);
@@ -54,5 +59,10 @@ std::optional<TrajectoryFit> fit_trajectory(const Map& map,
                                             const TimedPoses& trajectory,
                                             std::int64_t max_difference_ns,
                                             bool is_scale_free);
+
+/// Fits each sub-map that is a part of its own, the largest first, and moves those that fit; the
+/// scale is free where nothing measured it. Gives each with its fit, if there is one.
+std::vector<std::pair<SubmapId, std::optional<TrajectoryFit>>> fit_submaps(
+    Map& map, const TimedPoses& trajectory, std::int64_t max_difference_ns);
 
 }  // namespace waymark

@@ -4,9 +4,11 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <vector>
 
+#include "waymark/map/parts.h"
 #include "waymark/map/testing/random_map.h"
 
 namespace waymark {
@@ -173,6 +175,40 @@ TEST_F(MapAlign, FitsATrajectory) {
   EXPECT_EQ(rigid->trajectory_from_map.scale, 1.0);
   EXPECT_GT(rigid->rms_m, 0.5);
   EXPECT_FALSE(fit_trajectory(map_, submap_, {times, poses}, 1'000'000, true));
+}
+
+TEST_F(MapAlign, FitsEachPartAsAWhole) {
+  RandomMap random(3);  // Its lengths are partly measured.
+  Map& map = random.map();
+  const SubmapId largest = submaps_by_size(map).front();
+  const Rigid3 motion = Rigid3::exp((Vector6d() << 5.0, 1.0, -2.0, 0.3, 0.2, -0.9).finished());
+  std::vector<std::pair<std::int64_t, Rigid3>> truth;
+  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+    if (keyframe.submap != largest) return;
+    truth.push_back({keyframe.timestamp_ns,
+                     {Eigen::Quaterniond::Identity(), motion * camera_position(keyframe)}});
+  });
+  std::sort(
+      truth.begin(), truth.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::vector<std::int64_t> times;
+  std::vector<Rigid3> poses;
+  for (const auto& [time, pose] : truth) {
+    times.push_back(time);
+    poses.push_back(pose);
+  }
+  const Map before = Map::thaw(*map.freeze());
+  const auto fits = fit_submaps(map, {times, poses}, 0);
+  EXPECT_EQ(fits.size(), submaps_by_size(before).size());
+  EXPECT_EQ(map.broken_invariants(), "");
+  for (const auto& [submap, fit] : fits) {
+    EXPECT_EQ(fit.has_value(), submap == largest);
+    EXPECT_EQ(map.submaps()[submap.value].is_metric, submap == largest);
+  }
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    const Eigen::Vector3d old = camera_position(before.keyframes().at(id));
+    const Eigen::Vector3d expected = keyframe.submap == largest ? motion * old : old;
+    EXPECT_LT((camera_position(keyframe) - expected).norm(), 1e-6) << id.value;
+  });
 }
 
 }  // namespace

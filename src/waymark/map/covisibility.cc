@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <utility>
 
+#include "waymark/map/map.h"
+
 namespace waymark {
 
 Covisibility CovisibilityCounter::count(KeyframeId id, const Keyframe& keyframe) {
@@ -34,6 +36,19 @@ Covisibility CovisibilityCounter::count(KeyframeId id, const Keyframe& keyframe)
     edge.num_shared = std::exchange(num_shared_[edge.keyframe.value], 0u);
   }
   return result;
+}
+
+std::vector<KeyframeId> strongest_neighbours(const Map& map,
+                                             KeyframeId keyframe,
+                                             std::size_t max_count) {
+  std::vector<CovisibilityEdge> edges = map.covisible(keyframe);
+  std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
+    return a.num_shared != b.num_shared ? a.num_shared > b.num_shared : a.keyframe > b.keyframe;
+  });
+  if (edges.size() > max_count) edges.resize(max_count);
+  std::vector<KeyframeId> ids;
+  for (const CovisibilityEdge& edge : edges) ids.push_back(edge.keyframe);
+  return ids;
 }
 
 }  // namespace waymark

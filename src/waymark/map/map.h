@@ -171,4 +171,10 @@ class Map {
 /// Whether all sub-maps have a scale in metres.
 bool is_metric(const Map& map);
 
+/// Keyframes most covisible with one, at most max_count, most shared landmarks first; of equal ones
+/// the younger first.
+std::vector<KeyframeId> strongest_neighbours(const Map& map,
+                                             KeyframeId keyframe,
+                                             std::size_t max_count);
+
 }  // namespace waymark

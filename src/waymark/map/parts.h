@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <vector>
+
 #include "waymark/map/map.h"
 
 namespace waymark {
@@ -17,5 +19,8 @@ MapParts take_apart(const Map& map);
 /// Two maps in one, side by side. What belongs to b has the ids it had plus the ends of the ids of
 /// a: keyframe k of b is k + a.keyframes().end_id().
 Map unite(const Map& a, const Map& b);
+
+/// The sub-maps that have keyframes, that with most of them first, of equal ones the older.
+std::vector<SubmapId> submaps_by_size(const Map& map);
 
 }  // namespace waymark

@@ -7,7 +7,7 @@
 #include <fstream>
 
 #include "waymark/base/check.h"
-#include "waymark/mapfile/map_limits.h"
+#include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_reader.h"
 #include "waymark/mapfile/map_record_stream.h"
 

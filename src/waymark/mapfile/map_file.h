@@ -4,15 +4,21 @@
 
 #include <filesystem>
 #include <iosfwd>
+#include <map>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "waymark/camera/registry.h"
 #include "waymark/map/map.h"
-#include "waymark/mapfile/keyframe_images.h"
 
 namespace waymark {
+
+/// A JPEG file; shared, for there are many of them and they are large. Never null.
+using SharedJpeg = std::shared_ptr<const std::string>;
+
+/// Images of camera 0 of keyframes, as map files hold them.
+using KeyframeImages = std::map<KeyframeId, SharedJpeg>;
 
 /// What a map file holds; docs/map-format.md describes its bytes.
 struct StoredMap {

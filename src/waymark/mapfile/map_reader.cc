@@ -10,7 +10,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/mapfile/map_features.h"
-#include "waymark/mapfile/map_limits.h"
+#include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
 namespace {

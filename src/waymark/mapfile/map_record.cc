@@ -5,115 +5,118 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <array>
+
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/mapfile/map_limits.h"
+#include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
 namespace {
 
 constexpr double kMaxNormError = 1e-6;
 
-std::string_view view(const msgpack::object& text) { return {text.via.str.ptr, text.via.str.size}; }
+using Kind = MsgpackValue::Kind;
 
-/// The value in words, short whatever it is.
-std::string describe(const msgpack::object& value) {
-  switch (value.type) {
-    case msgpack::type::NIL:
-      return "nil";
-    case msgpack::type::BOOLEAN:
-      return value.via.boolean ? "true" : "false";
-    case msgpack::type::POSITIVE_INTEGER:
-      return fmt::format("{}", value.via.u64);
-    case msgpack::type::NEGATIVE_INTEGER:
-      return fmt::format("{}", value.via.i64);
-    case msgpack::type::FLOAT32:
-    case msgpack::type::FLOAT64:
-      return fmt::format("{}", value.via.f64);
-    case msgpack::type::STR:
-      return quote_for_message(view(value));
-    case msgpack::type::BIN:
-      return fmt::format("{} bytes", value.via.bin.size);
-    case msgpack::type::ARRAY:
-      return fmt::format("a list of {}", value.via.array.size);
-    case msgpack::type::MAP:
-      return fmt::format("a map of {} keys", value.via.map.size);
-    default:
-      return "an extension";
-  }
+/// The value at bytes[at] of sound bytes; steps behind it.
+MsgpackElement read_element(std::string_view bytes, std::size_t& at) {
+  MsgpackElement element;
+  std::size_t end = at;
+  WAYMARK_CHECK(skip_msgpack(bytes, end) && read_msgpack(bytes, at, element));
+  element.content = bytes.substr(at, end - at);
+  at = end;
+  return element;
 }
 
-const msgpack::object* find_in(const msgpack::object& map, std::string_view key) {
-  for (std::uint32_t i = 0; i < map.via.map.size; ++i) {
-    const msgpack::object_kv& entry = map.via.map.ptr[i];
-    if (entry.key.type == msgpack::type::STR && view(entry.key) == key) return &entry.val;
+/// The values of an array; keys and values of a map by turns.
+std::vector<MsgpackElement> elements_of(const MsgpackElement& value) {
+  std::vector<MsgpackElement> elements;
+  for (std::size_t at = 0; at < value.content.size();) {
+    elements.push_back(read_element(value.content, at));
   }
-  return nullptr;
+  return elements;
 }
 
-/// Whether a value is a map of exactly these keys.
-bool is_map_of(const msgpack::object& value, std::initializer_list<std::string_view> keys) {
-  if (value.type != msgpack::type::MAP || value.via.map.size != keys.size()) return false;
-  return std::all_of(
-      keys.begin(), keys.end(), [&](std::string_view key) { return find_in(value, key); });
+/// The values of a map of exactly these keys, in their order; nothing for other values.
+template <std::size_t kNumKeys>
+std::optional<std::array<MsgpackElement, kNumKeys>> values_of(
+    const MsgpackElement& value, const std::array<std::string_view, kNumKeys>& keys) {
+  if (value.kind != Kind::kMap || value.size != kNumKeys) return std::nullopt;
+  const std::vector<MsgpackElement> elements = elements_of(value);
+  std::array<MsgpackElement, kNumKeys> values;
+  for (std::size_t i = 0; i < kNumKeys; ++i) {
+    std::size_t at = 0;
+    while (at < elements.size() &&
+           !(elements[at].kind == Kind::kText && elements[at].bytes == keys[i])) {
+      at += 2;
+    }
+    if (at == elements.size()) return std::nullopt;
+    values[i] = elements[at + 1];
+  }
+  return values;
 }
 
 /// The elements of a shape, or nothing where it has other rows than the layout.
-std::optional<std::size_t> count_elements(const msgpack::object& shape,
+std::optional<std::size_t> count_elements(const MsgpackElement& shape,
                                           const MapArrayLayout& layout) {
-  if (shape.type != msgpack::type::ARRAY) return std::nullopt;
-  if (shape.via.array.size != 1 + layout.element_shape.size()) return std::nullopt;
-  const msgpack::object* sizes = shape.via.array.ptr;
-  for (std::size_t i = 0; i < shape.via.array.size; ++i) {
-    if (sizes[i].type != msgpack::type::POSITIVE_INTEGER) return std::nullopt;
-    if (i > 0 && sizes[i].via.u64 != layout.element_shape[i - 1]) return std::nullopt;
+  if (shape.kind != Kind::kArray || shape.size != 1 + layout.element_shape.size()) {
+    return std::nullopt;
   }
-  if (sizes[0].via.u64 > kMaxArrayBytes) return std::nullopt;
-  return static_cast<std::size_t>(sizes[0].via.u64);
+  const std::vector<MsgpackElement> sizes = elements_of(shape);
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    if (sizes[i].kind != Kind::kUnsigned) return std::nullopt;
+    if (i > 0 && sizes[i].whole != layout.element_shape[i - 1]) return std::nullopt;
+  }
+  if (sizes[0].whole > kMaxArrayBytes) return std::nullopt;
+  return static_cast<std::size_t>(sizes[0].whole);
 }
 
 }  // namespace
 
-MapRecord::MapRecord(const msgpack::object& object, std::string where) : where_(std::move(where)) {
-  if (object.type != msgpack::type::MAP) {
-    fail(fmt::format("is {}, expected a map of keys and values", describe(object)));
+MapRecord::MapRecord(std::string_view bytes, std::string where) : where_(std::move(where)) {
+  std::size_t at = 0;
+  const MsgpackElement record = read_element(bytes, at);
+  if (record.kind != Kind::kMap) {
+    fail(fmt::format("is {}, expected a map of keys and values", describe(record)));
   }
-  for (std::uint32_t i = 0; i < object.via.map.size; ++i) {
-    const msgpack::object_kv& entry = object.via.map.ptr[i];
-    if (entry.key.type != msgpack::type::STR) {
-      fail(fmt::format("has the key {}, expected text", describe(entry.key)));
+  const std::vector<MsgpackElement> elements = elements_of(record);
+  for (std::size_t i = 0; i < elements.size(); i += 2) {
+    const MsgpackElement& key = elements[i];
+    if (key.kind != Kind::kText) {
+      fail(fmt::format("has the key {}, expected text", describe(key)));
     }
-    if (has(view(entry.key))) {
-      fail(fmt::format("has the key {} twice, expected each once", describe(entry.key)));
+    if (has(key.bytes)) {
+      fail(fmt::format("has the key {} twice, expected each once", describe(key)));
     }
-    Entry added;
-    added.key = view(entry.key);
-    added.value = &entry.val;
-    entries_.push_back(added);
+    entries_.push_back({key.bytes, elements[i + 1]});
   }
 }
 
 void MapRecord::fail(const std::string& what) const { throw InputError(where_, what); }
 
-const msgpack::object* MapRecord::find(std::string_view key) const {
-  for (const Entry& entry : entries_) {
-    if (entry.key == key) return entry.value;
-  }
-  return nullptr;
+bool MapRecord::has(std::string_view key) const {
+  return std::ranges::any_of(entries_, [&](const Entry& entry) { return entry.key == key; });
 }
 
-const msgpack::object& MapRecord::take(std::string_view key) {
+bool MapRecord::is_nil(std::string_view key) const {
+  return std::ranges::any_of(entries_, [&](const Entry& entry) {
+    return entry.key == key && entry.value.kind == Kind::kNil;
+  });
+}
+
+const MsgpackElement& MapRecord::take(std::string_view key) {
   for (Entry& entry : entries_) {
     if (entry.key != key) continue;
     WAYMARK_CHECK(!entry.is_used);
     entry.is_used = true;
-    return *entry.value;
+    return entry.value;
   }
   fail(fmt::format("has no {}, expected one", key));
 }
 
 void MapRecord::fail_value(std::string_view key,
-                           const msgpack::object& value,
+                           const MsgpackValue& value,
                            const std::string& expected) const {
   fail(fmt::format("{} is {}, expected {}", key, describe(value), expected));
 }
@@ -124,52 +127,50 @@ void MapRecord::fail_element(std::string_view key, std::size_t index, double val
 }
 
 std::uint64_t MapRecord::whole(std::string_view key, std::uint64_t max) {
-  const msgpack::object& value = take(key);
-  if (value.type != msgpack::type::POSITIVE_INTEGER || value.via.u64 > max) {
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kUnsigned || value.whole > max) {
     fail_value(key, value, fmt::format("a whole number from 0 to {}", max));
   }
-  return value.via.u64;
+  return value.whole;
 }
 
 std::int64_t MapRecord::signed_whole(std::string_view key) {
-  const msgpack::object& value = take(key);
-  constexpr auto kMax = static_cast<std::uint64_t>(std::numeric_limits<std::int64_t>::max());
-  if (value.type == msgpack::type::NEGATIVE_INTEGER) return value.via.i64;
-  if (value.type != msgpack::type::POSITIVE_INTEGER || value.via.u64 > kMax) {
+  const MsgpackElement& value = take(key);
+  if (value.kind == Kind::kNegative) return value.negative;
+  if (value.kind != Kind::kUnsigned || value.whole > INT64_MAX) {
     fail_value(key, value, "a whole number of 64 bits");
   }
-  return static_cast<std::int64_t>(value.via.u64);
+  return static_cast<std::int64_t>(value.whole);
 }
 
 bool MapRecord::flag(std::string_view key) {
-  const msgpack::object& value = take(key);
-  if (value.type != msgpack::type::BOOLEAN) fail_value(key, value, "true or false");
-  return value.via.boolean;
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kFlag) fail_value(key, value, "true or false");
+  return value.whole != 0;
 }
 
 std::string MapRecord::text(std::string_view key, std::size_t max_bytes) {
-  const msgpack::object& value = take(key);
-  if (value.type != msgpack::type::STR || value.via.str.size > max_bytes) {
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kText || value.size > max_bytes) {
     fail_value(key, value, fmt::format("text of at most {} bytes", max_bytes));
   }
-  return std::string(view(value));
+  return std::string(value.bytes);
 }
 
 std::string MapRecord::bytes(std::string_view key) {
-  const msgpack::object& value = take(key);
-  if (value.type != msgpack::type::BIN || value.via.bin.size > kMaxArrayBytes) {
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kBytes || value.size > kMaxArrayBytes) {
     fail_value(key, value, fmt::format("binary data of at most {} bytes", kMaxArrayBytes));
   }
-  return std::string(value.via.bin.ptr, value.via.bin.size);
+  return std::string(value.bytes);
 }
 
 double MapRecord::number(std::string_view key, const NumberRange& range) {
-  const msgpack::object& value = take(key);
-  const bool is_number = value.type == msgpack::type::FLOAT64;
-  if (!is_number || !(value.via.f64 >= range.low && value.via.f64 <= range.high)) {
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kFloat || !(value.number >= range.low && value.number <= range.high)) {
     fail_value(key, value, fmt::format("a number from {} to {}", range.low, range.high));
   }
-  return value.via.f64;
+  return value.number;
 }
 
 std::vector<double> MapRecord::numbers(std::string_view key, std::size_t max_count) {
@@ -177,29 +178,27 @@ std::vector<double> MapRecord::numbers(std::string_view key, std::size_t max_cou
 }
 
 std::vector<double> MapRecord::finite_list(std::string_view key,
-                                           const msgpack::object& value,
+                                           const MsgpackElement& value,
                                            std::size_t max_count) const {
-  if (value.type != msgpack::type::ARRAY || value.via.array.size > max_count) {
+  if (value.kind != Kind::kArray || value.size > max_count) {
     fail_value(key, value, fmt::format("a list of at most {} numbers", max_count));
   }
   std::vector<double> numbers;
-  for (std::uint32_t i = 0; i < value.via.array.size; ++i) {
-    const msgpack::object& element = value.via.array.ptr[i];
-    if (element.type != msgpack::type::FLOAT64 || !std::isfinite(element.via.f64)) {
+  for (const MsgpackElement& element : elements_of(value)) {
+    if (element.kind != Kind::kFloat || !std::isfinite(element.number)) {
       fail_value(key, element, "finite numbers");
     }
-    numbers.push_back(element.via.f64);
+    numbers.push_back(element.number);
   }
   return numbers;
 }
 
 Rigid3 MapRecord::transform(std::string_view key) {
-  const msgpack::object& value = take(key);
-  if (!is_map_of(value, {"rotation", "translation"})) {
-    fail_value(key, value, "a map of rotation and translation");
-  }
-  const std::vector<double> rotation = finite_list(key, *find_in(value, "rotation"), 4);
-  const std::vector<double> translation = finite_list(key, *find_in(value, "translation"), 3);
+  const MsgpackElement& value = take(key);
+  const auto parts = values_of<2>(value, {"rotation", "translation"});
+  if (!parts) fail_value(key, value, "a map of rotation and translation");
+  const std::vector<double> rotation = finite_list(key, (*parts)[0], 4);
+  const std::vector<double> translation = finite_list(key, (*parts)[1], 3);
   if (rotation.size() != 4 || translation.size() != 3) {
     fail(fmt::format("{} has a rotation of {} and a translation of {} numbers, expected 4 and 3",
                      key,
@@ -215,15 +214,15 @@ Rigid3 MapRecord::transform(std::string_view key) {
 }
 
 std::vector<std::pair<std::string, std::uint64_t>> MapRecord::counts(std::string_view key) {
-  const msgpack::object& value = take(key);
-  if (value.type != msgpack::type::MAP) fail_value(key, value, "a map of counts");
+  const MsgpackElement& value = take(key);
+  if (value.kind != Kind::kMap) fail_value(key, value, "a map of counts");
+  const std::vector<MsgpackElement> elements = elements_of(value);
   std::vector<std::pair<std::string, std::uint64_t>> counts;
-  for (std::uint32_t i = 0; i < value.via.map.size; ++i) {
-    const msgpack::object_kv& entry = value.via.map.ptr[i];
-    if (entry.key.type != msgpack::type::STR || entry.val.type != msgpack::type::POSITIVE_INTEGER) {
-      fail_value(key, entry.val, "counts by kind");
+  for (std::size_t i = 0; i < elements.size(); i += 2) {
+    if (elements[i].kind != Kind::kText || elements[i + 1].kind != Kind::kUnsigned) {
+      fail_value(key, elements[i + 1], "counts by kind");
     }
-    counts.emplace_back(view(entry.key), entry.val.via.u64);
+    counts.emplace_back(elements[i].bytes, elements[i + 1].whole);
   }
   return counts;
 }
@@ -231,15 +230,14 @@ std::vector<std::pair<std::string, std::uint64_t>> MapRecord::counts(std::string
 std::string_view MapRecord::array_bytes(std::string_view key,
                                         const MapArrayLayout& layout,
                                         std::optional<std::size_t> count) {
-  const msgpack::object& value = take(key);
-  if (!is_map_of(value, {"dtype", "shape", "data"})) {
-    fail_value(key, value, "an array: a map of dtype, shape and data");
-  }
-  const msgpack::object& dtype = *find_in(value, "dtype");
-  if (dtype.type != msgpack::type::STR || view(dtype) != layout.dtype) {
+  const MsgpackElement& value = take(key);
+  const auto parts = values_of<3>(value, {"dtype", "shape", "data"});
+  if (!parts) fail_value(key, value, "an array: a map of dtype, shape and data");
+  const auto& [dtype, shape, data] = *parts;
+  if (dtype.kind != Kind::kText || dtype.bytes != layout.dtype) {
     fail(fmt::format("{} has the dtype {}, expected {}", key, describe(dtype), layout.dtype));
   }
-  const std::optional<std::size_t> rows = count_elements(*find_in(value, "shape"), layout);
+  const std::optional<std::size_t> rows = count_elements(shape, layout);
   if (!rows || (count && *rows != *count)) {
     fail(fmt::format("{} has {}, expected {}{}{}",
                      key,
@@ -250,11 +248,10 @@ std::string_view MapRecord::array_bytes(std::string_view key,
   }
   std::size_t num_bytes = *rows * layout.number_bytes;
   for (const std::size_t size : layout.element_shape) num_bytes *= size;
-  const msgpack::object& data = *find_in(value, "data");
-  if (data.type != msgpack::type::BIN || data.via.bin.size != num_bytes) {
+  if (data.kind != Kind::kBytes || data.size != num_bytes) {
     fail(fmt::format("{} has as data {}, expected {} bytes", key, describe(data), num_bytes));
   }
-  return {data.via.bin.ptr, data.via.bin.size};
+  return data.bytes;
 }
 
 void MapRecord::expect_no_more() const {

@@ -6,7 +6,6 @@
 #include <cstdint>
 #include <cstring>
 #include <limits>
-#include <msgpack.hpp>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -15,7 +14,8 @@
 #include <vector>
 
 #include "waymark/geometry/rigid3.h"
-#include "waymark/mapfile/map_array.h"
+#include "waymark/mapfile/map_layout.h"
+#include "waymark/mapfile/msgpack.h"
 
 namespace waymark {
 
@@ -28,17 +28,22 @@ struct NumberRange {
 inline constexpr NumberRange kNotNegative{0.0};
 inline constexpr NumberRange kPositive{std::numeric_limits<double>::min()};
 
+/// A value with the bytes of what is in it.
+struct MsgpackElement : MsgpackValue {
+  std::string_view content;  ///< Of an array or map.
+};
+
 /// One map of a map file, its values by key. Each value is asked for once, with what it may be;
 /// whatever else it is fails with an InputError that says so. Borrows the bytes.
 class MapRecord {
  public:
   /// `where` begins error messages: the file and which record it is.
-  MapRecord(const msgpack::object& object, std::string where);
+  MapRecord(std::string_view bytes, std::string where);
 
   const std::string& where() const { return where_; }
   [[noreturn]] void fail(const std::string& what) const;
 
-  bool has(std::string_view key) const { return find(key) != nullptr; }
+  bool has(std::string_view key) const;
   std::uint64_t whole(std::string_view key, std::uint64_t max);
   std::int64_t signed_whole(std::string_view key);
   bool flag(std::string_view key);
@@ -63,18 +68,18 @@ class MapRecord {
  private:
   struct Entry {
     std::string_view key;
-    const msgpack::object* value = nullptr;
+    MsgpackElement value;
     bool is_used = false;
   };
 
-  const msgpack::object* find(std::string_view key) const;
-  const msgpack::object& take(std::string_view key);
+  const MsgpackElement& take(std::string_view key);
   [[noreturn]] void fail_value(std::string_view key,
-                               const msgpack::object& value,
+                               const MsgpackValue& value,
                                const std::string& expected) const;
   std::vector<double> finite_list(std::string_view key,
-                                  const msgpack::object& value,
+                                  const MsgpackElement& value,
                                   std::size_t max_count) const;
+  bool is_nil(std::string_view key) const;
   std::string_view array_bytes(std::string_view key,
                                const MapArrayLayout& layout,
                                std::optional<std::size_t> count);
@@ -86,8 +91,7 @@ class MapRecord {
 
 template <class IdType>
 IdType MapRecord::id(std::string_view key, std::uint64_t end) {
-  const msgpack::object* value = find(key);
-  if (value && value->type == msgpack::type::NIL) {
+  if (is_nil(key)) {
     take(key);
     return {};
   }

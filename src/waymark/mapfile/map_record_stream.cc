@@ -5,12 +5,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/mapfile/crc32c.h"
-#include "waymark/mapfile/map_limits.h"
+#include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
 namespace {
@@ -18,19 +19,24 @@ namespace {
 constexpr std::size_t kChunkBytes = std::size_t{64} << 10;
 constexpr std::size_t kMaxKeys = 64;
 constexpr std::size_t kMaxDepth = 4;
-constexpr std::size_t kChecksumBytes = 5;  // Its type and its value, always of four bytes.
 
-/// Data stays in the buffer.
-bool refer_to_buffer(msgpack::type::object_type, std::size_t, void*) { return true; }
+using Kind = MsgpackValue::Kind;
 
-const msgpack::object* find_value(const msgpack::object& map, std::string_view key) {
-  if (map.type != msgpack::type::MAP) return nullptr;
-  for (std::uint32_t i = 0; i < map.via.map.size; ++i) {
-    const msgpack::object_kv& entry = map.via.map.ptr[i];
-    if (entry.key.type != msgpack::type::STR) continue;
-    if (std::string_view(entry.key.via.str.ptr, entry.key.via.str.size) == key) return &entry.val;
+/// The value of a key of a map that is whole; of no kind if there is none.
+MsgpackValue find_value(std::string_view record, std::string_view key) {
+  std::size_t at = 0;
+  MsgpackValue map, found, value;
+  read_msgpack(record, at, map);
+  for (std::size_t i = 0; map.kind == Kind::kMap && i < map.size; ++i) {
+    std::size_t value_at = at;
+    skip_msgpack(record, value_at);
+    const bool is_found =
+        read_msgpack(record, at, value) && value.kind == Kind::kText && value.bytes == key;
+    at = value_at;
+    if (is_found && read_msgpack(record, value_at, found)) return found;
+    skip_msgpack(record, at);
   }
-  return nullptr;
+  return {};
 }
 
 }  // namespace
@@ -41,14 +47,12 @@ MapRecordStream::MapRecordStream(std::istream& stream, std::string name)
 MapRecord MapRecordStream::next() {
   kind_.clear();
   id_ = 0;
-  const msgpack::object object = unpack_next();
-  if (const msgpack::object* kind = find_value(object, "kind")) {
-    if (kind->type == msgpack::type::STR) kind_.assign(kind->via.str.ptr, kind->via.str.size);
+  const std::string_view record = read_next();
+  if (const MsgpackValue kind = find_value(record, "kind"); kind.kind == Kind::kText) {
+    kind_ = kind.bytes;
   }
-  if (const msgpack::object* id = find_value(object, "id")) {
-    if (id->type == msgpack::type::POSITIVE_INTEGER) id_ = id->via.u64;
-  }
-  return MapRecord(object, where());
+  id_ = find_value(record, "id").whole;
+  return MapRecord(record, where());
 }
 
 bool MapRecordStream::is_at_end() { return begin_ == buffer_.size() && !read_more(); }
@@ -76,54 +80,69 @@ bool MapRecordStream::read_more() {
   return buffer_.size() > old_size;
 }
 
-msgpack::object MapRecordStream::unpack_next() {
-  const msgpack::unpack_limit limit(
-      kMaxKeys, kMaxKeys, kMaxTextBytes, kMaxArrayBytes, 0, kMaxDepth);
-  while (true) {
-    zone_.clear();
-    std::size_t end = begin_;
-    try {
-      const msgpack::object object = msgpack::unpack(
-          zone_, buffer_.data(), buffer_.size(), end, refer_to_buffer, nullptr, limit);
-      const auto bytes = std::string_view(buffer_).substr(begin_, end - begin_);
-      check_checksum(object, bytes);
-      begin_ = end;
-      ++num_records_;
-      return object;
-    } catch (const msgpack::insufficient_bytes&) {
-      if (buffer_.size() - begin_ > kMaxRecordBytes) {
-        throw InputError(place(),
-                         fmt::format("is larger than {} MB, expected less", kMaxRecordBytes >> 20));
-      }
-    } catch (const msgpack::size_overflow& error) {
-      throw InputError(place(),
-                       fmt::format("is too large or too deep ({}), expected less", error.what()));
-    } catch (const msgpack::unpack_error&) {
+/// Finds the end of the record at begin_; false where the buffer ends before. What is too large is
+/// refused by its first bytes.
+bool MapRecordStream::measure(std::size_t& end) const {
+  std::array<std::size_t, kMaxDepth> num_left;
+  std::size_t depth = 0;
+  MsgpackValue value;
+  end = begin_;
+  do {
+    const bool is_whole = read_msgpack(buffer_, end, value);
+    const bool is_nest = value.kind == Kind::kArray || value.kind == Kind::kMap;
+    if ((is_nest && (value.size > kMaxKeys || depth == kMaxDepth)) ||
+        (value.kind == Kind::kText && value.size > kMaxTextBytes) ||
+        (value.kind == Kind::kBytes && value.size > kMaxArrayBytes)) {
+      throw InputError(place(), "is too large or too deep, expected less");
+    }
+    if (!is_whole) return false;
+    if (value.kind == Kind::kNone || value.kind == Kind::kExtension) {
       throw InputError(place(), "is damaged, expected MessagePack data");
+    }
+    if (is_nest && value.size > 0) {
+      num_left[depth++] = value.kind == Kind::kMap ? 2 * value.size : value.size;
+    } else {
+      while (depth > 0 && --num_left[depth - 1] == 0) --depth;
+    }
+  } while (depth > 0);
+  return true;
+}
+
+std::string_view MapRecordStream::read_next() {
+  std::size_t end = begin_;
+  while (!measure(end)) {
+    if (buffer_.size() - begin_ > kMaxRecordBytes) {
+      throw InputError(place(),
+                       fmt::format("is larger than {} MB, expected less", kMaxRecordBytes >> 20));
     }
     if (!read_more())
       throw InputError(place(), "is truncated, expected records up to one of the kind end");
   }
+  const std::string_view record = std::string_view(buffer_).substr(begin_, end - begin_);
+  check_checksum(record);
+  begin_ = end;
+  ++num_records_;
+  return record;
 }
 
-void MapRecordStream::check_checksum(const msgpack::object& object, std::string_view bytes) const {
-  if (num_records_ == 0 && !find_value(object, "format")) {
+void MapRecordStream::check_checksum(std::string_view record) const {
+  if (num_records_ == 0 && find_value(record, "format").kind == Kind::kNone) {
     throw InputError(name_, "is no map file, expected one written by waymark");
   }
-  const msgpack::object* stated = find_value(object, "crc32c");
-  const msgpack::object_kv* last = stated ? object.via.map.ptr + object.via.map.size - 1 : nullptr;
-  const bool is_in_place = stated && stated == &last->val &&
-                           stated->type == msgpack::type::POSITIVE_INTEGER &&
-                           bytes[bytes.size() - kChecksumBytes] == '\xce';
-  if (!is_in_place)
+  constexpr std::string_view kLastKey =
+      "\xa6"
+      "crc32c\xce";  // And the type of what follows.
+  constexpr std::size_t kChecksumBytes = 5;
+  const std::size_t size = record.size() - std::min(record.size(), kChecksumBytes);
+  const MsgpackValue stated = find_value(record, "crc32c");
+  if (stated.kind != Kind::kUnsigned || !record.substr(0, size + 1).ends_with(kLastKey))
     throw InputError(place(),
                      "does not end with its checksum, expected crc32c as its last key, of 32 bits");
-  const std::uint32_t computed = crc32c(bytes.substr(0, bytes.size() - kChecksumBytes));
-  if (computed != stated->via.u64) {
+  const std::uint32_t computed = crc32c(record.substr(0, size));
+  if (computed != stated.whole) {
     throw InputError(
         place(),
-        fmt::format(
-            "is damaged: its checksum is {:08x}, expected {:08x}", computed, stated->via.u64));
+        fmt::format("is damaged: its checksum is {:08x}, expected {:08x}", computed, stated.whole));
   }
 }
 

@@ -4,8 +4,6 @@
 
 #include <cstdint>
 #include <istream>
-#include <msgpack.hpp>
-#include <optional>
 #include <string>
 #include <string_view>
 
@@ -32,8 +30,9 @@ class MapRecordStream {
 
  private:
   bool read_more();
-  msgpack::object unpack_next();
-  void check_checksum(const msgpack::object& object, std::string_view bytes) const;
+  bool measure(std::size_t& end) const;
+  std::string_view read_next();
+  void check_checksum(std::string_view record) const;
   std::string where() const;
   std::string place() const;
 
@@ -45,7 +44,6 @@ class MapRecordStream {
   std::uint64_t num_records_ = 0;
   std::string kind_;
   std::uint64_t id_ = 0;
-  msgpack::zone zone_;
 };
 
 }  // namespace waymark

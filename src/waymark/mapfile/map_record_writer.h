@@ -11,7 +11,7 @@
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/mapfile/map_array.h"
+#include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
 

@@ -7,7 +7,7 @@
 #include "waymark/base/check.h"
 #include "waymark/camera/same_rig.h"
 #include "waymark/mapfile/map_file.h"
-#include "waymark/mapfile/map_limits.h"
+#include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_record_writer.h"
 
 namespace waymark {

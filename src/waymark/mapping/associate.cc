@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/associate.h"
 
-#include <algorithm>
-
 #include "waymark/image/range_precision.h"
 
 namespace waymark {
@@ -64,19 +62,6 @@ int add_landmarks_from_range(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
     ++num_added;
   }
   return num_added;
-}
-
-std::vector<KeyframeId> strongest_neighbours(const Map& map,
-                                             KeyframeId keyframe,
-                                             std::size_t max_count) {
-  std::vector<CovisibilityEdge> edges = map.covisible(keyframe);
-  std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
-    return a.num_shared != b.num_shared ? a.num_shared > b.num_shared : a.keyframe > b.keyframe;
-  });
-  if (edges.size() > max_count) edges.resize(max_count);
-  std::vector<KeyframeId> ids;
-  for (const CovisibilityEdge& edge : edges) ids.push_back(edge.keyframe);
-  return ids;
 }
 
 }  // namespace waymark

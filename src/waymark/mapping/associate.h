@@ -37,9 +37,4 @@ using DirtyLandmarks = std::set<LandmarkId>;
 /// Returns how many.
 int add_landmarks_from_range(Map& map, KeyframeId keyframe, DirtyLandmarks& dirty);
 
-/// Keyframes most covisible with one, at most max_count, most shared first.
-std::vector<KeyframeId> strongest_neighbours(const Map& map,
-                                             KeyframeId keyframe,
-                                             std::size_t max_count);
-
 }  // namespace waymark

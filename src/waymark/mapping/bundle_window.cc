@@ -77,18 +77,6 @@ struct WindowProblem {
   std::vector<Observation> observations;  ///< Parallel to problem.observations.
 };
 
-BundleObservation measure(const Keyframe& keyframe, std::uint32_t feature) {
-  const Features& features = *keyframe.features;
-  BundleObservation measured;
-  measured.camera = features.keypoints[feature].camera;
-  measured.bearing = features.bearings[feature];
-  measured.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  const MeasuredRange range = features.measured_range(feature);
-  measured.inverse_range = range.inverse;
-  measured.inverse_range_sigma = range.inverse_sigma;
-  return measured;
-}
-
 WindowProblem make_problem(const Map& map, const BundleWindow& window) {
   WindowProblem result;
   BundleProblem& problem = result.problem;
@@ -107,11 +95,10 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
     for (const Observation& observation : landmark.observations) {
       const std::size_t pose = index_of(keyframes, observation.keyframe);
       if (pose == keyframes.size()) continue;
-      BundleObservation measured =
-          measure(map.keyframes().at(observation.keyframe), observation.feature);
-      measured.pose = static_cast<std::uint32_t>(pose);
-      measured.point = point;
-      problem.observations.push_back(measured);
+      const Features& features = *map.keyframes().at(observation.keyframe).features;
+      problem.observations.push_back({features.measurement(observation.feature),
+                                      static_cast<std::uint32_t>(pose),
+                                      point});
       result.observations.push_back(observation);
     }
   }

@@ -153,17 +153,6 @@ double announced_error(const Session& session) {
   return std::sqrt(sum / static_cast<double>(session.position_variances.size()));
 }
 
-BundleObservation observation_of(const Features& features, std::uint32_t feature) {
-  BundleObservation observation;
-  observation.camera = features.keypoints[feature].camera;
-  observation.bearing = features.bearings[feature];
-  observation.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  const MeasuredRange measured = features.measured_range(feature);
-  observation.inverse_range = measured.inverse;
-  observation.inverse_range_sigma = measured.inverse_sigma;
-  return observation;
-}
-
 /// All sightings of all landmarks by a part of the frames, as only the simulator knows them, at the
 /// true poses and points.
 BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
@@ -176,9 +165,8 @@ BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
     for (std::uint32_t k = 0; k < seen.features->size(); ++k) {
       const std::uint32_t landmark = seen.landmark_of_feature[k];
       if (landmark == kNoLandmark) continue;
-      BundleObservation observation = observation_of(*seen.features, k);
-      observation.pose = static_cast<std::uint32_t>(problem.rig_from_world.size());
-      sightings[landmark].push_back(observation);
+      const auto pose = static_cast<std::uint32_t>(problem.rig_from_world.size());
+      sightings[landmark].push_back({seen.features->measurement(k), pose});
     }
     problem.is_pose_fixed.push_back(problem.rig_from_world.empty());
     problem.rig_from_world.push_back(truth(i).inverse());

@@ -6,20 +6,16 @@
 #include <cstdint>
 #include <vector>
 
+#include "waymark/camera/measurement.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 
 /// One feature that sees one point.
-struct BundleObservation {
-  std::uint32_t pose = 0;                              ///< Index in BundleProblem::rig_from_world.
-  std::uint32_t point = 0;                             ///< Index in BundleProblem::points.
-  std::uint8_t camera = 0;                             ///< Index in the rig of the pose.
-  Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();  ///< Measured, unit, in the camera.
-  Matrix23f level_pixel_from_bearing = Matrix23f::Zero();  ///< W of Features.
-  float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
-  float inverse_range_sigma = 0.0f;  ///< 1/m; 0 where there is no measurement.
+struct BundleObservation : Measurement {
+  std::uint32_t pose = 0;   ///< Index in BundleProblem::rig_from_world.
+  std::uint32_t point = 0;  ///< Index in BundleProblem::points.
 };
 
 /// Poses and points in contiguous arrays, in the order of their ids, and what ties them.

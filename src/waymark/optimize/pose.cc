@@ -126,22 +126,16 @@ class PoseSolver {
   int num_iterations_ = 0;
 };
 
-struct Spread {
-  double variance = 0.0;  ///< Of a residual component.
-  double mean = 0.0;      ///< Of the residuals' length.
-};
-
-/// The gate cuts off the tail of the residuals: for a squared length s = variance * chi2(2) below
-/// the gate, E[s] = 2 * variance - gate * q / (1 - q), q = exp(-gate / (2 * variance)); solved by
-/// fixed-point iteration. The assumed noise counts as kNoisePriorStrength components.
-Spread measure_spread(const Arrays& arrays, double gate, double assumed_variance) {
+/// Variance of a residual component. The gate cuts off the tail of the residuals: for a squared
+/// length s = variance * chi2(2) below the gate, E[s] = 2 * variance - gate * q / (1 - q), q =
+/// exp(-gate / (2 * variance)); solved by fixed-point iteration. The assumed noise counts as
+/// kNoisePriorStrength components.
+double measure_variance(const Arrays& arrays, double gate, double assumed_variance) {
   double sum = 0.0;
-  double sum_of_lengths = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < arrays.observation.size(); ++i) {
     if (arrays.observation[i] == UINT32_MAX || !arrays.is_inlier[arrays.observation[i]]) continue;
     sum += arrays.squared_residual[i];
-    sum_of_lengths += std::sqrt(arrays.squared_residual[i]);
     count += 1.0;
   }
   // The pose absorbs 6 components, as many as the observations have at most.
@@ -152,7 +146,7 @@ Spread measure_spread(const Arrays& arrays, double gate, double assumed_variance
     const double q = std::exp(-gate / (2.0 * std::min(variance, assumed_variance)));
     variance = (prior + sum + count * gate * q / (1.0 - q)) / num_components;
   }
-  return {variance, count > 0.0 ? sum_of_lengths / count : 0.0};
+  return variance;
 }
 
 }  // namespace
@@ -181,17 +175,15 @@ PoseEstimate optimize_pose(const Rig& rig,
     classes = classify_pose_observations(observations, gate, arrays);
   }
   const double assumed_variance = options.noise_px * options.noise_px;
-  const Spread spread = measure_spread(arrays, gate, assumed_variance);
+  const double variance = measure_variance(arrays, gate, assumed_variance);
   const Matrix6d of_bearings = solver.has_ranges() ? solver.bearing_hessian(huber) : hessian;
-  const Matrix6d information =
-      of_bearings / spread.variance + (hessian - of_bearings) / assumed_variance;
+  const Matrix6d information = of_bearings / variance + (hessian - of_bearings) / assumed_variance;
   PoseEstimate estimate;
   estimate.rig_from_world = solver.rig_from_world();
   estimate.is_inlier = arrays.is_inlier;
   estimate.num_inliers = classes.num_inliers;
   estimate.covariance = covariance_from<6>(information);
-  estimate.noise_measured_px = std::sqrt(spread.variance);
-  estimate.mean_residual_px = spread.mean;
+  estimate.noise_measured_px = std::sqrt(variance);
   estimate.num_iterations = solver.num_iterations();
   return estimate;
 }

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/camera/measurement.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 
@@ -27,6 +28,8 @@ struct PoseObservations {
 
   std::size_t size() const { return point_in_world.size(); }
   void clear();
+  /// Adds what was measured of a point; not where there are weights.
+  void add(const Eigen::Vector3d& point, const Measurement& measured);
 };
 
 struct PoseOptions {
@@ -50,7 +53,6 @@ struct PoseEstimate {
   /// Standard deviation of a residual component as the inliers show it; leans on noise_px when
   /// there are few of them.
   double noise_measured_px = 0.0;
-  double mean_residual_px = 0.0;  ///< Mean length of the inliers' residuals.
   int num_iterations = 0;
 };
 

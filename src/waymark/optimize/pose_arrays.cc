@@ -68,6 +68,15 @@ void pad(Arrays& arrays) {
 
 }  // namespace
 
+void PoseObservations::add(const Eigen::Vector3d& point, const Measurement& measured) {
+  point_in_world.push_back(point);
+  bearing.push_back(measured.bearing);
+  level_pixel_from_bearing.push_back(measured.level_pixel_from_bearing);
+  camera.push_back(measured.camera);
+  inverse_range.push_back(measured.inverse_range);
+  inverse_range_sigma.push_back(measured.inverse_range_sigma);
+}
+
 void PoseObservations::clear() {
   point_in_world.clear();
   bearing.clear();

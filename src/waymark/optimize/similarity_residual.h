@@ -7,7 +7,7 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/camera/camera.h"
+#include "waymark/camera/measurement.h"
 #include "waymark/geometry/sim3.h"
 
 namespace waymark {
@@ -20,6 +20,12 @@ struct LandmarkMatches {
     std::vector<Eigen::Vector3d> point_in_cam;
     std::vector<Eigen::Vector3f> bearing;             ///< Measured, unit.
     std::vector<Matrix23f> level_pixel_from_bearing;  ///< W of Features.
+
+    void add(const Eigen::Vector3d& point, const Measurement& measured) {
+      point_in_cam.push_back(point);
+      bearing.push_back(measured.bearing);
+      level_pixel_from_bearing.push_back(measured.level_pixel_from_bearing);
+    }
   };
   Side a, b;
 

@@ -35,11 +35,6 @@ inline Matrix23d pixel_from_bearing(const Eigen::Vector3d& bearing, double focal
   return w;
 }
 
-struct Measurement {
-  Eigen::Vector3f bearing;
-  Matrix23f level_pixel_from_bearing;
-};
-
 /// Sees a point with noise_px in each direction at one of four pyramid levels.
 inline Measurement measure(const Eigen::Vector3d& point_in_cam, double noise_px, Rng& rng) {
   const double focal_px = 400.0 / std::pow(1.2, rng.below(4));
@@ -49,7 +44,7 @@ inline Measurement measure(const Eigen::Vector3d& point_in_cam, double noise_px,
   const double dy = noise_px * rng.normal();
   const Eigen::Vector3d measured =
       (direction + w.transpose() * Eigen::Vector2d(dx, dy) / (focal_px * focal_px)).normalized();
-  return {measured.cast<float>(), pixel_from_bearing(measured, focal_px).cast<float>()};
+  return {0, measured.cast<float>(), pixel_from_bearing(measured, focal_px).cast<float>()};
 }
 
 /// Cameras that look forward, left, ... half a metre apart, slightly rotated.
@@ -145,13 +140,8 @@ inline void observe(const BundleSceneOptions& options,
     const bool is_outlier = rng.uniform() < options.share_of_outliers;
     const Eigen::Vector3d seen =
         is_outlier ? point_in_cam + random_vector(rng, 0.3 * point_in_cam.norm()) : point_in_cam;
-    const Measurement measurement = measure(seen, options.noise_px, rng);
-    BundleObservation observation;
-    observation.pose = pose;
-    observation.point = point;
+    BundleObservation observation{measure(seen, options.noise_px, rng), pose, point};
     observation.camera = static_cast<std::uint8_t>(camera);
-    observation.bearing = measurement.bearing;
-    observation.level_pixel_from_bearing = measurement.level_pixel_from_bearing;
     if (options.range_sigma > 0.0) {
       const double inverse_range = 1.0 / point_in_cam.norm() + options.range_sigma * rng.normal();
       observation.inverse_range = static_cast<float>(inverse_range);

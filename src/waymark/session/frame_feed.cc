@@ -43,19 +43,14 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
-  record.state = result.state;
-  record.reason = result.reason;
-  record.num_matches = result.num_matches;
-  record.num_inliers = result.num_inliers;
-  record.num_candidates = result.num_candidates;
+  static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
-  if (result.submap.is_valid()) record.submap = result.submap.value;
   record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());
   return record;
 }
 
-FrameInput borrow(const InputFrame& frame) {
-  FrameInput input;
+FrameImages borrow(const InputFrame& frame) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images.at(0).view();
   if (frame.images.size() > 1) input.image1 = frame.images[1].view();
@@ -67,17 +62,17 @@ FrameInput borrow(const InputFrame& frame) {
 }  // namespace
 
 void forget_session(FedFrames& frames) {
-  for (const std::size_t row : frames.fed) frames.table.frames[row].submap.reset();
+  for (const std::size_t row : frames.fed) frames.table.frames[row].submap = SubmapId{};
   frames.fed.clear();
 }
 
 FedFrames feed_all(Input& input,
-                   const std::function<TrackingResult(const FrameInput&)>& feed,
+                   const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer) {
   FedFrames frames;
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
-  while (!should_stop()) {
+  while (!should_stop || !should_stop()) {
     const std::optional<InputFrame> frame = input.next();
     if (!frame) break;
     if (frame->fault != FrameFault::kNone) {
@@ -89,7 +84,7 @@ FedFrames feed_all(Input& input,
       frames.tracking_ms.push_back(result.stages.tracking_ms());
       frames.table.frames.push_back(record_of_result(*frame, result));
     }
-    observer(frames.table.frames.back());
+    if (observer) observer(frames.table.frames.back());
   }
   return frames;
 }
@@ -103,18 +98,6 @@ std::vector<SubmapTrajectory> split_by_submap(
     return a.second.size() > b.second.size();
   });
   return parts;
-}
-
-std::vector<StampedPose> keyframe_poses(const Map& map, SubmapId submap) {
-  std::vector<StampedPose> poses;
-  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    if (keyframe.submap != submap) return;
-    poses.push_back({keyframe.timestamp_ns, keyframe.rig_from_world.inverse()});
-  });
-  std::sort(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) {
-    return a.timestamp_ns < b.timestamp_ns;
-  });
-  return poses;
 }
 
 UsageMeter::UsageMeter()

@@ -31,7 +31,7 @@ void forget_session(FedFrames& frames);
 /// Feeds an input until it ends or should_stop() says so. Frames with a fault are not fed, but have
 /// their row.
 FedFrames feed_all(Input& input,
-                   const std::function<TrackingResult(const FrameInput&)>& feed,
+                   const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer);
 
@@ -40,9 +40,6 @@ using SubmapTrajectory = std::pair<SubmapId, std::vector<StampedPose>>;
 /// The frames of each sub-map, most frames first, the older sub-map where they tie.
 std::vector<SubmapTrajectory> split_by_submap(
     const std::vector<std::pair<SubmapId, StampedPose>>& frames);
-
-/// The keyframes of a sub-map, by time.
-std::vector<StampedPose> keyframe_poses(const Map& map, SubmapId submap);
 
 /// What was used since its construction.
 class UsageMeter {

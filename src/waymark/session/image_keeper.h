@@ -11,7 +11,7 @@
 
 #include "waymark/input/input.h"
 #include "waymark/map/map.h"
-#include "waymark/mapfile/keyframe_images.h"
+#include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/session/live_input.h"
 
+#include <algorithm>
+#include <thread>
 #include <utility>
 
 namespace waymark {
@@ -20,6 +22,28 @@ void drop(InputFrame& frame) {
 
 }  // namespace
 
+std::optional<InputFrame> PacedInput::next() {
+  using namespace std::chrono_literals;
+  constexpr Clock::duration kStep = 50ms;  // A wait may be long and the user may want to end it.
+  std::optional<InputFrame> frame = input_.next();
+  if (!frame) return frame;
+  if (!start_) start_ = Start{Clock::now(), frame->timestamp_ns};
+  const double elapsed_s = 1e-9 * static_cast<double>(frame->timestamp_ns - start_->timestamp_ns);
+  const auto since_start = std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(elapsed_s / speed_));
+  for (auto now = Clock::now(); !should_stop_(); now = Clock::now()) {
+    if (is_paused_()) {
+      std::this_thread::sleep_for(kStep);
+      start_->time += Clock::now() - now;
+      continue;
+    }
+    const Clock::time_point due = start_->time + since_start;
+    if (now >= due) break;
+    std::this_thread::sleep_for(std::min(due - now, kStep));
+  }
+  return frame;
+}
+
 LiveInput::LiveInput(Input& input,
                      std::function<bool()> should_stop,
                      std::function<bool()> is_paused)
@@ -35,16 +59,20 @@ LiveInput::~LiveInput() {
 
 void LiveInput::read() {
   Arrival arrival;
-  while (!is_closed_ && !should_stop_()) {
-    std::optional<InputFrame> frame = input_.next();
-    if (!frame) break;
-    if (input_.info().is_live && is_paused_()) continue;
-    arrival.push_back(std::make_unique<InputFrame>(*std::move(frame)));
-    if (arrivals_.try_push(arrival)) {
-      arrival.clear();
-    } else {
-      drop(*arrival.back());
+  try {
+    while (!is_closed_ && !should_stop_()) {
+      std::optional<InputFrame> frame = input_.next();
+      if (!frame) break;
+      if (input_.info().is_live && is_paused_()) continue;
+      arrival.push_back(std::make_unique<InputFrame>(*std::move(frame)));
+      if (arrivals_.try_push(arrival)) {
+        arrival.clear();
+      } else {
+        drop(*arrival.back());
+      }
     }
+  } catch (...) {
+    failure_ = std::current_exception();
   }
   arrivals_.push(std::move(arrival));  // What was dropped just before the end.
   arrivals_.close();
@@ -54,12 +82,25 @@ std::optional<InputFrame> LiveInput::next() {
   if (!thread_.joinable()) thread_ = std::jthread([this] { read(); });
   while (ready_.empty()) {
     std::optional<Arrival> arrival = arrivals_.pop();
+    if (!arrival && failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     if (!arrival) return std::nullopt;
     ready_ = *std::move(arrival);
   }
   const std::unique_ptr<InputFrame> frame = std::move(ready_.front());
   ready_.pop_front();
   return std::move(*frame);
+}
+
+TimedInput::TimedInput(Input& input,
+                       double pace,
+                       bool may_drop,
+                       const std::function<bool()>& should_stop,
+                       const std::function<bool()>& is_paused)
+    : input_(&input) {
+  if (pace > 0.0) input_ = &paced_.emplace(*input_, pace, should_stop, is_paused);
+  if (may_drop && (pace > 0.0 || input.info().is_live)) {
+    input_ = &arriving_.emplace(*input_, should_stop, is_paused);
+  }
 }
 
 }  // namespace waymark

@@ -14,7 +14,7 @@ SessionResults localize_input(Input& input,
                               const FrameObserver& observer) {
   const UsageMeter usage;
   std::vector<std::pair<SubmapId, StampedPose>> poses;
-  const auto feed = [&](const FrameInput& frame) {
+  const auto feed = [&](const FrameImages& frame) {
     const TrackingResult result =
         order == ImageOrder::kStream ? localizer.track(frame) : localizer.locate(frame);
     if (result.world_from_rig) {

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/exchange/export_scene.h"
 
 namespace waymark {
 namespace {
@@ -20,7 +21,7 @@ void update_states(const System& system, FedFrames& frames) {
     if (states[i] == FrameState::kFilled) record.reason = FrameReason::kNone;
   }
   for (const TrajectoryFrame& frame : system.trajectory()) {
-    frames.table.frames[frames.fed.at(frame.frame.value)].submap = frame.submap.value;
+    frames.table.frames[frames.fed.at(frame.frame.value)].submap = frame.submap;
   }
 }
 
@@ -49,16 +50,9 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system) {
 
 }  // namespace
 
-SessionResults run_session(Input& input,
-                           System& system,
-                           const std::function<bool()>& should_stop,
-                           const FrameObserver& observer) {
-  return run_session(input, system, {should_stop, observer, nullptr, nullptr});
-}
-
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
-  const auto feed = [&](const FrameInput& frame) {
+  const auto feed = [&](const FrameImages& frame) {
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
     return result;
@@ -80,7 +74,7 @@ void add_trajectories(const Map& map,
                       const std::vector<std::pair<SubmapId, StampedPose>>& poses,
                       SessionResults& results) {
   for (auto& [submap, trajectory] : split_by_submap(poses)) {
-    if (results.trajectories.empty()) results.keyframes = keyframe_poses(map, submap);
+    if (results.trajectories.empty()) results.keyframes = keyframe_trajectory(map, submap);
     results.trajectories.push_back(std::move(trajectory));
   }
   if (!results.trajectories.empty()) {

@@ -26,23 +26,20 @@ struct SessionResults {
   RunSummary summary;
 };
 
-/// Who takes part in a session while it runs.
+/// Who takes part in a session while it runs; any may be empty.
 struct SessionHooks {
   std::function<bool()> should_stop;  ///< Asked before each frame.
   FrameObserver observer;
   /// Hears of each frame that was fed.
-  std::function<void(const FrameInput&, const TrackingResult&)> on_result;
+  std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
 };
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and
 /// collects the results. Frames with a fault are not fed, but have their row. setup, timing, seed
-/// and version of the summary are left to the caller.
-SessionResults run_session(Input& input, System& system, const SessionHooks& hooks);
-SessionResults run_session(Input& input,
-                           System& system,
-                           const std::function<bool()>& should_stop,
-                           const FrameObserver& observer);
+/// and version of the summary are left to the caller. What the input throws ends it, and the map
+/// made so far stays with the system.
+SessionResults run_session(Input& input, System& system, const SessionHooks& hooks = {});
 
 /// Fills in the trajectories of all sub-maps, and what follows from them.
 void add_trajectories(const Map& map,

@@ -10,7 +10,7 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/input/input.h"
-#include "waymark/mapfile/keyframe_images.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/system/settings.h"
 #include "waymark/system/system.h"
 

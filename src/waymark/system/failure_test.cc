@@ -95,7 +95,7 @@ TEST(SystemFailure, RefusedFramesLeaveNoTrace) {
   const Image small(160, 120);
   for (std::size_t i = 0; i < frames().size(); ++i) {
     usual.feed(input_of(frames()[i]));
-    FrameInput wrong = input_of(frames()[i]);
+    FrameImages wrong = input_of(frames()[i]);
     if (i % 3 == 0) wrong.image0 = small.view();
     if (i % 3 == 1) wrong.timestamp_ns = i == 1 ? frames()[0].timestamp_ns : -1;
     if (i % 3 == 2) wrong.mask = small.view();

@@ -87,11 +87,11 @@ class Localizer::Impl {
   }
 
   const Map& map() const { return *snapshot_.map; }
-  TrackingResult track(const FrameInput& input);
-  TrackingResult locate(const FrameInput& input, const std::optional<PoseHint>& hint);
+  TrackingResult track(const FrameImages& images);
+  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint);
 
  private:
-  Frame build(const FrameInput& input, TrackingResult& result);
+  Frame build(const FrameImages& images, TrackingResult& result);
   std::shared_ptr<const Features> find_features(const FrameImages& images);
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
   /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
@@ -110,16 +110,12 @@ class Localizer::Impl {
   Relocalizer relocalizer_;
   std::uint32_t num_frames_ = 0;
   std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
-  std::vector<LandmarkId> landmarks_;
 };
 
-Frame Localizer::Impl::build(const FrameInput& input, TrackingResult& result) {
-  FrameImages images{input.image0, {}, {}, input.mask};
-  if (uses_range_) {
-    images.image1 = input.image1;
-    images.depth = input.depth;
-  }
-  Frame frame{FrameId{num_frames_}, input.timestamp_ns, find_features(images)};
+Frame Localizer::Impl::build(const FrameImages& images, TrackingResult& result) {
+  FrameImages used = images;
+  if (!uses_range_) used.image1 = {}, used.depth = {};
+  Frame frame{FrameId{num_frames_}, images.timestamp_ns, find_features(used)};
   ++num_frames_;
   result.frame = frame.id;
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
@@ -136,27 +132,21 @@ std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages
   if (!images.image1.is_empty()) image1 = reduce(images.image1, reduction_);
   if (!images.depth.is_empty()) depth = pick_reduced(images.depth, reduction_);
   if (!images.mask.is_empty()) mask = pick_reduced(images.mask, reduction_);
-  return builder_.build({image0.view(), image1.view(), depth.view(), mask.view()});
+  return builder_.build(
+      {images.timestamp_ns, image0.view(), image1.view(), depth.view(), mask.view()});
 }
 
-TrackingResult Localizer::Impl::track(const FrameInput& input) {
-  if (last_timestamp_ns_ && input.timestamp_ns <= *last_timestamp_ns_) {
+TrackingResult Localizer::Impl::track(const FrameImages& images) {
+  if (last_timestamp_ns_ && images.timestamp_ns <= *last_timestamp_ns_) {
     throw InputError("frame " + std::to_string(num_frames_),
                      "time stamp is not later than that of the frame before");
   }
   TrackingResult result;
-  const Frame frame = build(input, result);
-  last_timestamp_ns_ = input.timestamp_ns;
+  const Frame frame = build(images, result);
+  last_timestamp_ns_ = images.timestamp_ns;
   const TrackOutcome outcome = tracker_.track(frame, temporary_.visible(), result.stages);
-  bridge_gaps(outcome, input.timestamp_ns);
-  result.state = outcome.state;
-  result.reason = outcome.reason;
-  if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
-  result.covariance = outcome.covariance;
-  result.num_matches = outcome.num_matches;
-  result.num_inliers = outcome.num_inliers;
-  result.num_candidates = outcome.num_candidates;
-  result.submap = outcome.submap;
+  bridge_gaps(outcome, images.timestamp_ns);
+  static_cast<FrameVerdict&>(result) = outcome;
   return result;
 }
 
@@ -168,41 +158,37 @@ void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t time
       });
   if (num_lasting >= kMinLandmarks) last_in_map_ns_ = timestamp_ns;
   const bool has_left = timestamp_ns - last_in_map_ns_ > kMaxBridgeNs;
-  if (is_on_temporary_ && outcome.pose && num_lasting < kEnoughLandmarks && !has_left) {
+  if (is_on_temporary_ && outcome.world_from_rig && num_lasting < kEnoughLandmarks && !has_left) {
     if (!outcome.message) return;
     temporary_.add(std::get<NewKeyframe>(*outcome.message));
   } else if (is_on_temporary_) {
     is_on_temporary_ = false;
     temporary_.clear();
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
-  } else if (outcome.pose && num_lasting < kFewLandmarks) {
+  } else if (outcome.world_from_rig && num_lasting < kFewLandmarks) {
     is_on_temporary_ = true;
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kMapping);
   }
 }
 
-TrackingResult Localizer::Impl::locate(const FrameInput& input,
+TrackingResult Localizer::Impl::locate(const FrameImages& images,
                                        const std::optional<PoseHint>& hint) {
   TrackingResult result;
-  const Frame frame = build(input, result);
+  const Frame frame = build(images, result);
   StageTimer timer(result.stages, Stage::kRecover);
   if (frame.features->num_primary == 0) {
     result.reason = FrameReason::kNoFeatures;
     return result;
   }
   const std::optional<LocatedFrame> located = search(frame, hint);
-  const PlaceDiagnosis& diagnosis = relocalizer_.diagnosis();
-  result.num_candidates = diagnosis.num_candidates;
-  result.reason = diagnosis.reason;
-  result.num_matches = diagnosis.num_matches;
-  result.num_inliers = diagnosis.num_inliers;
+  static_cast<FrameStatus&>(result) = relocalizer_.diagnosis();
   if (!located) return result;
   result.state = FrameState::kTracked;
   result.world_from_rig = located->rig_from_world.inverse();
   result.covariance = located->covariance;
   result.num_matches = located->num_matches;
   result.num_inliers = located->num_inliers;
-  result.submap = submap_of(*snapshot_.map, landmarks_);
+  result.submap = submap_of(*snapshot_.map, located->landmarks);
   return result;
 }
 
@@ -211,20 +197,20 @@ std::optional<LocatedFrame> Localizer::Impl::search(const Frame& frame,
   if (hint) {
     const std::vector<KeyframeId> near = keyframes_near(
         *snapshot_.map, hint->submap, *rig_, hint->world_from_rig.inverse(), kMaxNearHint);
-    if (auto located = relocalizer_.locate_among(frame, *snapshot_.map, near, landmarks_)) {
+    if (auto located = relocalizer_.locate_among(frame, *snapshot_.map, near)) {
       return located;
     }
   }
-  return relocalizer_.locate(frame, *snapshot_.map, *snapshot_.places, landmarks_);
+  return relocalizer_.locate(frame, *snapshot_.map, *snapshot_.places);
 }
 
 Localizer::Localizer(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
     : impl_(std::make_unique<Impl>(std::move(rig), settings, std::move(map))) {}
 Localizer::~Localizer() = default;
 const Map& Localizer::map() const { return impl_->map(); }
-TrackingResult Localizer::track(const FrameInput& input) { return impl_->track(input); }
-TrackingResult Localizer::locate(const FrameInput& input, const std::optional<PoseHint>& hint) {
-  return impl_->locate(input, hint);
+TrackingResult Localizer::track(const FrameImages& images) { return impl_->track(images); }
+TrackingResult Localizer::locate(const FrameImages& images, const std::optional<PoseHint>& hint) {
+  return impl_->locate(images, hint);
 }
 
 }  // namespace waymark

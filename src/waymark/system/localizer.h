@@ -39,11 +39,11 @@ class Localizer {
   /// The next image of a stream: looked for near the one before, and anywhere where it is not.
   /// Where the map shows too little, for two seconds at most, landmarks that the stream itself saw
   /// make up for it.
-  TrackingResult track(const FrameInput& input);
+  TrackingResult track(const FrameImages& images);
 
   /// An image by itself: looked for near the hint, if there is one, and anywhere where it is not.
   /// Leaves the stream alone.
-  TrackingResult locate(const FrameInput& input, const std::optional<PoseHint>& hint = {});
+  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint = {});
 
  private:
   class Impl;

@@ -34,8 +34,8 @@ SequenceSpec spec_of(const CameraDescription& camera) {
   return spec;
 }
 
-FrameInput depth_input_of(const SimulatedFrame& frame) {
-  FrameInput input;
+FrameImages depth_input_of(const SimulatedFrame& frame) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images[0].view();
   input.depth = frame.depth.view();
@@ -114,7 +114,7 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
   const Image left = columns(0, 200);
   System system(scene().query.rig(), localizer_settings(), Timing::kInline);
   for (const SimulatedFrame& frame : scene().frames) {
-    FrameInput input = depth_input_of(frame);
+    FrameImages input = depth_input_of(frame);
     input.mask = left.view();
     system.feed(input);
   }
@@ -124,7 +124,7 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
   for (const bool has_depth : {true, false}) {
     Localizer localizer(scene().query.rig(), localizer_settings(), map);
     for (std::size_t i = 0; i < scene().frames.size(); ++i) {
-      FrameInput input = depth_input_of(scene().frames[i]);
+      FrameImages input = depth_input_of(scene().frames[i]);
       if (!has_depth) input.depth = {};
       const Image mask = columns(num_covered(i), 400);
       input.mask = mask.view();
@@ -146,7 +146,7 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
 TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
   Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   for (const std::size_t i : {20u, 3u, 11u}) {
-    FrameInput grey = depth_input_of(scene().frames[i]);
+    FrameImages grey = depth_input_of(scene().frames[i]);
     grey.depth = {};
     const TrackingResult result = localizer.locate(grey);
     expect_pose(result, i);
@@ -162,7 +162,7 @@ TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
 TEST(Localizer, SaysWhatFailed) {
   Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   const Image black(400, 260);
-  FrameInput input = depth_input_of(scene().frames[5]);
+  FrameImages input = depth_input_of(scene().frames[5]);
   input.image0 = black.view();
   for (const TrackingResult& blind : {localizer.locate(input), localizer.track(input)}) {
     EXPECT_EQ(blind.state, FrameState::kLost);

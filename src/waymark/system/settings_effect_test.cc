@@ -35,7 +35,7 @@ std::shared_ptr<const Features> features_with(const std::vector<std::string>& as
   return system.details().features;
 }
 
-struct SettingsRun {
+struct EffectRun {
   std::vector<TrackingResult> results;           ///< Per frame.
   std::vector<std::shared_ptr<const Map>> maps;  ///< What each frame saw.
   std::shared_ptr<const Map> map;                ///< At the end.
@@ -52,22 +52,22 @@ struct SettingsRun {
 
 enum class Sensor { kDepth, kMono };
 
-SettingsRun play_with(const std::vector<std::string>& assignments, Sensor sensor = Sensor::kDepth) {
+EffectRun play(const std::vector<std::string>& assignments, Sensor sensor = Sensor::kDepth) {
   System system(small_rig(), settings_with(assignments), Timing::kInline);
-  SettingsRun run;
+  EffectRun session;
   for (const SimulatedFrame& frame : frames()) {
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     if (sensor == Sensor::kMono) input.depth = {};
-    run.results.push_back(system.feed(input));
-    run.maps.push_back(system.map());
+    session.results.push_back(system.feed(input));
+    session.maps.push_back(system.map());
   }
   system.finish();
-  run.map = system.map();
-  run.trajectory = system.trajectory();
-  return run;
+  session.map = system.map();
+  session.trajectory = system.trajectory();
+  return session;
 }
 
-bool same_bits(const SettingsRun& a, const SettingsRun& b) {
+bool same_bits(const EffectRun& a, const EffectRun& b) {
   return std::equal(a.trajectory.begin(),
                     a.trajectory.end(),
                     b.trajectory.begin(),
@@ -78,26 +78,26 @@ bool same_bits(const SettingsRun& a, const SettingsRun& b) {
 }
 
 TEST(SettingsEffect, SeedChangesWhatIsDrawn) {
-  const SettingsRun first = play_with({"seed=1"}, Sensor::kMono);
+  const EffectRun first = play({"seed=1"}, Sensor::kMono);
   ASSERT_GT(first.trajectory.size(), 15u);
-  EXPECT_TRUE(same_bits(first, play_with({"seed=1"}, Sensor::kMono)));
-  const bool differs = !same_bits(first, play_with({"seed=2"}, Sensor::kMono)) ||
-                       !same_bits(first, play_with({"seed=3"}, Sensor::kMono));
+  EXPECT_TRUE(same_bits(first, play({"seed=1"}, Sensor::kMono)));
+  const bool differs = !same_bits(first, play({"seed=2"}, Sensor::kMono)) ||
+                       !same_bits(first, play({"seed=3"}, Sensor::kMono));
   EXPECT_TRUE(differs);
 }
 
 TEST(SettingsEffect, MapLatencySaysWhenAKeyframeShows) {
   for (const int latency : {1, 2, 5}) {
-    const SettingsRun run = play_with({"map_latency=" + std::to_string(latency)});
-    const std::vector<int> keyframes = run.keyframes();
+    const EffectRun session = play({"map_latency=" + std::to_string(latency)});
+    const std::vector<int> keyframes = session.keyframes();
     ASSERT_GE(keyframes.size(), 3u);
     // The first begins the map, which is needed at once.
     for (std::size_t k = 1; k < keyframes.size(); ++k) {
       const int shows = keyframes[k] + latency;
       if (shows >= kNumFrames) continue;
       const KeyframeId id{static_cast<std::uint32_t>(k)};
-      EXPECT_LE(run.maps[static_cast<std::size_t>(shows - 1)]->keyframes().end_id(), id);
-      EXPECT_GT(run.maps[static_cast<std::size_t>(shows)]->keyframes().end_id(), id);
+      EXPECT_LE(session.maps[static_cast<std::size_t>(shows - 1)]->keyframes().end_id(), id);
+      EXPECT_GT(session.maps[static_cast<std::size_t>(shows)]->keyframes().end_id(), id);
     }
   }
 }
@@ -130,7 +130,7 @@ TEST(SettingsEffect, MinRangeBaselinesLeavesOutWhatIsNear) {
   const SimulatedFrame frame = sequence.frame(0);
   const auto num_ranges = [&](const std::string& assignment) {
     System system(sequence.rig(), settings_with({assignment}), Timing::kInline);
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     input.depth = {};
     input.image1 = frame.images[1].view();
     system.feed(input);
@@ -182,14 +182,14 @@ TEST(SettingsEffect, ViewSaysWhereFeaturesMayBe) {
 }
 
 TEST(SettingsEffect, MinInliersIsWhatAPoseMustRestOn) {
-  const SettingsRun usual = play_with({});
+  const EffectRun usual = play({});
   int fewest = 1000;
   for (std::size_t i = 1; i < usual.results.size(); ++i) {
     ASSERT_EQ(usual.results[i].state, FrameState::kTracked) << i;
     fewest = std::min(fewest, usual.results[i].num_inliers);
   }
   ASSERT_LT(fewest, 480);
-  const SettingsRun strict = play_with({"tracking.min_inliers=490"});
+  const EffectRun strict = play({"tracking.min_inliers=490"});
   for (std::size_t i = 1; i < strict.results.size(); ++i) {
     if (strict.results[i].state != FrameState::kTracked) continue;
     EXPECT_GE(strict.results[i].num_inliers, 490);
@@ -199,14 +199,14 @@ TEST(SettingsEffect, MinInliersIsWhatAPoseMustRestOn) {
 
 TEST(SettingsEffect, KeyframesComeWhenLittleIsShared) {
   const std::string no_parallax = "tracking.keyframe_parallax_px=1000";
-  const auto few = play_with({no_parallax, "tracking.keyframe_ratio=0.1"}).keyframes();
-  const auto many = play_with({no_parallax, "tracking.keyframe_ratio=1"}).keyframes();
+  const auto few = play({no_parallax, "tracking.keyframe_ratio=0.1"}).keyframes();
+  const auto many = play({no_parallax, "tracking.keyframe_ratio=1"}).keyframes();
   EXPECT_GT(many.size(), few.size() + 2);
 }
 
 TEST(SettingsEffect, KeyframesComeWithParallax) {
-  const auto few = play_with({"tracking.keyframe_parallax_px=60"}).keyframes();
-  const auto many = play_with({"tracking.keyframe_parallax_px=4"}).keyframes();
+  const auto few = play({"tracking.keyframe_parallax_px=60"}).keyframes();
+  const auto many = play({"tracking.keyframe_parallax_px=4"}).keyframes();
   EXPECT_GT(many.size(), few.size() + 2);
 }
 
@@ -222,16 +222,16 @@ TEST(SettingsEffect, KeyframesComeAtLastWhileTheCameraMoves) {
                                          "tracking.keyframe_ratio=0.1"};
   std::vector<std::string> hurried = rare;
   hurried.push_back("tracking.max_keyframe_interval=5");
-  EXPECT_GT(longest_pause(play_with(rare).keyframes()), 8);
-  EXPECT_LE(longest_pause(play_with(hurried).keyframes()), 6);
+  EXPECT_GT(longest_pause(play(rare).keyframes()), 8);
+  EXPECT_LE(longest_pause(play(hurried).keyframes()), 6);
 }
 
 /// The last frame at which a keyframe's pose in the map changed.
-int last_move(const SettingsRun& run, KeyframeId id) {
+int last_move(const EffectRun& session, KeyframeId id) {
   int last = -1;
-  for (std::size_t i = 1; i < run.maps.size(); ++i) {
-    const auto& before = run.maps[i - 1]->keyframes();
-    const auto& now = run.maps[i]->keyframes();
+  for (std::size_t i = 1; i < session.maps.size(); ++i) {
+    const auto& before = session.maps[i - 1]->keyframes();
+    const auto& now = session.maps[i]->keyframes();
     if (!before.contains(id) || !now.contains(id)) continue;
     const bool moved = before.at(id).rig_from_world.matrix() != now.at(id).rig_from_world.matrix();
     if (moved) last = static_cast<int>(i);
@@ -241,14 +241,14 @@ int last_move(const SettingsRun& run, KeyframeId id) {
 
 TEST(SettingsEffect, WindowKeyframesAreThoseThatMove) {
   const std::string often = "tracking.keyframe_parallax_px=3";
-  const SettingsRun narrow = play_with({often, "mapping.window_keyframes=2"});
-  const SettingsRun wide = play_with({often, "mapping.window_keyframes=20"});
+  const EffectRun narrow = play({often, "mapping.window_keyframes=2"});
+  const EffectRun wide = play({often, "mapping.window_keyframes=20"});
   ASSERT_GE(narrow.keyframes().size(), 5u);
   EXPECT_LT(last_move(narrow, KeyframeId{1}) + 4, last_move(wide, KeyframeId{1}));
 }
 
 /// A mask that leaves the columns from first to end.
-Image unmasked_columns(int first, int end) {
+Image mask_of_columns(int first, int end) {
   Image mask(320, 240);
   for (int v = 0; v < mask.height_px; ++v) std::fill(mask.row(v) + first, mask.row(v) + end, 255);
   return mask;
@@ -264,10 +264,10 @@ struct Reunion {
 /// Stands still at the end, so that nothing else happens.
 Reunion play_reunion(const std::vector<std::string>& assignments) {
   const Settings settings = settings_with(assignments);
-  const Image right = unmasked_columns(150, 320), left = unmasked_columns(0, 140);
+  const Image right = mask_of_columns(150, 320), left = mask_of_columns(0, 140);
   System first(small_rig(), settings, Timing::kInline);
   for (const SimulatedFrame& frame : frames()) {
-    FrameInput input = input_of(frame);
+    FrameImages input = input_of(frame);
     input.mask = right.view();
     first.feed(input);
   }
@@ -277,7 +277,7 @@ Reunion play_reunion(const std::vector<std::string>& assignments) {
   std::vector<int> due;
   Reunion reunion;
   for (int i = 0; i < kNumFrames + 10; ++i) {
-    FrameInput input = input_of(frames()[static_cast<std::size_t>(std::min(i, 18))]);
+    FrameImages input = input_of(frames()[static_cast<std::size_t>(std::min(i, 18))]);
     input.timestamp_ns = 50'000'000 * std::int64_t{i};
     if (i < 12) input.mask = left.view();
     const TrackingResult result = second.feed(input);

@@ -67,7 +67,7 @@ class System::Impl {
     mapper_.take_over(visible_.snapshot);
   }
 
-  TrackingResult feed(const FrameInput& input);
+  TrackingResult feed(const FrameImages& images);
   void finish();
   void set_mapping(bool is_on);
   /// The same, from its beginning and with an empty map.
@@ -83,7 +83,6 @@ class System::Impl {
   void make_tracker(bool has_range);
   void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
-  void keep_details(const Frame& frame, TrackOutcome outcome);
   std::shared_ptr<const PublishedMap> process(const MapTask& task);
   void add(const MapperMessage& message);
   void finish_adjustment();
@@ -118,19 +117,17 @@ class System::Impl {
   MapWorker worker_;
 };
 
-TrackingResult System::Impl::feed(const FrameInput& input) {
+TrackingResult System::Impl::feed(const FrameImages& images) {
   WAYMARK_CHECK(!is_finished_);
   const auto& past = memory_.entries();
-  if (!past.empty() && input.timestamp_ns <= past.back().timestamp_ns) {
+  if (!past.empty() && images.timestamp_ns <= past.back().timestamp_ns) {
     throw InputError("frame " + std::to_string(past.size()),
                      "time stamp is not later than that of the frame before");
   }
   TrackingResult result;
   const FrameId id = memory_.next();
-  if (!tracker_) make_tracker(!input.image1.is_empty() || !input.depth.is_empty());
-  Frame frame{id,
-              input.timestamp_ns,
-              builder_.build({input.image0, input.image1, input.depth, input.mask})};
+  if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
+  const Frame frame{id, images.timestamp_ns, builder_.build(images)};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
   {
@@ -141,15 +138,8 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
   memory_.add(frame, outcome, *map());
   num_relocalizations_ += outcome.is_relocalized;
   result.frame = FrameId{id.value - memory_.first().value};
-  result.state = outcome.state;
-  result.reason = outcome.reason;
-  if (outcome.pose) result.world_from_rig = outcome.rig_from_world.inverse();
-  result.covariance = outcome.covariance;
-  result.num_matches = outcome.num_matches;
-  result.num_inliers = outcome.num_inliers;
-  result.num_candidates = outcome.num_candidates;
+  static_cast<FrameVerdict&>(result) = outcome;
   result.is_keyframe = outcome.message.has_value();
-  result.submap = outcome.submap;
   if (outcome.message) {
     // The mapper works in send() in kInline, and what kRealtime has to wait for is a sub-map.
     const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);
@@ -157,20 +147,8 @@ TrackingResult System::Impl::feed(const FrameInput& input) {
     StageTimer timer(result.stages, waits ? Stage::kWait : Stage::kKeyframe);
     send(id, std::move(*outcome.message));
   }
-  keep_details(frame, std::move(outcome));
+  details_ = std::move(outcome.details);
   return result;
-}
-
-void System::Impl::keep_details(const Frame& frame, TrackOutcome outcome) {
-  details_.frame = frame.id;
-  details_.features = frame.features;
-  details_.landmarks = std::move(outcome.landmarks);
-  details_.pose = outcome.pose.value_or(RelativePose{});
-  // A keyframe is its own reference, so that it moves as the map moves it.
-  if (outcome.keyframe) {
-    details_.pose = {*outcome.keyframe, Rigid3{}, details_.pose.reference_scale};
-  }
-  details_.filled = std::move(outcome.filled);
 }
 
 void System::Impl::make_tracker(bool has_range) {
@@ -300,7 +278,7 @@ SystemStatistics System::Impl::statistics() const {
 System::System(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
     : impl_(std::make_unique<Impl>(std::move(rig), settings, timing, std::move(map))) {}
 System::~System() = default;
-TrackingResult System::feed(const FrameInput& input) { return impl_->feed(input); }
+TrackingResult System::feed(const FrameImages& images) { return impl_->feed(images); }
 void System::finish() { impl_->finish(); }
 void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }

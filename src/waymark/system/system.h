@@ -7,52 +7,22 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/base/frame_state.h"
 #include "waymark/base/timing.h"
 #include "waymark/camera/rig.h"
-#include "waymark/image/image.h"
+#include "waymark/image/frame_images.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/settings.h"
-#include "waymark/track/messages.h"
+#include "waymark/track/frame_verdict.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
 
-/// The images of one moment. Views are borrowed for the duration of the call.
-struct FrameInput {
-  std::int64_t timestamp_ns = 0;  ///< Increases from frame to frame.
-  ImageView image0;               ///< Camera 0, grey, of the size its calibration states.
-  ImageView image1;               ///< Camera 1 of a stereo rig; empty otherwise.
-  DepthView depth;  ///< Depth along z registered to camera 0; empty where there is none.
-  ImageView mask;   ///< Of camera 0; no features where it is 0. Empty: everything is used.
-};
-
 /// What is known of a frame right after it was fed.
-struct TrackingResult {
-  FrameId frame;                            ///< Of this session, from 0 on.
-  FrameState state = FrameState::kLost;     ///< What became of it.
-  FrameReason reason = FrameReason::kNone;  ///< Why there is no pose.
-  std::optional<Rigid3> world_from_rig;     ///< The pose, in metres (map units for mono).
-  /// Covariance of the pose for perturbations exp(xi) * rig_from_world, xi = (rho, phi) in (m,
-  /// rad).
-  Matrix6d covariance = Matrix6d::Zero();
-  int num_matches = 0;       ///< Where there is no pose, of the place in the map that came closest.
-  int num_inliers = 0;       ///< The same.
-  int num_candidates = 0;    ///< Places in the map compared when all else had failed.
+struct TrackingResult : FrameVerdict {
+  FrameId frame;             ///< Of this session, from 0 on.
   bool is_keyframe = false;  ///< Whether it was sent to the map.
-  SubmapId submap;           ///< Whose frame the pose is in.
   StageTimes stages;         ///< What it took.
-};
-
-/// More of the newest frame, for those who show it. Poses are by reference: they move as the map is
-/// corrected, see Map::rig_from_world(); the reference may not be in the newest map yet.
-struct FrameDetails {
-  FrameId frame;  ///< As keyframes of the map have it: goes on from those of a map made before.
-  std::shared_ptr<const Features> features;  ///< Null for a frame that could not be used.
-  std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none; empty without a pose.
-  RelativePose pose;                  ///< Where the frame has one.
-  std::vector<FilledPose> filled;     ///< Earlier frames that have a pose now.
 };
 
 /// A frame in the final trajectory.
@@ -93,7 +63,7 @@ class System {
 
   /// Tracks one frame; timestamps must increase. A map without scale takes no images with range:
   /// then the first frame throws InputError. Rethrows what failed in the mapper's thread.
-  TrackingResult feed(const FrameInput& input);
+  TrackingResult feed(const FrameImages& images);
 
   /// Of the frame fed last; empty before the first.
   const FrameDetails& details() const;

@@ -151,7 +151,7 @@ TEST(System, TimeStampsMustIncrease) {
 TEST(System, ImagesMustHaveTheSizeOfTheCalibration) {
   System system(small_rig(), small_settings(), Timing::kInline);
   const Image small(160, 120);
-  FrameInput input = input_of(frames()[0]);
+  FrameImages input = input_of(frames()[0]);
   input.image0 = small.view();
   EXPECT_THROW(system.feed(input), InputError);
   input.image0 = {};
@@ -163,7 +163,7 @@ TEST(System, AnImageWithoutFeaturesIsLostAndTheNextIsFoundAgain) {
   System system(small_rig(), small_settings(), Timing::kLockstep);
   for (int i = 0; i < 3; ++i) system.feed(input_of(frames()[static_cast<std::size_t>(i)]));
   const Image black(320, 240);
-  FrameInput blind = input_of(frames()[3]);
+  FrameImages blind = input_of(frames()[3]);
   blind.image0 = black.view();
   const TrackingResult lost = system.feed(blind);
   EXPECT_EQ(lost.state, FrameState::kLost);
@@ -232,7 +232,7 @@ TEST(System, TakesNoRangesIntoAMapWithoutScale) {
   map.add_submap(false);
   System system(small_rig(), small_settings(), Timing::kInline, map.freeze());
   EXPECT_THROW(system.feed(input_of(frames()[0])), InputError);
-  FrameInput grey = input_of(frames()[0]);
+  FrameImages grey = input_of(frames()[0]);
   grey.depth = {};
   EXPECT_EQ(system.feed(grey).state, FrameState::kLost);
 }

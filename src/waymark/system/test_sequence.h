@@ -47,8 +47,8 @@ inline Settings small_settings() {
   return settings;
 }
 
-inline FrameInput input_of(const SimulatedFrame& frame) {
-  FrameInput input;
+inline FrameImages input_of(const SimulatedFrame& frame) {
+  FrameImages input;
   input.timestamp_ns = frame.timestamp_ns;
   input.image0 = frame.images[0].view();
   input.depth = frame.depth.view();

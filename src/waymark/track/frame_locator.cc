@@ -2,25 +2,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/frame_locator.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace waymark {
 
-void append_observation(const Features& features,
-                        std::uint32_t feature,
-                        const Eigen::Vector3d& point_in_world,
-                        PoseObservations& observations) {
-  observations.point_in_world.push_back(point_in_world);
-  observations.bearing.push_back(features.bearings[feature]);
-  observations.level_pixel_from_bearing.push_back(features.level_pixel_from_bearing[feature]);
-  observations.camera.push_back(features.keypoints[feature].camera);
-  const MeasuredRange measured = features.measured_range(feature);
-  observations.inverse_range.push_back(measured.inverse);
-  observations.inverse_range_sigma.push_back(measured.inverse_sigma);
+int num_valid(std::span<const LandmarkId> landmarks) {
+  return static_cast<int>(std::count_if(
+      landmarks.begin(), landmarks.end(), [](LandmarkId id) { return id.is_valid(); }));
+}
+
+std::vector<LandmarkId> primary_landmarks(const Features& features,
+                                          std::span<const LandmarkId> landmarks) {
+  std::vector<LandmarkId> shown;
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    if (landmarks[i].is_valid()) shown.push_back(landmarks[i]);
+  }
+  return shown;
 }
 
 LocatedFrame FrameLocator::locate(const Features& features,
                                   const Map& map,
                                   const Rigid3& initial_rig_from_world,
-                                  std::vector<LandmarkId>& landmarks) {
+                                  std::vector<LandmarkId> landmarks) {
   collect(features, map, landmarks);
   const PoseEstimate estimate =
       optimize_pose(*rig_, observations_, initial_rig_from_world, PoseOptions{}, workspace_);
@@ -38,7 +42,46 @@ LocatedFrame FrameLocator::locate(const Features& features,
       landmarks[feature] = estimate.is_inlier[k] ? of_primary : LandmarkId{};
     }
   }
+  located.landmarks = std::move(landmarks);
   return located;
+}
+
+std::vector<LandmarkId> FrameLocator::find(const Features& features,
+                                           const LandmarkSet& set,
+                                           const Rigid3& rig_from_world,
+                                           const ProjectionOptions& options) {
+  const ProjectionMatches& matches =
+      matcher_.match(set, features, {}, rig_from_world, options);
+  is_visible_ = matches.is_visible;
+  std::vector<LandmarkId> landmarks(features.size());
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (matches.features[i] != kNoFeature) landmarks[matches.features[i]] = set.ids[i];
+  }
+  return landmarks;
+}
+
+LocatedFrame FrameLocator::locate_again(const Features& features,
+                                        const Map& map,
+                                        LocatedFrame first,
+                                        const LandmarkSet& set,
+                                        const ProjectionOptions& options) {
+  is_taken_.assign(features.num_primary, 0);
+  found_.clear();
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    if (!first.landmarks[i].is_valid()) continue;
+    is_taken_[i] = 1;
+    found_.push_back(first.landmarks[i]);
+  }
+  std::sort(found_.begin(), found_.end());
+  const ProjectionMatches& matches =
+      matcher_.match(set, features, is_taken_, first.rig_from_world, options);
+  is_visible_ = matches.is_visible;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (matches.features[i] == kNoFeature) continue;
+    if (std::binary_search(found_.begin(), found_.end(), set.ids[i])) continue;
+    first.landmarks[matches.features[i]] = set.ids[i];
+  }
+  return locate(features, map, first.rig_from_world, std::move(first.landmarks));
 }
 
 void FrameLocator::collect(const Features& features,
@@ -51,7 +94,7 @@ void FrameLocator::collect(const Features& features,
     const Eigen::Vector3d& position = map.landmarks().at(landmarks[feature]).position_in_world;
     for (const std::uint32_t seer : {feature, features.partner[feature]}) {
       if (seer == kNoFeature) continue;
-      append_observation(features, seer, position, observations_);
+      observations_.add(position, features.measurement(seer));
       feature_of_observation_.push_back(seer);
     }
   }

@@ -2,46 +2,72 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "waymark/map/map.h"
+#include "waymark/match/projection.h"
 #include "waymark/optimize/pose.h"
 
 namespace waymark {
 
-/// Adds what a feature measures of a point with a known position.
-void append_observation(const Features& features,
-                        std::uint32_t feature,
-                        const Eigen::Vector3d& point_in_world,
-                        PoseObservations& observations);
-
-/// The pose that follows from which landmark each feature of a frame shows.
+/// Where a frame was taken, and the landmarks that say so.
 struct LocatedFrame {
   Rigid3 rig_from_world;
   Matrix6d covariance = Matrix6d::Zero();
   int num_matches = 0;  ///< Primary features with a landmark before outliers were removed.
   int num_inliers = 0;  ///< Primary features with a landmark after.
+  std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none.
 };
 
-/// Pose of a frame from the landmarks assigned to its features. Keeps its buffers.
+/// How many features show a landmark.
+int num_valid(std::span<const LandmarkId> landmarks);
+
+/// The landmarks that primary features show, in the order of the features.
+std::vector<LandmarkId> primary_landmarks(const Features& features,
+                                          std::span<const LandmarkId> landmarks);
+
+/// Pose of a frame from the landmarks that its features show. Keeps its buffers.
 class FrameLocator {
  public:
-  explicit FrameLocator(std::shared_ptr<const Rig> rig) : rig_(std::move(rig)) {}
+  explicit FrameLocator(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
 
-  /// landmarks: per feature; on entry primary features have candidates (living in the map), on
-  /// return outliers are cleared and partner features of inliers that agree are set.
+  /// landmarks: per feature; primary features have candidates (living in the map). Of these
+  /// outliers are cleared, and partner features of inliers that agree are set.
   LocatedFrame locate(const Features& features,
                       const Map& map,
                       const Rigid3& initial_rig_from_world,
-                      std::vector<LandmarkId>& landmarks);
+                      std::vector<LandmarkId> landmarks);
+
+  /// The landmark of the set that each feature may show, seen from about this pose.
+  std::vector<LandmarkId> find(const Features& features,
+                               const LandmarkSet& set,
+                               const Rigid3& rig_from_world,
+                               const ProjectionOptions& options);
+
+  /// Locates a frame again, with those landmarks of the set in addition that its other features
+  /// show, seen from where it was located first.
+  LocatedFrame locate_again(const Features& features,
+                            const Map& map,
+                            LocatedFrame first,
+                            const LandmarkSet& set,
+                            const ProjectionOptions& options);
+
+  /// Per landmark of the set searched for last: 1 where it should have been seen.
+  std::span<const std::uint8_t> is_visible() const { return is_visible_; }
 
  private:
   void collect(const Features& features, const Map& map, const std::vector<LandmarkId>& landmarks);
 
   std::shared_ptr<const Rig> rig_;
+  ProjectionMatcher matcher_;
+  std::span<const std::uint8_t> is_visible_;  ///< Of the matcher.
   PoseObservations observations_;
   std::vector<std::uint32_t> feature_of_observation_;
+  std::vector<std::uint8_t> is_taken_;
+  std::vector<LandmarkId> found_;  ///< Ascending.
   PoseWorkspace workspace_;
 };
 

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include <Eigen/Cholesky>
 
 #include "waymark/track/test_map.h"
@@ -25,7 +27,9 @@ class FrameLocatorTest : public ::testing::TestWithParam<int> {
     const Rigid3 guess =
         Rigid3::exp((Vector6d() << 0.05, -0.03, 0.04, 0.01, -0.02, 0.01).finished()) *
         truth_.inverse();
-    return locator_.locate(*view_.features, scene_.map, guess, landmarks_);
+    LocatedFrame located = locator_.locate(*view_.features, scene_.map, guess, landmarks_);
+    landmarks_ = located.landmarks;
+    return located;
   }
 
   const Rigid3 truth_ = pose_at(0.3, 0.1, 0.2, 0.03);
@@ -111,6 +115,32 @@ TEST_P(FrameLocatorTest, WithoutLandmarksTheGuessComesBack) {
   EXPECT_EQ(located.num_matches, 0);
   EXPECT_EQ(located.num_inliers, 0);
   EXPECT_TRUE(located.rig_from_world.matrix().isApprox(guess.matrix(), 1e-12));
+}
+
+TEST_P(FrameLocatorTest, LocatedAgainRestsOnWhatElseTheSetShows) {
+  LandmarkSet all;
+  scene_.map.landmarks().for_each(
+      [&](LandmarkId id, const Landmark& landmark) { all.add(id, landmark); });
+  const std::vector<LandmarkId> truth = landmarks_;
+  for (std::size_t i = 0; i < view_.features->num_primary; ++i) {
+    if (i % 5 != 0) landmarks_[i] = LandmarkId{};
+  }
+  const LocatedFrame first = locate();
+  const LocatedFrame again =
+      locator_.locate_again(*view_.features, scene_.map, first, all, {.radius_px = 5.0});
+  EXPECT_GT(again.num_inliers, 3 * first.num_inliers);
+  std::vector<LandmarkId> shown = primary_landmarks(*view_.features, again.landmarks);
+  EXPECT_EQ(static_cast<int>(shown.size()), again.num_inliers);
+  std::sort(shown.begin(), shown.end());
+  EXPECT_EQ(std::adjacent_find(shown.begin(), shown.end()), shown.end()) << "one feature each";
+  int num_wrong = 0;
+  for (std::size_t i = 0; i < view_.features->num_primary; ++i) {
+    num_wrong += again.landmarks[i].is_valid() && again.landmarks[i] != truth[i];
+  }
+  EXPECT_LT(num_wrong, again.num_inliers / 50);
+  // All of the set that the view shows should have been seen.
+  const auto is_visible = locator_.is_visible();
+  EXPECT_GE(std::count(is_visible.begin(), is_visible.end(), 1), num_valid(shown));
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, FrameLocatorTest, ::testing::Values(1, 2), [](const auto& info) {

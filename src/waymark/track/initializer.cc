@@ -9,7 +9,6 @@
 #include "waymark/geometry/two_view.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
-#include "waymark/track/frame_locator.h"
 
 namespace waymark {
 namespace {
@@ -54,19 +53,6 @@ std::vector<Eigen::Vector2f> pixels_of(const Features& features) {
     pixels.emplace_back(features.keypoints[i].x_px, features.keypoints[i].y_px);
   }
   return pixels;
-}
-
-BundleObservation observation_of(const Features& features,
-                                 std::uint32_t feature,
-                                 std::uint32_t pose,
-                                 std::uint32_t point) {
-  BundleObservation observation;
-  observation.pose = pose;
-  observation.point = point;
-  observation.camera = 0;
-  observation.bearing = features.bearings[feature];
-  observation.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  return observation;
 }
 
 /// Median distance of points from the origin.
@@ -127,8 +113,8 @@ RefinedPair refine_pair(const Rig& rig,
     if (!geometry.has_point[i]) continue;
     const auto point = static_cast<std::uint32_t>(problem.points.size());
     problem.points.push_back(geometry.points_in_a[i]);
-    problem.observations.push_back(observation_of(a, matches[i].a, 0, point));
-    problem.observations.push_back(observation_of(b, matches[i].b, 1, point));
+    problem.observations.push_back({a.measurement(matches[i].a), 0, point});
+    problem.observations.push_back({b.measurement(matches[i].b), 1, point});
     kept.push_back(matches[i]);
   }
   const BundleResult result = adjust_bundle(problem, BundleOptions{});
@@ -301,8 +287,8 @@ std::optional<Rigid3> Initializer::locate(const Frame& frame,
   PoseObservations observations;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
-    append_observation(
-        *frame.features, matches.features[i], landmarks.positions_in_world[i], observations);
+    observations.add(landmarks.positions_in_world[i],
+                     frame.features->measurement(matches.features[i]));
   }
   const PoseEstimate estimate =
       optimize_pose(*rig_, observations, guess, PoseOptions{}, pose_workspace_);

@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/keyframe_decision.h"
 
+#include <algorithm>
+#include <utility>
+#include <vector>
+
+#include "waymark/base/median.h"
+#include "waymark/camera/pixel_angles.h"
+#include "waymark/image/range_precision.h"
+
 namespace waymark {
 namespace {
 
@@ -10,8 +18,49 @@ constexpr std::size_t kMaxPending = 2;
 /// Where less than this part of the features with a reliable range have a landmark, most of what
 /// the camera sees is new.
 constexpr double kMinKnownNear = 0.3;
+/// Landmarks that so many keyframes see, or all in a young map, count as established.
+constexpr std::size_t kEstablishedObservers = 3;
 
 }  // namespace
+
+KeyframeAssessor::KeyframeAssessor(std::shared_ptr<const Rig> rig, bool has_range)
+    : rig_(std::move(rig)),
+      has_range_(has_range),
+      pixel_rad_(central_pixel_angle(*rig_->cameras.at(0).camera)) {}
+
+KeyframeSituation KeyframeAssessor::assess(const Features& features,
+                                           const LocatedFrame& located,
+                                           const Map& map,
+                                           KeyframeId reference_id,
+                                           std::size_t submap_age) const {
+  const Keyframe& reference = map.keyframes().at(reference_id);
+  const std::size_t established = std::min(kEstablishedObservers, submap_age);
+  KeyframeSituation situation;
+  situation.has_range = has_range_;
+  for (std::uint32_t i = 0; i < reference.features->num_primary; ++i) {
+    const Landmark* landmark = map.landmarks().find(reference.landmarks[i]);
+    situation.num_reference += landmark && num_observers(*landmark) >= established;
+  }
+  const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
+  const Eigen::Vector3d reference_centre = reference.rig_from_world.origin_in_source();
+  std::vector<double> parallaxes_px;
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    const LandmarkId id = located.landmarks[i];
+    const bool is_near = has_range_ && has_reliable_range(*rig_, features, i);
+    situation.num_near_tracked += is_near && id.is_valid();
+    situation.num_near_untracked += is_near && !id.is_valid();
+    if (!id.is_valid()) continue;
+    const Landmark& landmark = map.landmarks().at(id);
+    situation.num_shared +=
+        num_observers(landmark) >= established && is_observed_by(landmark, reference_id);
+    const Eigen::Vector3d& point = landmark.position_in_world;
+    const Eigen::Vector3d a = (point - centre).normalized();
+    const Eigen::Vector3d b = (point - reference_centre).normalized();
+    parallaxes_px.push_back((a - b).norm() / pixel_rad_);
+  }
+  if (!parallaxes_px.empty()) situation.median_parallax_px = median(parallaxes_px);
+  return situation;
+}
 
 bool should_make_keyframe(const KeyframeSituation& situation, const TrackingSettings& settings) {
   if (situation.num_pending >= kMaxPending || situation.frames_since_keyframe < 1) return false;

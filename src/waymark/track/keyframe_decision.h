@@ -3,7 +3,9 @@
 #pragma once
 
 #include <cstddef>
+#include <memory>
 
+#include "waymark/track/frame_locator.h"
 #include "waymark/track/settings.h"
 
 namespace waymark {
@@ -18,6 +20,25 @@ struct KeyframeSituation {
   std::size_t num_pending = 0;      ///< Keyframes sent that the visible map does not contain yet.
   double median_parallax_px = 0.0;  ///< Of the landmarks, between reference keyframe and frame.
   bool has_range = false;           ///< Stereo or depth.
+};
+
+/// Compares frames with the keyframe that shares most landmarks with them.
+class KeyframeAssessor {
+ public:
+  KeyframeAssessor(std::shared_ptr<const Rig> rig, bool has_range);
+
+  /// What the frame itself says; num_pending and frames_since_keyframe are left to the caller.
+  /// submap_age: keyframes that the sub-map has had so far.
+  KeyframeSituation assess(const Features& features,
+                           const LocatedFrame& located,
+                           const Map& map,
+                           KeyframeId reference,
+                           std::size_t submap_age) const;
+
+ private:
+  const std::shared_ptr<const Rig> rig_;
+  const bool has_range_;
+  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
 };
 
 /// Whether a frame should become a keyframe.

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "waymark/track/test_map.h"
+
 namespace waymark {
 namespace {
 
@@ -65,6 +67,62 @@ TEST_F(KeyframeDecision, NotWhileTheMapperIsBehindOrRightAfterTheLast) {
   situation_.frames_since_keyframe = 0;
   EXPECT_FALSE(is_made());
 }
+
+/// A frame among two keyframes side by side, and what each of its features shows.
+class KeyframeAssessment : public ::testing::TestWithParam<int> {
+ protected:
+  KeyframeAssessment() : scene_(GetParam(), cloud_ahead(), {.seed = 5}, true) {
+    scene_.add_keyframe(pose_at(0.0));
+    scene_.add_keyframe(pose_at(0.5));
+  }
+
+  KeyframeSituation assess(const Rigid3& world_from_rig, std::uint32_t stride) const {
+    const PointObservation view = scene_.look(world_from_rig, 100);
+    LocatedFrame located;
+    located.rig_from_world = world_from_rig.inverse();
+    located.landmarks = scene_.true_associations(view);
+    for (std::size_t i = 0; i < view.features->num_primary; ++i) {
+      if (i % stride != 0) located.landmarks[i] = LandmarkId{};
+    }
+    const KeyframeAssessor assessor(scene_.rig, GetParam() == 2);
+    return assessor.assess(*view.features, located, scene_.map, KeyframeId{1}, 2);
+  }
+
+  TestMap scene_;
+};
+
+TEST_P(KeyframeAssessment, CountsWhatIsSharedWithTheReference) {
+  const KeyframeSituation all = assess(pose_at(0.4), 1);
+  const KeyframeSituation half = assess(pose_at(0.4), 2);
+  // Only what both keyframes see is established.
+  EXPECT_LT(all.num_reference, static_cast<int>(scene_.seen[1].features->num_primary));
+  EXPECT_GT(all.num_shared, all.num_reference * 8 / 10);
+  EXPECT_LE(all.num_shared, all.num_reference);
+  EXPECT_NEAR(half.num_shared, all.num_shared / 2, all.num_shared / 10);
+}
+
+TEST_P(KeyframeAssessment, MeasuresParallaxInPixels) {
+  EXPECT_LT(assess(pose_at(0.5), 1).median_parallax_px, 1e-6);
+  const double once = assess(pose_at(0.6), 1).median_parallax_px;
+  EXPECT_GT(once, 2.0);
+  EXPECT_NEAR(assess(pose_at(0.7), 1).median_parallax_px, 2.0 * once, 0.2 * once);
+}
+
+TEST_P(KeyframeAssessment, CountsNearFeaturesWhereRangeIsMeasured) {
+  const KeyframeSituation third = assess(pose_at(0.4), 3);
+  const int num_near = third.num_near_tracked + third.num_near_untracked;
+  if (GetParam() == 1) {
+    EXPECT_EQ(num_near, 0);
+    return;
+  }
+  EXPECT_GT(num_near, 50);
+  EXPECT_GT(third.num_near_untracked, third.num_near_tracked);
+}
+
+INSTANTIATE_TEST_SUITE_P(Cameras,
+                         KeyframeAssessment,
+                         ::testing::Values(1, 2),
+                         [](const auto& info) { return info.param == 1 ? "mono" : "stereo"; });
 
 }  // namespace
 }  // namespace waymark

@@ -11,7 +11,6 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
-#include "waymark/match/projection.h"
 #include "waymark/match/turn_vote.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame_locator.h"
@@ -46,14 +45,12 @@ class PlaceLocator {
   /// rig: the one that sees the features.
   PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
-  /// Nothing unless the pose rests on 30 landmarks with kMinConfidence. landmarks: on success per
-  /// feature the landmark that it shows, all of the candidate's sub-map. Same seed and stream (the
-  /// frame, for example), same result.
+  /// Nothing unless the pose rests on 30 landmarks with kMinConfidence; all of these are of the
+  /// candidate's sub-map. Same seed and stream (the frame, for example), same result.
   std::optional<LocatedPlace> locate(const Features& features,
                                      const Map& map,
                                      KeyframeId candidate,
-                                     std::uint64_t stream,
-                                     std::vector<LandmarkId>& landmarks);
+                                     std::uint64_t stream);
 
   /// The same where a pose is known already, though too coarsely to look for landmarks one by one:
   /// to within some 5 degrees or a tenth of the depth of the scene. Such a pose says more than
@@ -61,8 +58,7 @@ class PlaceLocator {
   std::optional<LocatedPlace> locate_near(const Features& features,
                                           const Map& map,
                                           KeyframeId candidate,
-                                          const Rigid3& guess,
-                                          std::vector<LandmarkId>& landmarks);
+                                          const Rigid3& guess);
 
   /// What became of the last call.
   const PlaceAttempt& attempt() const { return attempt_; }
@@ -78,30 +74,22 @@ class PlaceLocator {
     std::uint16_t distance;
   };
 
-  std::size_t match_by_appearance(const Features& features,
-                                  const Map& map,
-                                  std::vector<LandmarkId>& landmarks);
+  std::vector<LandmarkId> match_by_appearance(const Features& features, const Map& map);
   std::optional<LocatedPlace> refine(const Features& features,
                                      const Map& map,
                                      KeyframeId candidate,
                                      std::uint64_t stream,
-                                     std::vector<LandmarkId>& landmarks);
+                                     std::vector<LandmarkId> landmarks);
   void match_keyframe(const Features& features, const Map& map, KeyframeId keyframe);
-  std::optional<Rigid3> find_consensus(const Features& features,
-                                       const Map& map,
-                                       std::uint64_t stream,
-                                       std::vector<LandmarkId>& landmarks);
-  LocatedFrame match_around(const Features& features,
-                            const Map& map,
-                            const Rigid3& rig_from_world,
-                            double radius_px,
-                            std::vector<LandmarkId>& landmarks);
+  std::optional<LocatedFrame> find_consensus(const Features& features,
+                                             const Map& map,
+                                             std::uint64_t stream,
+                                             std::vector<LandmarkId> landmarks);
 
   const std::shared_ptr<const Rig> rig_;
   const std::uint64_t seed_;
   AppearanceMatcher appearance_;
   TurnVote turn_vote_;
-  ProjectionMatcher matcher_;
   FrameLocator locator_;
   PoseObservations observations_;
   PoseWorkspace workspace_;
@@ -110,8 +98,6 @@ class PlaceLocator {
   std::vector<LandmarkMatch> matches_;
   std::vector<std::uint32_t> with_landmark_;
   std::vector<std::uint32_t> feature_of_observation_;
-  std::vector<std::uint8_t> is_taken_;
-  std::vector<LandmarkId> found_;  ///< Ascending.
   PlaceAttempt attempt_;
 };
 

@@ -11,26 +11,14 @@ constexpr double kMinInlierRatio = 0.5;
 /// A start's poses are off by what little parallax it had.
 constexpr double kRefineRadiusPx = 20.0;
 
-SeenLandmark seen_by(const Features& features, std::uint32_t feature, LandmarkId landmark) {
-  SeenLandmark seen;
-  seen.landmark = landmark;
-  seen.bearing = features.bearings[feature];
-  seen.level_pixel_from_bearing = features.level_pixel_from_bearing[feature];
-  seen.camera = features.keypoints[feature].camera;
-  const MeasuredRange measured = features.measured_range(feature);
-  seen.inverse_range = measured.inverse;
-  seen.inverse_range_sigma = measured.inverse_sigma;
-  return seen;
-}
-
 }  // namespace
 
 std::vector<SeenLandmark> seen_landmarks(const Features& features,
                                          std::span<const LandmarkId> landmarks) {
   std::vector<SeenLandmark> seen;
   for (std::uint32_t feature = 0; feature < landmarks.size(); ++feature) {
-    if (landmarks[feature].is_valid())
-      seen.push_back(seen_by(features, feature, landmarks[feature]));
+    if (!landmarks[feature].is_valid()) continue;
+    seen.push_back({features.measurement(feature), landmarks[feature]});
   }
   return seen;
 }
@@ -44,12 +32,7 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
   for (const SeenLandmark& one : seen) {
     const LandmarkId living = map.resolve(one.landmark);
     if (!living.is_valid()) continue;
-    observations_.point_in_world.push_back(map.landmarks().at(living).position_in_world);
-    observations_.bearing.push_back(one.bearing);
-    observations_.level_pixel_from_bearing.push_back(one.level_pixel_from_bearing);
-    observations_.camera.push_back(one.camera);
-    observations_.inverse_range.push_back(one.inverse_range);
-    observations_.inverse_range_sigma.push_back(one.inverse_range_sigma);
+    observations_.add(map.landmarks().at(living).position_in_world, one);
   }
   if (observations_.size() < kMinObservations) return std::nullopt;
   const PoseEstimate estimate =
@@ -75,7 +58,7 @@ std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
   std::vector<SeenLandmark> seen;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
-    seen.push_back(seen_by(features, matches.features[i], set.ids[i]));
+    seen.push_back({features.measurement(matches.features[i]), set.ids[i]});
   }
   return seen;
 }

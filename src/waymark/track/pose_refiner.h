@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <Eigen/Core>
-#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
@@ -16,13 +14,8 @@
 namespace waymark {
 
 /// What a feature measured of a landmark, without the rest of the frame.
-struct SeenLandmark {
+struct SeenLandmark : Measurement {
   LandmarkId landmark;
-  Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();      ///< Unit, in the observing camera.
-  Matrix23f level_pixel_from_bearing = Matrix23f::Zero();  ///< W of Features.
-  float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
-  float inverse_range_sigma = 0.0f;  ///< 1/m; 0 where there is no measurement.
-  std::uint8_t camera = 0;           ///< Index in the rig.
 };
 
 /// The features of a frame that show a landmark. landmarks: per feature, invalid where none.

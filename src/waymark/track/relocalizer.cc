@@ -38,8 +38,7 @@ Relocalizer::Relocalizer(std::shared_ptr<const Rig> rig,
 
 std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const Map& map,
-                                                const PlaceIndex& places,
-                                                std::vector<LandmarkId>& landmarks) {
+                                                const PlaceIndex& places) {
   PlaceQuery query;
   query.max_candidates = kMaxCandidates;
   query.is_excluded = [&map](const PlaceRow& row) {
@@ -49,19 +48,18 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
   for (const PlaceCandidate& candidate : places.find(frame.features->descriptors, query)) {
     candidates_.push_back(candidate.keyframe);
   }
-  return locate_among(frame, map, candidates_, landmarks);
+  return locate_among(frame, map, candidates_);
 }
 
 std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
                                                       const Map& map,
-                                                      std::span<const KeyframeId> candidates,
-                                                      std::vector<LandmarkId>& landmarks) {
+                                                      std::span<const KeyframeId> candidates) {
   std::optional<LocatedPlace> best;
   matched_.clear();
   diagnosis_ = {.reason = FrameReason::kNoCandidate};
   for (const KeyframeId candidate : candidates) {
     if (std::find(matched_.begin(), matched_.end(), candidate) != matched_.end()) continue;
-    const auto place = locator_.locate(*frame.features, map, candidate, frame.id.value, seen_);
+    auto place = locator_.locate(*frame.features, map, candidate, frame.id.value);
     const auto matched = locator_.matched_keyframes();
     matched_.insert(matched_.end(), matched.begin(), matched.end());
     const bool has_inliers = place && place->frame.num_inliers >= min_inliers_;
@@ -69,12 +67,11 @@ std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
     if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;
     note(attempt);
     if (!has_inliers || (best && place->confidence <= best->confidence)) continue;
-    best = place;
-    landmarks = seen_;
+    best = std::move(place);
     if (best->confidence >= kCertainConfidence) break;
   }
   if (!best) return std::nullopt;
-  return best->frame;
+  return std::move(best->frame);
 }
 
 void Relocalizer::note(const PlaceAttempt& attempt) {

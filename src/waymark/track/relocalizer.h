@@ -17,14 +17,6 @@
 
 namespace waymark {
 
-/// What became of the search for a place: of the place that came closest, or was found.
-struct PlaceDiagnosis {
-  FrameReason reason = FrameReason::kNone;  ///< kNoCandidate or PlaceAttempt::failure.
-  int num_candidates = 0;                   ///< Places compared.
-  int num_matches = 0;
-  int num_inliers = 0;
-};
-
 /// Finds frames of which nothing is known in the map: similar places from the index, the first of
 /// which that shows what the frame shows is the answer. The cost is bounded whatever the size of
 /// the map, and misses are preferred to wrong places. Keeps its buffers.
@@ -33,31 +25,29 @@ class Relocalizer {
   /// rig: the one that sees the frames; the map may be of other cameras.
   Relocalizer(std::shared_ptr<const Rig> rig, const TrackingSettings& settings, std::uint64_t seed);
 
-  /// Pose of a frame in whichever sub-map shows the place. landmarks: per feature, on success those
-  /// that the frame sees. The index may know more or fewer keyframes than the map.
+  /// Pose of a frame in whichever sub-map shows the place. The index may know more or fewer
+  /// keyframes than the map.
   std::optional<LocatedFrame> locate(const Frame& frame,
                                      const Map& map,
-                                     const PlaceIndex& places,
-                                     std::vector<LandmarkId>& landmarks);
+                                     const PlaceIndex& places);
 
   /// The same with the keyframes to compare given, the likeliest first.
   std::optional<LocatedFrame> locate_among(const Frame& frame,
                                            const Map& map,
-                                           std::span<const KeyframeId> candidates,
-                                           std::vector<LandmarkId>& landmarks);
+                                           std::span<const KeyframeId> candidates);
 
-  /// What became of the last search.
-  const PlaceDiagnosis& diagnosis() const { return diagnosis_; }
+  /// What became of the last search, of the place that came closest or was found; the reason is
+  /// kNoCandidate or PlaceAttempt::failure.
+  const FrameStatus& diagnosis() const { return diagnosis_; }
 
  private:
   void note(const PlaceAttempt& attempt);
 
   PlaceLocator locator_;
   const int min_inliers_;
-  PlaceDiagnosis diagnosis_;
+  FrameStatus diagnosis_;
   std::vector<KeyframeId> candidates_;
   std::vector<KeyframeId> matched_;  ///< Those already tried for this frame.
-  std::vector<LandmarkId> seen_;
 };
 
 }  // namespace waymark

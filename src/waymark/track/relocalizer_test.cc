@@ -39,11 +39,11 @@ class RelocalizerTest : public ::testing::Test {
   std::optional<LocatedFrame> locate(const PointCloud& cloud, const Rigid3& world_from_rig) {
     const auto view = observe(cloud, *scene_.rig, world_from_rig, scene_.noise, 100);
     const Frame frame = {FrameId{100}, 0, view.features};
-    return relocalizer_.locate(frame, scene_.map, places_, landmarks_);
+    return relocalizer_.locate(frame, scene_.map, places_);
   }
 
-  SubmapId found_submap() const {
-    for (const LandmarkId id : landmarks_) {
+  SubmapId submap_of(const LocatedFrame& located) const {
+    for (const LandmarkId id : located.landmarks) {
       if (id.is_valid()) return scene_.map.landmarks().at(id).submap;
     }
     return {};
@@ -53,7 +53,6 @@ class RelocalizerTest : public ::testing::Test {
   PointCloud first_;
   PlaceIndex places_;
   Relocalizer relocalizer_;
-  std::vector<LandmarkId> landmarks_;
 };
 
 TEST_F(RelocalizerTest, FindsFramesInTheSubmapThatShowsTheirPlace) {
@@ -63,7 +62,7 @@ TEST_F(RelocalizerTest, FindsFramesInTheSubmapThatShowsTheirPlace) {
     ASSERT_TRUE(located);
     EXPECT_EQ(relocalizer_.diagnosis().reason, FrameReason::kNone);
     EXPECT_LT((located->rig_from_world.origin_in_source() - truth.translation).norm(), 0.02);
-    EXPECT_EQ(found_submap(), SubmapId{submap});
+    EXPECT_EQ(submap_of(*located), SubmapId{submap});
   }
 }
 
@@ -82,10 +81,12 @@ TEST_F(RelocalizerTest, PrefersThePlaceThatExplainsMore) {
     places_.add(KeyframeId{id}, SubmapId{0}, std::span(all).first(all.size() / 4));
   }
   add_keyframes();
-  ASSERT_TRUE(locate(half_alike, pose_at(0.5)));
-  EXPECT_EQ(found_submap(), SubmapId{2});
-  ASSERT_TRUE(locate(first_, pose_at(0.5)));
-  EXPECT_EQ(found_submap(), SubmapId{0});
+  const auto in_third = locate(half_alike, pose_at(0.5));
+  ASSERT_TRUE(in_third);
+  EXPECT_EQ(submap_of(*in_third), SubmapId{2});
+  const auto in_first = locate(first_, pose_at(0.5));
+  ASSERT_TRUE(in_first);
+  EXPECT_EQ(submap_of(*in_first), SubmapId{0});
 }
 
 TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {
@@ -94,7 +95,7 @@ TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {
   // The looks of the place, but not its shape.
   for (PointLandmark& point : first_.landmarks) point.position.x() *= -1.0;
   EXPECT_FALSE(locate(first_, pose_at(0.5)));
-  const PlaceDiagnosis& diagnosis = relocalizer_.diagnosis();
+  const FrameStatus& diagnosis = relocalizer_.diagnosis();
   EXPECT_EQ(diagnosis.reason, FrameReason::kNotVerified);
   EXPECT_GE(diagnosis.num_candidates, 2);
   EXPECT_GT(diagnosis.num_matches, 100);

@@ -6,20 +6,19 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/base/frame_state.h"
-#include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
-#include "waymark/match/projection.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/frame_locator.h"
+#include "waymark/track/frame_verdict.h"
 #include "waymark/track/initializer.h"
 #include "waymark/track/keyframe_decision.h"
+#include "waymark/track/last_frame.h"
 #include "waymark/track/local_map.h"
 #include "waymark/track/map_snapshot.h"
-#include "waymark/track/messages.h"
-#include "waymark/track/motion_model.h"
 #include "waymark/track/pose_refiner.h"
 #include "waymark/track/relocalizer.h"
+#include "waymark/track/sent_ids.h"
+#include "waymark/track/sightings.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
@@ -28,21 +27,10 @@ namespace waymark {
 enum class TrackingPurpose { kMapping, kLocalizing };
 
 /// What tracking a frame gave.
-struct TrackOutcome {
-  FrameState state = FrameState::kLost;
-  FrameReason reason = FrameReason::kNone;
-  std::optional<RelativePose> pose;
-  Rigid3 rig_from_world;  ///< The pose as of now, where there is one.
-  Matrix6d covariance = Matrix6d::Zero();
-  int num_matches = 0;     ///< Where there is no pose, of the place that came closest.
-  int num_inliers = 0;     ///< The same.
-  int num_candidates = 0;  ///< Places compared when all else had failed.
+struct TrackOutcome : FrameVerdict {
+  FrameDetails details;                  ///< Its pose has the id that a keyframe will have.
   std::optional<MapperMessage> message;  ///< For the mapper; a frame with a message is a keyframe.
-  std::optional<KeyframeId> keyframe;    ///< The id that the frame will have as a keyframe.
-  std::vector<FilledPose> filled;        ///< Earlier frames that have a pose now.
   std::vector<SeenLandmark> seen;        ///< What the pose rests on.
-  std::vector<LandmarkId> landmarks;     ///< Per feature, invalid where none; empty without pose.
-  SubmapId submap;                       ///< Where there is a pose.
   bool is_relocalized = false;           ///< Found again after a loss.
 };
 
@@ -75,38 +63,33 @@ class Tracker {
  private:
   enum class Mode { kInitializing, kTracking, kLost };
 
-  TrackOutcome initialize(const Frame& frame, StageTimes& times);
-  /// The first pose of a new sub-map, if this frame completes one.
-  std::optional<TrackOutcome> start_submap(const Frame& frame);
-  TrackOutcome follow(const Frame& frame, StageTimes& times);
-  std::optional<LocatedFrame> locate_near_last(const Frame& frame, StageTimes& times);
-  /// Reads the last frame's pose and landmarks in the map of this frame.
-  void carry_over();
-  std::optional<LocatedFrame> locate_from_last(const Frame& frame);
-  std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
+  std::optional<LocatedFrame> locate_from_last(const Frame& frame, StageTimes& times);
   /// Among the keyframes where it was last, or while mapping the newest ones of that sub-map.
-  std::optional<LocatedFrame> recover(const Frame& frame);
+  std::optional<LocatedFrame> recover(const Frame& frame, StageTimes& times);
+  std::vector<KeyframeId> recovery_keyframes() const;
+  std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
   /// Anywhere in the map.
   std::optional<LocatedFrame> relocalize(const Frame& frame, StageTimes& times);
-  LocatedFrame locate_in_local_map(const Frame& frame, const LocatedFrame& first);
-  void refresh_local_map(const Frame& frame);
-  void count_sightings(const ProjectionMatches& matches);
-  TrackOutcome accept(const Frame& frame, const LocatedFrame& located);
-  TrackOutcome lose(const Frame& frame, const PlaceDiagnosis& diagnosis, StageTimes& times);
-  std::vector<KeyframeId> recovery_keyframes() const;
-  KeyframeSituation assess(const Frame& frame, const LocatedFrame& located) const;
-  NewKeyframe make_keyframe(const Frame& frame, const RelativePose& pose);
-  std::vector<Sighting> take_sightings();
+  std::optional<LocatedFrame> locate_in_local_map(const Frame& frame,
+                                                  std::optional<LocatedFrame> first,
+                                                  StageTimes& times);
+  void refresh_local_map(const Features& features, const LocatedFrame& located);
+  void count_sightings(const Features& features, const LocatedFrame& located);
+  bool is_keyframe(const Frame& frame, const LocatedFrame& located) const;
+  TrackOutcome accept(const Frame& frame, LocatedFrame located, StageTimes& times);
+  /// Starts a new sub-map, or keeps looking.
+  TrackOutcome lose(const Frame& frame, const FrameStatus& why, StageTimes& times);
+  TrackOutcome initialize(const Frame& frame, StageTimes& times);
+  /// The first pose of a new sub-map, if this frame completes one.
+  std::optional<TrackOutcome> start_submap(const Frame& frame, StageTimes& times);
 
-  const std::shared_ptr<const Rig> rig_;
   const bool has_range_;
   const TrackingSettings settings_;
-  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
   Initializer initializer_;
-  ProjectionMatcher matcher_;
   AppearanceMatcher appearance_;
   FrameLocator locator_;
   Relocalizer relocalizer_;
+  KeyframeAssessor keyframe_assessor_;
 
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;
@@ -116,18 +99,10 @@ class Tracker {
   LocalMap local_;
   std::shared_ptr<const Map> local_map_source_;
   int local_map_age_ = 0;
-  MotionModel motion_;
-  RelativePose last_pose_;
-  std::shared_ptr<const Features> last_features_;
-  std::vector<LandmarkId> last_landmarks_;  ///< Per feature of the last frame.
-  std::vector<LandmarkId> landmarks_;       ///< Per feature of this frame.
-  std::vector<Sighting> sightings_;
+  LastFrame last_;
   FrameId last_keyframe_frame_;
-  std::uint32_t num_sent_ = 0;      ///< Keyframes sent to the mapper.
-  std::uint32_t num_submaps_ = 0;   ///< Sub-maps sent to the mapper.
-  std::uint32_t submap_start_ = 0;  ///< First keyframe of the sub-map, if that is a new one.
-  LandmarkSet last_set_;
-  std::vector<std::uint8_t> is_taken_;
+  SentIds ids_;
+  SightingCounter sightings_;
 };
 
 }  // namespace waymark

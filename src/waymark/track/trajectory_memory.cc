@@ -14,14 +14,11 @@ bool has_pose(const TrajectoryMemory::Entry& entry) {
 }  // namespace
 
 void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, const Map& map) {
-  RelativePose pose = outcome.pose.value_or(RelativePose{});
-  // A keyframe is its own reference, so that it moves as the map moves it.
-  if (outcome.keyframe) pose = {*outcome.keyframe, Rigid3{}, pose.reference_scale};
-  entries_.push_back({frame.timestamp_ns, outcome.state, pose});
+  entries_.push_back({frame.timestamp_ns, outcome.state, outcome.details.pose});
   if (!outcome.seen.empty()) unsettled_.push_back({frame.id, outcome.seen, nullptr});
-  if (!outcome.pose) unposed_.push_back({frame.id, frame.features});
+  if (outcome.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
-  for (const FilledPose& filled : outcome.filled) {
+  for (const FilledPose& filled : outcome.details.filled) {
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
     entry.pose = filled.pose;

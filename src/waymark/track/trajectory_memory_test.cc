@@ -22,7 +22,7 @@ class TrajectoryMemoryTest : public ::testing::Test {
   void add_stale(std::uint32_t number) {
     TrackOutcome outcome;
     outcome.state = FrameState::kTracked;
-    outcome.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
+    outcome.details.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
     outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
     memory_.add(frame(number), outcome, scene_.map);
   }
@@ -63,8 +63,8 @@ TEST_F(TrajectoryMemoryTest, SettlesFilledFramesByWhatTheirFeaturesShow) {
   memory_.add(frame(2), TrackOutcome{}, scene_.map);
   TrackOutcome start;
   start.state = FrameState::kTracked;
-  start.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
-  start.filled = {{FrameId{2}, {KeyframeId{0}, stale(), 1.0}, view_.features}};
+  start.details.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
+  start.details.filled = {{FrameId{2}, {KeyframeId{0}, stale(), 1.0}, view_.features}};
   memory_.add(frame(3), start, scene_.map);
   EXPECT_EQ(memory_.entries()[2].state, FrameState::kFilled);
   memory_.settle(scene_.map);
@@ -92,8 +92,7 @@ TEST_F(TrajectoryMemoryTest, FillsGapsFromBothSides) {
 TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
-  outcome.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
-  outcome.keyframe = KeyframeId{1};
+  outcome.details.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
   outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
   memory_.add(frame(1), outcome, scene_.map);  // The second keyframe was made from frame 1.
   memory_.settle(scene_.map);

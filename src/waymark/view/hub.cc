@@ -253,7 +253,7 @@ std::string encode_preview(const Image& image) {
   return {bytes.begin(), bytes.end()};
 }
 
-Message encode_frame(const FrameImage& frame, std::int64_t start_ns) {
+Message encode_frame(const DrawnFrame& frame, std::int64_t start_ns) {
   const std::string jpeg = encode_preview(frame.image);
   const std::size_t num_features = frame.features ? frame.features->num_primary : 0;
   MessageWriter writer(MessageKind::kFrame, num_features);

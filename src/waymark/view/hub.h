@@ -128,7 +128,7 @@ class ViewHub {
   std::map<std::uint64_t, std::shared_ptr<ViewClient>> clients_;
   std::uint64_t next_client_ = 1;
   std::vector<Message> snapshot_;            ///< Of now, once somebody needed it.
-  std::shared_ptr<const FrameImage> image_;  ///< The newest; null if none.
+  std::shared_ptr<const DrawnFrame> image_;  ///< The newest; null if none.
   bool is_frame_new_ = false;                ///< Whether clients have to be told of it.
   Message last_frame_;                       ///< Of it, once somebody needed it.
   Clock::time_point last_status_;
@@ -138,6 +138,6 @@ class ViewHub {
 std::string encode_preview(const Image& image);
 
 /// The `frame` message.
-Message encode_frame(const FrameImage& frame, std::int64_t start_ns);
+Message encode_frame(const DrawnFrame& frame, std::int64_t start_ns);
 
 }  // namespace waymark

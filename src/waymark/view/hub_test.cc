@@ -54,14 +54,14 @@ class Sleeper : public ViewClient {
 };
 
 ViewUpdate frame_update(std::uint32_t frame) {
-  FrameImage image;
+  DrawnFrame image;
   image.frame = FrameId{frame};
   image.width_px = 8;
   image.height_px = 6;
   image.features = std::make_shared<Features>();
   image.image = Image(8, 6);
   ViewUpdate update;
-  update.image = std::make_shared<const FrameImage>(std::move(image));
+  update.image = std::make_shared<const DrawnFrame>(std::move(image));
   return update;
 }
 

@@ -56,7 +56,7 @@ TEST(Protocol, AFrameIsWhatTheDocumentSays) {
   auto features = std::make_shared<Features>();
   features->num_primary = 1;
   features->keypoints.push_back({.x_px = 100.0f, .y_px = 50.0f});
-  FrameImage frame;
+  DrawnFrame frame;
   frame.frame = FrameId{10};
   frame.timestamp_ns = 1'500'000'000;
   frame.width_px = 640;

@@ -47,7 +47,7 @@ ViewPublisher::ViewPublisher(ViewChannel& channel, std::optional<std::size_t> nu
 }
 
 void ViewPublisher::tell(const System& system,
-                         const FrameInput& input,
+                         const FrameImages& input,
                          const TrackingResult& result) {
   const FrameDetails& details = system.details();
   SessionStatus& status = update_.status;
@@ -56,16 +56,13 @@ void ViewPublisher::tell(const System& system,
   timestamps_ns_.push_back(input.timestamp_ns);
   status.frame = details.frame;
   status.time_s = 1e-9 * static_cast<double>(input.timestamp_ns - timestamps_ns_.front());
-  status.submap = result.submap;
-  status.num_matches = result.num_matches;
-  status.num_inliers = result.num_inliers;
   measure(result);
-  count(result.state, result.reason);
+  count(result);
   update_.map = system.map();
   note_frames(system, input, result);
   update_.colors.push_back(colors_of(details, input.image0));
   if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
-    update_.image = std::make_shared<const FrameImage>(FrameImage{details.frame,
+    update_.image = std::make_shared<const DrawnFrame>(DrawnFrame{details.frame,
                                                                   input.timestamp_ns,
                                                                   input.image0.width_px,
                                                                   input.image0.height_px,
@@ -77,14 +74,13 @@ void ViewPublisher::tell(const System& system,
 }
 
 void ViewPublisher::note_frames(const System& system,
-                                const FrameInput& input,
+                                const FrameImages& input,
                                 const TrackingResult& result) {
   const FrameDetails& details = system.details();
   FrameNote note;
   note.frame = details.frame;
   note.timestamp_ns = input.timestamp_ns;
-  note.state = result.state;
-  note.reason = result.reason;
+  static_cast<FrameStatus&>(note) = result;
   note.tracking_ms = static_cast<float>(result.stages.tracking_ms());
   if (result.world_from_rig) note.pose = details.pose;
   update_.frames.push_back(note);
@@ -99,15 +95,15 @@ void ViewPublisher::note_frames(const System& system,
   update_.status.num_tracked += details.filled.size();
 }
 
-void ViewPublisher::count(FrameState state, FrameReason reason) {
+void ViewPublisher::count(const FrameStatus& newest) {
   SessionStatus& status = update_.status;
   ++status.num_frames;
-  status.num_tracked += state == FrameState::kTracked;
-  status.num_unreadable += state == FrameState::kUnreadable;
-  status.num_dropped += state == FrameState::kDropped;
-  status.lost_count += state == FrameState::kLost && status.state != FrameState::kLost;
-  status.state = state;
-  status.reason = reason;
+  status.num_tracked += newest.state == FrameState::kTracked;
+  status.num_unreadable += newest.state == FrameState::kUnreadable;
+  status.num_dropped += newest.state == FrameState::kDropped;
+  status.lost_count +=
+      newest.state == FrameState::kLost && status.newest.state != FrameState::kLost;
+  status.newest = newest;
 }
 
 void ViewPublisher::measure(const TrackingResult& result) {
@@ -128,8 +124,8 @@ void ViewPublisher::measure(const TrackingResult& result) {
       span.count() > 0.0 ? static_cast<double>(recent_times_.size() - 1) / span.count() : 0.0;
 }
 
-void ViewPublisher::skip(FrameState state, FrameReason reason) {
-  count(state, reason);
+void ViewPublisher::skip(const FrameStatus& newest) {
+  count(newest);
   push();
 }
 
@@ -166,7 +162,6 @@ void ViewPublisher::finish(const System& system) {
     note.frame = FrameId{first_frame_.value + frame.frame.value};
     note.timestamp_ns = frame.timestamp_ns;
     note.state = frame.state;
-    note.reason = FrameReason::kNone;
     note.final_pose = frame.world_from_rig;
     note.submap = frame.submap;
     update_.frames.push_back(note);

@@ -23,9 +23,9 @@ class ViewPublisher {
       : ViewPublisher(viewer.channel(), num_frames_total) {}
 
   /// A frame was fed; input is what was fed.
-  void tell(const System& system, const FrameInput& input, const TrackingResult& result);
+  void tell(const System& system, const FrameImages& input, const TrackingResult& result);
   /// A frame was not fed.
-  void skip(FrameState state, FrameReason reason);
+  void skip(const FrameStatus& newest);
   /// Where the session is in its course.
   void set_phase(SessionPhase phase);
   /// Whether the map grows.
@@ -38,8 +38,8 @@ class ViewPublisher {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void note_frames(const System& system, const FrameInput& input, const TrackingResult& result);
-  void count(FrameState state, FrameReason reason);
+  void note_frames(const System& system, const FrameImages& input, const TrackingResult& result);
+  void count(const FrameStatus& newest);
   void measure(const TrackingResult& result);
   void push();
 

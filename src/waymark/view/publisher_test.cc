@@ -20,15 +20,15 @@ class PublishingSession {
     std::fill(depth_.values.begin(), depth_.values.end(), std::uint16_t{2000});
   }
 
-  FrameInput input() {
-    FrameInput input;
+  FrameImages input() {
+    FrameImages input;
     input.timestamp_ns = 1'000'000'000 + 50'000'000 * std::int64_t{num_frames_++};
     input.image0 = {texture_.row(0), kWidth, kHeight, texture_.stride()};
     input.depth = depth_.view();
     return input;
   }
-  FrameInput black_input() {
-    FrameInput black = input();
+  FrameImages black_input() {
+    FrameImages black = input();
     black.image0 = black_.view();
     return black;
   }
@@ -86,7 +86,7 @@ class Listener {
 
 class Publisher : public ::testing::Test {
  protected:
-  TrackingResult feed(const FrameInput& input) {
+  TrackingResult feed(const FrameImages& input) {
     const TrackingResult result = session_.system().feed(input);
     publisher_.tell(session_.system(), input, result);
     listener_.take_in();
@@ -123,7 +123,7 @@ TEST_F(Publisher, TellsOfEachFrame) {
 
 TEST_F(Publisher, GivesAnImageWhereOneIsWished) {
   listener_.channel.wants_image = true;
-  const FrameInput input = session_.input();
+  const FrameImages input = session_.input();
   feed(input);
   const auto image = listener_.last().image;
   ASSERT_NE(image, nullptr);

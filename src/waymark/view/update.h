@@ -22,15 +22,12 @@
 namespace waymark {
 
 /// A frame of the trajectory and of the time line.
-struct FrameNote {
-  FrameId frame;                            ///< Which one.
-  std::int64_t timestamp_ns = 0;            ///< Of the input.
-  FrameState state = FrameState::kLost;     ///< What became of it.
-  FrameReason reason = FrameReason::kNone;  ///< Why it has no pose.
-  float tracking_ms = 0.0f;                 ///< From image in memory to pose.
-  std::optional<RelativePose> pose;         ///< Moves with the map.
-  std::optional<Rigid3> final_pose = {};    ///< world_from_rig, in place of it.
-  SubmapId submap;                          ///< Whose frame the pose is in.
+struct FrameNote : FrameStatus {
+  FrameId frame;                          ///< Which one.
+  std::int64_t timestamp_ns = 0;          ///< Of the input.
+  float tracking_ms = 0.0f;               ///< From image in memory to pose.
+  std::optional<RelativePose> pose;       ///< Moves with the map.
+  std::optional<Rigid3> final_pose = {};  ///< world_from_rig, in place of it.
 };
 
 /// Colours at the features of a frame, for the landmarks that will be made from them.
@@ -40,7 +37,7 @@ struct FeatureColors {
 };
 
 /// What is drawn of the newest frame.
-struct FrameImage {
+struct DrawnFrame {
   FrameId frame;                  ///< Which one.
   std::int64_t timestamp_ns = 0;  ///< Of the input.
   int width_px = 0;               ///< Of the images of camera 0, whether there is one or not.
@@ -59,11 +56,7 @@ struct SessionStatus {
   bool is_mapping = true;                        ///< Whether the map grows.
   std::optional<FrameId> frame;                  ///< The newest.
   double time_s = 0.0;                           ///< Of the newest frame, since the first.
-  FrameState state = FrameState::kInitializing;  ///< Of the newest frame.
-  FrameReason reason = FrameReason::kNone;       ///< Why it has no pose.
-  SubmapId submap;                               ///< Of the newest frame.
-  int num_matches = 0;                           ///< Of the newest frame.
-  int num_inliers = 0;                           ///< Of the newest frame.
+  FrameStatus newest = {.state = FrameState::kInitializing};  ///< Of the newest frame.
   StageTimes stages;                             ///< Of the newest frame.
   double median_tracking_ms = 0.0;               ///< Of the recent frames.
   std::size_t num_frames = 0;                    ///< So far.
@@ -81,7 +74,7 @@ struct ViewUpdate {
   std::shared_ptr<const Map> map;           ///< Null: as before.
   std::vector<FrameNote> frames;            ///< New ones and those that are known better now.
   std::vector<FeatureColors> colors;        ///< Of new frames.
-  std::shared_ptr<const FrameImage> image;  ///< Null: none this time.
+  std::shared_ptr<const DrawnFrame> image;  ///< Null: none this time.
   SessionStatus status;                     ///< As of now.
 };
 

@@ -13,7 +13,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/exchange/export_colmap.h"
+#include "waymark/exchange/exports.h"
 
 namespace waymark::testing {
 

@@ -1,0 +1,25 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "waymark/image/depth.h"
+#include "waymark/image/image.h"
+
+namespace waymark {
+
+using Rgb = std::array<std::uint8_t, 3>;  ///< Red, green, blue.
+using ColorView = BasicImageView<Rgb>;    ///< A borrowed image in colour.
+using ColorImage = BasicImage<Rgb>;       ///< An image in colour.
+
+/// The luma of ITU-R BT.601, 0.299 R + 0.587 G + 0.114 B, rounded; bit by bit what OpenCV makes of
+/// such an image.
+Image to_grey(const ColorView& image);
+
+/// Depth in metres in the units of the settings, rounded. 0, no measurement, where it is not
+/// positive and finite or more than the units can say (65535 of them).
+DepthImage depth_in_units(const BasicImageView<float>& depth_m, const DepthSettings& settings);
+
+}  // namespace waymark

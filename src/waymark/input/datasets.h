@@ -1,0 +1,105 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/base/config.h"
+#include "waymark/input/input.h"
+#include "waymark/input/listing.h"
+
+namespace waymark {
+
+// What open_input() recognises, a reader each.
+
+/// One row of camN/data.csv.
+struct EurocImage {
+  std::int64_t timestamp_ns = 0;
+  std::string name;   ///< In camN/data.
+  std::string where;  ///< File and line, for errors.
+};
+
+/// Rows "nanoseconds,name", times increasing, at least one. Throws InputError; name is what it
+/// calls the file.
+std::vector<EurocImage> parse_euroc_images(std::string_view text, const std::string& name);
+
+/// camN/sensor.yaml.
+struct EurocSensor {
+  CameraDescription description;
+  Rigid3 body_from_sensor;  ///< T_BS.
+};
+
+/// Parses sensor.yaml of a camera. Throws InputError.
+EurocSensor parse_euroc_sensor(const ConfigSource& source);
+
+/// Data set in the layout of EuRoC (Burri et al. 2016) and TUM-VI: mav0/cam0 and, for stereo,
+/// mav0/cam1. folder is mav0 or the one that holds it. Calibration: sensor.yaml of each camera, or
+/// dso/camchain.yaml beside mav0.
+Listing list_euroc(const std::filesystem::path& folder, const InputOptions& options);
+
+/// Whether the folder is or holds a mav0 with a camera.
+bool is_euroc(const std::filesystem::path& folder);
+
+/// What turns a pose of the sensor of mav0/SENSOR/data.csv (ground truth is of the body) into one
+/// of camera 0, from the sensor.yaml files of both; identity without that of camera 0.
+Rigid3 euroc_sensor_from_camera0(const std::filesystem::path& csv_path);
+
+/// Parses calib.txt: rows "P0: 12 numbers", the 3x4 projection matrices of rectified cameras in the
+/// frame of camera 0. Cameras come without a resolution. Throws InputError when one of the first
+/// num_cameras is missing or malformed; name is what it calls the file.
+CameraChain parse_kitti_calibration(std::string_view text,
+                                    const std::string& name,
+                                    std::size_t num_cameras);
+
+/// Data set in the layout of KITTI odometry (Geiger et al. 2012): image_0/, for stereo image_1/,
+/// times.txt. Calibration: calib.txt.
+Listing list_kitti(const std::filesystem::path& folder, const InputOptions& options);
+
+/// Whether the folder holds image_0/ with times.txt or calib.txt beside it.
+bool is_kitti(const std::filesystem::path& folder);
+
+/// One row of rgb.txt or depth.txt.
+struct TumImage {
+  std::int64_t timestamp_ns = 0;
+  std::string name;  ///< Below the folder of the data set.
+};
+
+/// Rows "seconds name", times increasing, at least one. Throws InputError; name is what it calls
+/// the file.
+std::vector<TumImage> parse_tum_images(std::string_view text, const std::string& name);
+
+/// For each colour time the index of its depth image: the two are nearest to each other and at most
+/// max_difference_ns apart. Both lists increase. A depth image serves one colour image.
+std::vector<std::optional<std::size_t>> pair_depth(const std::vector<std::int64_t>& colour_ns,
+                                                   const std::vector<std::int64_t>& depth_ns,
+                                                   std::int64_t max_difference_ns);
+
+/// Data set in the layout of TUM RGB-D (Sturm et al. 2012): rgb.txt and, for depth, depth.txt.
+Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& options);
+
+/// Folder of images, or one that holds them in images/. Times come from times.txt in the folder or
+/// beside it; without one the images are taken to be 1/30 s apart.
+Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options);
+
+/// The file of true poses that belongs to an input, if its layout has one and it is there:
+/// mav0/state_groundtruth_estimate0/data.csv (EuRoC), mav0/mocap0/data.csv (TUM-VI),
+/// groundtruth.txt (TUM), poses.txt or ../../poses/NN.txt of sequences/NN (KITTI). For an input
+/// that is a file they are looked for beside it. read_trajectory() reads what is found.
+std::optional<std::filesystem::path> find_groundtruth(const std::filesystem::path& input);
+
+/// Opens a video file. Times come from times.txt beside it (one per frame), else from the
+/// container. Reads the first frame. Throws InputError.
+std::unique_ptr<Input> open_video(const std::filesystem::path& path, const InputOptions& options);
+
+/// Opens a camera, "camera:N" or a device such as /dev/video0, and reads its first frame. Asks for
+/// images of the size that the calibration states. Throws InputError.
+std::unique_ptr<Input> open_camera(const std::filesystem::path& path, const InputOptions& options);
+
+}  // namespace waymark

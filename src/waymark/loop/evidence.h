@@ -1,0 +1,70 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "waymark/loop/revisit.h"
+#include "waymark/map/map.h"
+#include "waymark/match/appearance.h"
+#include "waymark/match/projection.h"
+#include "waymark/optimize/similarity.h"
+
+namespace waymark {
+
+/// How much of what should be seen is seen.
+struct Sightings {
+  std::size_t num_found = 0;
+  std::size_t num_visible = 0;
+
+  double share() const {
+    return num_visible == 0 ? 0.0
+                            : static_cast<double>(num_found) / static_cast<double>(num_visible);
+  }
+};
+
+/// A possible revisit and what speaks for it.
+struct RevisitEvidence {
+  Revisit revisit;
+  Sightings in_query;  ///< Landmarks around the match in the query.
+  Sightings in_match;  ///< Landmarks around the query in the match.
+  /// Other keyframes near the query that see the place, too, where this revisit puts it.
+  std::size_t num_confirming = 0;
+};
+
+/// Collects by geometry what speaks for two keyframes showing the same place: how much of what they
+/// see alike fits one similarity (a rigid motion where both sub-maps are metric), as Strasdat et
+/// al. (2010) do, and how much of what else the two and their neighbours see that explains. Keeps
+/// its buffers.
+class EvidenceCollector {
+ public:
+  EvidenceCollector(std::shared_ptr<const Rig> rig, std::uint64_t seed);
+
+  /// Nothing if no similarity fits enough matches to be looked into. Repeatable by bits.
+  std::optional<RevisitEvidence> collect(const Map& map, KeyframeId query, KeyframeId match);
+
+ private:
+  LandmarkMatches match_by_appearance(const Map& map, KeyframeId query, KeyframeId match);
+  std::optional<SimilarityEstimate> estimate(const Map& map, Revisit& revisit);
+  LandmarkMatches match_by_projection(const Map& map, Revisit& revisit);
+  Sightings look_for(const Map& map,
+                     std::span<const KeyframeId> sources,
+                     KeyframeId target,
+                     const Rigid3& target_from_world);
+  void count_sightings(const Map& map, RevisitEvidence& evidence);
+
+  std::uint64_t seed_;
+  AppearanceMatcher appearance_;
+  ProjectionMatcher projection_;
+  LandmarkSet landmarks_;
+};
+
+/// The rig from another rig's world, given the similarity of the two rigs: a pose in the units of
+/// that world.
+Rigid3 pose_in_other_world(const Sim3& rig_from_other, const Rigid3& other_from_world);
+
+}  // namespace waymark

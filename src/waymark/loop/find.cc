@@ -1,0 +1,120 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/find.h"
+
+#include <algorithm>
+#include <iterator>
+
+#include "waymark/loop/drift.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::size_t kMaxCandidates = 4;
+/// Of keyframes that see the same, so many are candidates, so that others have their turn.
+constexpr int kMaxOfOnePlace = 2;
+constexpr std::size_t kNumRanked = 12;
+/// Keyframes so many steps away are the query's surroundings.
+constexpr int kNumNearSteps = 2;
+/// Of the best score within the surroundings.
+constexpr double kMinRelativeScore = 0.1;
+
+bool contains(const std::vector<KeyframeId>& ascending, KeyframeId id) {
+  return std::binary_search(ascending.begin(), ascending.end(), id);
+}
+
+bool are_linked(const Map& map, KeyframeId a, KeyframeId b) {
+  const auto& edges = map.covisible(a);
+  return std::any_of(edges.begin(), edges.end(), [&](const CovisibilityEdge& edge) {
+    return edge.keyframe == b && edge.num_shared >= kMinSharedOfLinked;
+  });
+}
+
+bool is_metric(const Map& map, KeyframeId id) {
+  return map.submaps()[map.keyframes().at(id).submap.value].is_metric;
+}
+
+}  // namespace
+
+std::vector<KeyframeId> within_steps(const Map& map, KeyframeId keyframe, int num_steps) {
+  std::vector<KeyframeId> near = {keyframe};
+  std::vector<KeyframeId> front = near;
+  for (int step = 0; step < num_steps; ++step) {
+    std::vector<KeyframeId> next;
+    for (KeyframeId id : front) {
+      const KeyframeId parent = map.keyframes().at(id).parent;
+      if (parent.is_valid()) next.push_back(parent);
+      for (const CovisibilityEdge& edge : map.covisible(id)) {
+        if (edge.num_shared >= kMinSharedOfLinked) next.push_back(edge.keyframe);
+      }
+    }
+    std::sort(next.begin(), next.end());
+    next.erase(std::unique(next.begin(), next.end()), next.end());
+    front.clear();
+    std::set_difference(
+        next.begin(), next.end(), near.begin(), near.end(), std::back_inserter(front));
+    near.insert(near.end(), front.begin(), front.end());
+    std::sort(near.begin(), near.end());
+  }
+  return near;
+}
+
+std::vector<KeyframeId> with_neighbours(const Map& map,
+                                        KeyframeId keyframe,
+                                        std::size_t max_count) {
+  std::vector<KeyframeId> ids = strongest_neighbours(map, keyframe, max_count);
+  ids.insert(ids.begin(), keyframe);
+  return ids;
+}
+
+std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query) {
+  const std::vector<KeyframeId> near = within_steps(map, query, kNumNearSteps);
+  const auto ranked =
+      places.find(map.keyframes().at(query).features->descriptors,
+                  {.max_candidates = near.size() + kNumRanked,
+                   .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
+  double best_near = 0.0;
+  for (const PlaceCandidate& candidate : ranked) {
+    if (contains(near, candidate.keyframe)) best_near = std::max(best_near, candidate.score);
+  }
+  std::vector<KeyframeId> alike;
+  for (const PlaceCandidate& candidate : ranked) {
+    const KeyframeId id = candidate.keyframe;
+    if (contains(near, id) || !map.keyframes().contains(id)) continue;
+    if (is_metric(map, id) != is_metric(map, query)) continue;
+    if (alike.size() == kMaxCandidates || candidate.score < kMinRelativeScore * best_near) break;
+    const auto num_linked = std::count_if(
+        alike.begin(), alike.end(), [&](KeyframeId chosen) { return are_linked(map, chosen, id); });
+    if (num_linked < kMaxOfOnePlace) alike.push_back(id);
+  }
+  return alike;
+}
+
+std::vector<KeyframeId> find_beside(const Map& map,
+                                    KeyframeId query,
+                                    const BesideOptions& options) {
+  struct Beside {
+    double distance;
+    KeyframeId keyframe;
+  };
+  const Keyframe& here = map.keyframes().at(query);
+  const double depth = median_depth(map, query);
+  const std::vector<KeyframeId> known = within_steps(map, query, options.num_known_steps);
+  std::vector<Beside> found;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& other) {
+    if (other.submap != here.submap || contains(known, id)) return;
+    const Rigid3 here_from_other = here.rig_from_world * other.rig_from_world.inverse();
+    const double distance = here_from_other.translation.norm() / depth;
+    const double angle = Eigen::AngleAxisd(here_from_other.rotation).angle();
+    if (distance >= options.distance || angle >= options.angle_rad) return;
+    found.push_back({distance + angle, id});
+  });
+  std::stable_sort(found.begin(), found.end(), [](const Beside& a, const Beside& b) {
+    return a.distance < b.distance;
+  });
+  std::vector<KeyframeId> ids;
+  for (const Beside& beside : found) ids.push_back(beside.keyframe);
+  return ids;
+}
+
+}  // namespace waymark

@@ -1,0 +1,40 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "waymark/map/map.h"
+#include "waymark/place/place_index.h"
+
+namespace waymark {
+
+/// Keyframes that share so many landmarks are linked in the covisibility graph (Mur-Artal et al.
+/// 2015, III.D); fewer may have been seen again by chance.
+inline constexpr std::uint32_t kMinSharedOfLinked = 15;
+
+/// The keyframe and those so many steps away from it, by covisibility or up the spanning tree;
+/// ascending.
+std::vector<KeyframeId> within_steps(const Map& map, KeyframeId keyframe, int num_steps);
+
+/// The keyframe and its strongest neighbours.
+std::vector<KeyframeId> with_neighbours(const Map& map, KeyframeId keyframe, std::size_t max_count);
+
+/// Keyframes of other places that look like the query, best first: none that the map links to it by
+/// a few steps of covisibility, few of one place, and none that look less like it than the query's
+/// own surroundings do by far.
+std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query);
+
+/// What lies beside a keyframe though the map does not know that they show the same.
+struct BesideOptions {
+  int num_known_steps = 1;  ///< Keyframes so near in the covisibility graph are known.
+  double distance = 0.0;    ///< Between the rigs, in parts of the median depth of the scene.
+  double angle_rad = 0.0;   ///< Of the rotation between them.
+};
+
+/// Keyframes of the same sub-map beside the query where the map has it, nearest first.
+std::vector<KeyframeId> find_beside(const Map& map, KeyframeId query, const BesideOptions& options);
+
+}  // namespace waymark

@@ -1,0 +1,172 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/verify.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "waymark/base/median.h"
+#include "waymark/camera/same_rig.h"
+#include "waymark/loop/drift.h"
+
+namespace waymark {
+namespace {
+
+/// What a revisit must have at least. In the shelves of a warehouse and the arcades of an atrium
+/// that are alike, false ones had up to 37 inliers and a share of 0.13.
+struct Demand {
+  std::size_t num_inliers;
+  std::size_t num_found;
+};
+constexpr Demand kOfLoops{25, 40};
+constexpr Demand kOfJoins{30, 60};
+constexpr double kMinShare = 0.15;  ///< Of what both sides should see.
+/// Two revisits of one query agree within this, in radians and in parts of the depth of the scene.
+constexpr double kMaxDisagreement = 0.2;
+
+/// Features of the query that show landmarks of both sides, and their distances in the same ratio.
+constexpr std::size_t kMinPairsBeside = 10;
+constexpr double kMaxRatioError = 0.15;
+
+bool meets(const RevisitEvidence& evidence, const Demand& demand) {
+  const Sightings both{evidence.in_query.num_found + evidence.in_match.num_found,
+                       evidence.in_query.num_visible + evidence.in_match.num_visible};
+  return evidence.revisit.num_inliers >= demand.num_inliers &&
+         evidence.in_query.num_found >= demand.num_found &&
+         evidence.in_match.num_found >= demand.num_found && both.share() >= kMinShare &&
+         evidence.num_confirming > 0;
+}
+
+bool is_loop(const Map& map, const Revisit& revisit) {
+  return map.keyframes().at(revisit.query).submap == map.keyframes().at(revisit.match).submap;
+}
+
+/// Whether two revisits of one query put it at the same place of the same sub-map.
+bool agree(const Map& map, const Revisit& a, const Revisit& b) {
+  const Keyframe& match_a = map.keyframes().at(a.match);
+  const Keyframe& match_b = map.keyframes().at(b.match);
+  if (match_a.submap != match_b.submap) return true;  // Of different worlds: nothing to compare.
+  const Rigid3 pose_a = pose_in_other_world(a.query_from_match, match_a.rig_from_world);
+  const Rigid3 pose_b = pose_in_other_world(b.query_from_match, match_b.rig_from_world);
+  const Rigid3 difference = pose_a * pose_b.inverse();
+  return difference.translation.norm() < kMaxDisagreement * median_depth(map, a.match) &&
+         Eigen::AngleAxisd(difference.rotation).angle() < kMaxDisagreement;
+}
+
+/// The one with most inliers, unless another contradicts it.
+std::optional<Revisit> choose(const Map& map,
+                              const std::vector<RevisitEvidence>& all,
+                              const Demand& demand) {
+  const auto& best = *std::max_element(
+      all.begin(), all.end(), [](const RevisitEvidence& a, const RevisitEvidence& b) {
+        return a.revisit.num_inliers < b.revisit.num_inliers;
+      });
+  const bool is_clear = std::all_of(all.begin(), all.end(), [&](const RevisitEvidence& other) {
+    return agree(map, best.revisit, other.revisit);
+  });
+  if (!is_clear || !meets(best, demand)) return std::nullopt;
+  return best.revisit;
+}
+
+/// Features of a keyframe that show a landmark of its own and another one.
+std::vector<Revisit::Pair> pair_up(const Keyframe& keyframe,
+                                   const std::vector<LandmarkId>& others) {
+  std::vector<Revisit::Pair> pairs;
+  for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
+    const LandmarkId own = keyframe.landmarks[i];
+    if (own.is_valid() && others[i].is_valid() && own != others[i]) {
+      pairs.push_back({own, others[i]});
+    }
+  }
+  return pairs;
+}
+
+/// How much further away the query's landmarks are than those of the match, seen from the query;
+/// keeps the pairs that agree on it.
+double find_scale(const Map& map,
+                  const Rigid3& query_from_world,
+                  const Rigid3& query_from_world_of_match,
+                  std::vector<Revisit::Pair>& pairs) {
+  const auto ratio_of = [&](const Revisit::Pair& pair) {
+    const Landmark& of_query = map.landmarks().at(pair.of_query);
+    const Landmark& of_match = map.landmarks().at(pair.of_match);
+    return (query_from_world * of_query.position_in_world).norm() /
+           (query_from_world_of_match * of_match.position_in_world).norm();
+  };
+  if (pairs.empty()) return 1.0;
+  std::vector<double> ratios;
+  for (const Revisit::Pair& pair : pairs) ratios.push_back(ratio_of(pair));
+  const double scale = median(ratios);
+  std::erase_if(pairs, [&](const Revisit::Pair& pair) {
+    return std::abs(std::log(ratio_of(pair) / scale)) > kMaxRatioError;
+  });
+  return scale;
+}
+
+}  // namespace
+
+RevisitVerifier::RevisitVerifier(std::shared_ptr<const Rig> rig, std::uint64_t seed)
+    : rig_(rig), evidence_(rig, seed), locator_(rig, seed) {}
+
+std::optional<Revisit> RevisitVerifier::verify_alike(const Map& map,
+                                                     KeyframeId query,
+                                                     std::span<const KeyframeId> candidates) {
+  std::vector<RevisitEvidence> loops;
+  std::vector<RevisitEvidence> joins;
+  bool is_ambiguous = false;
+  for (KeyframeId match : candidates) {
+    std::optional<RevisitEvidence> evidence = evidence_.collect(map, query, match);
+    if (!evidence || !meets(*evidence, kOfLoops)) continue;
+    if (!is_loop(map, evidence->revisit)) {
+      joins.push_back(std::move(*evidence));
+    } else if (is_plausible_loop(map, evidence->revisit)) {
+      loops.push_back(std::move(*evidence));
+    } else {
+      is_ambiguous = true;
+    }
+  }
+  if (!loops.empty()) return choose(map, loops, kOfLoops);
+  // Where one sub-map has two places alike, one of them says nothing of another sub-map.
+  if (is_ambiguous || joins.empty()) return std::nullopt;
+  return choose(map, joins, kOfJoins);
+}
+
+std::optional<Revisit> RevisitVerifier::verify_beside(const Map& map,
+                                                      KeyframeId query,
+                                                      std::span<const KeyframeId> candidates) {
+  const auto is_own = [&](KeyframeId id) {
+    return is_same_rig(*map.keyframes().at(id).rig, *rig_);
+  };
+  if (!is_own(query)) return std::nullopt;
+  const auto match = std::find_if(candidates.begin(), candidates.end(), is_own);
+  return match == candidates.end() ? std::nullopt : compare_beside(map, query, *match);
+}
+
+std::optional<Revisit> RevisitVerifier::compare_beside(const Map& map,
+                                                       KeyframeId query,
+                                                       KeyframeId match) {
+  const Keyframe& in_query = map.keyframes().at(query);
+  const auto place =
+      locator_.locate_near(*in_query.features, map, match, in_query.rig_from_world);
+  if (!place) return std::nullopt;
+  Revisit revisit;
+  revisit.query = query;
+  revisit.match = match;
+  revisit.num_inliers = static_cast<std::size_t>(place->frame.num_inliers);
+  revisit.pairs = pair_up(in_query, place->frame.landmarks);
+  const double scale =
+      find_scale(map, in_query.rig_from_world, place->frame.rig_from_world, revisit.pairs);
+  if (revisit.pairs.size() < kMinPairsBeside) return std::nullopt;
+  const Rigid3 query_from_match =
+      place->frame.rig_from_world * map.keyframes().at(match).rig_from_world.inverse();
+  revisit.query_from_match = Sim3(query_from_match);
+  if (!map.submaps()[in_query.submap.value].is_metric) {
+    revisit.query_from_match.scale = scale;
+    revisit.query_from_match.translation *= scale;
+  }
+  if (!is_plausible_loop(map, revisit)) return std::nullopt;
+  return revisit;
+}
+
+}  // namespace waymark

@@ -1,0 +1,220 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/session.h"
+
+#include <gmock/gmock.h>
+
+#include <thread>
+
+#include "waymark/base/testing/temporary_folder.h"
+#include "waymark/base/text.h"
+#include "waymark/session/localization.h"
+#include "waymark/session/merging.h"
+#include "waymark/session/testing/memory_input.h"
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::MemoryInput;
+using ::testing::SizeIs;
+
+constexpr std::size_t kNumFrames = 25;
+
+SequenceSpec small_spec() {
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {210.0, 210.0, 159.5, 119.5};
+  camera.width_px = 320;
+  camera.height_px = 240;
+  SequenceSpec spec;
+  spec.motion = "slide";
+  spec.seed = 3;
+  spec.num_frames = static_cast<int>(kNumFrames);
+  spec.chain = rgbd_chain(camera, 1000.0);
+  return spec;
+}
+
+/// Rendered once for all tests.
+const std::vector<InputFrame>& rendered_frames() {
+  static const std::vector<InputFrame> rendered = [] {
+    SimulatedSequence sequence(small_spec(), std::thread::hardware_concurrency());
+    std::vector<InputFrame> frames(kNumFrames);
+    for (std::size_t i = 0; i < kNumFrames; ++i) {
+      SimulatedFrame simulated = sequence.frame(static_cast<int>(i));
+      frames[i].index = i;
+      frames[i].timestamp_ns = simulated.timestamp_ns;
+      frames[i].images = std::move(simulated.images);
+      frames[i].depth = std::move(simulated.depth);
+    }
+    return frames;
+  }();
+  return rendered;
+}
+
+Rig small_rig() { return SimulatedSequence(small_spec()).rig(); }
+
+Settings small_settings() {
+  Settings settings;
+  settings.features.count = 500;
+  settings.tracking.keyframe_parallax_px = 6.0;  // Several keyframes in a short sequence.
+  return settings;
+}
+
+TEST(RunSession, GoesFromInputToResults) {
+  std::vector<InputFrame> frames = rendered_frames();
+  frames[10] = {};
+  frames[10].index = 10;
+  frames[10].timestamp_ns = rendered_frames()[10].timestamp_ns;
+  frames[10].fault = FrameFault::kUnreadable;
+  MemoryInput input(std::move(frames));
+  System system(small_rig(), small_settings(), Timing::kInline);
+  std::size_t num_observed = 0;
+  std::size_t num_fed = 0;
+  int num_ends = 0;
+  SessionHooks hooks;
+  hooks.observer = [&](const auto& row) { EXPECT_EQ(row.index, num_observed++); };
+  hooks.on_result = [&](const auto&, const auto&) { ++num_fed; };
+  hooks.on_input_end = [&] {
+    ++num_ends;
+    EXPECT_EQ(num_observed, kNumFrames);
+  };
+  const SessionResults results = run_session(input, system, hooks);
+
+  EXPECT_EQ(num_observed, kNumFrames);
+  EXPECT_EQ(num_fed, kNumFrames - 1);
+  EXPECT_EQ(num_ends, 1);
+  EXPECT_EQ(results.summary.counts.tracked, kNumFrames - 1);
+  EXPECT_EQ(results.summary.counts.unreadable, 1u);
+  ASSERT_THAT(results.trajectories, SizeIs(1));
+  EXPECT_THAT(results.trajectories[0], SizeIs(kNumFrames - 1));
+  EXPECT_EQ(results.summary.num_trajectory_lines, kNumFrames - 1);
+  EXPECT_GE(results.keyframes.size(), 3u);
+  EXPECT_EQ(results.keyframes.size(), system.map()->keyframes().size());
+  EXPECT_FALSE(results.table.frames[10].submap.is_valid());
+  EXPECT_GT(results.summary.wall_s, 0.0);
+
+  const testing::TemporaryFolder folder;
+  write_results(folder.path(), results);
+  EXPECT_THAT(read_trajectory(folder / "trajectory.txt"), SizeIs(kNumFrames - 1));
+  EXPECT_THAT(read_trajectory(folder / "keyframes.txt"), SizeIs(results.keyframes.size()));
+  EXPECT_FALSE(std::filesystem::exists(folder / "trajectory_1.txt"));
+  EXPECT_THAT(read_text_file(folder / "frames.csv", "a table"), HasSubstr("\n10,"));
+  EXPECT_THAT(read_text_file(folder / "summary.json", "a summary"), HasSubstr("\"unreadable\": 1"));
+}
+
+TEST(RunSession, EndsEarlyWithWhatItHas) {
+  MemoryInput input(rendered_frames());
+  System system(small_rig(), small_settings(), Timing::kInline);
+  std::size_t num_observed = 0;
+  SessionHooks hooks;
+  hooks.should_stop = [&] { return num_observed == 8; };
+  hooks.observer = [&](const auto&) { ++num_observed; };
+  const SessionResults results = run_session(input, system, hooks);
+  EXPECT_THAT(results.table.frames, SizeIs(8));
+  EXPECT_EQ(results.summary.counts.tracked, 8u);
+}
+
+TEST(RunSession, HasAMapWhenTheInputThrows) {
+  for (const Timing timing : {Timing::kInline, Timing::kLockstep, Timing::kRealtime}) {
+    MemoryInput input(rendered_frames(), 20);
+    System system(small_rig(), small_settings(), timing);
+    EXPECT_THROW(run_session(input, system), InputError);
+    system.finish();
+    EXPECT_FALSE(system.map()->keyframes().is_empty());
+    EXPECT_EQ(system.map()->broken_invariants(), "");
+    EXPECT_THAT(system.trajectory(), SizeIs(20));
+  }
+}
+
+TEST(RunSession, HasRowsButNoTrajectoryWhereNothingIsSeen) {
+  std::vector<InputFrame> frames = rendered_frames();
+  for (InputFrame& frame : frames) {
+    frame.images = {Image(320, 240)};
+    frame.depth = DepthImage(320, 240);
+  }
+  MemoryInput input(std::move(frames));
+  System system(small_rig(), small_settings(), Timing::kInline);
+  const SessionResults results = run_session(input, system);
+  EXPECT_THAT(results.table.frames, SizeIs(kNumFrames));
+  EXPECT_EQ(results.summary.counts.tracked, 0u);
+  EXPECT_THAT(results.trajectories, SizeIs(0));
+  const testing::TemporaryFolder folder;
+  write_results(folder.path(), results);
+  EXPECT_EQ(read_text_file(folder / "trajectory.txt", "a trajectory"), "");
+}
+
+/// A map of the rendered frames, made once.
+std::shared_ptr<const Map> small_map() {
+  static const std::shared_ptr<const Map> map = [] {
+    MemoryInput input(rendered_frames());
+    System system(small_rig(), small_settings(), Timing::kInline);
+    run_session(input, system);
+    return system.map();
+  }();
+  return map;
+}
+
+TEST(LocalizeInput, FindsStreamsAndSingleImagesInAMap) {
+  for (const ImageOrder order : {ImageOrder::kStream, ImageOrder::kUnordered}) {
+    MemoryInput input(rendered_frames());
+    Localizer localizer(small_rig(), small_settings(), small_map());
+    std::size_t num_observed = 0;
+    const SessionResults results =
+        localize_input(input, localizer, order, nullptr, [&](const auto&) { ++num_observed; });
+    EXPECT_EQ(num_observed, kNumFrames);
+    EXPECT_GE(*results.summary.localized, kNumFrames - 3);
+    ASSERT_THAT(results.trajectories, SizeIs(1));
+    EXPECT_THAT(results.trajectories[0], SizeIs(*results.summary.localized));
+    EXPECT_EQ(results.summary.keyframes, small_map()->keyframes().size());
+    EXPECT_EQ(results.summary.submaps, 1u);
+    for (const StampedPose& pose : results.trajectories[0]) {
+      EXPECT_LT(pose.world_from_camera.translation.norm(), 10.0);
+    }
+  }
+}
+
+TEST(LocalizeInput, PassesOnWhatTheInputThrows) {
+  MemoryInput input(rendered_frames(), 2);
+  Localizer localizer(small_rig(), small_settings(), small_map());
+  EXPECT_THROW(localize_input(input, localizer, ImageOrder::kStream, nullptr, nullptr), InputError);
+}
+
+TEST(MergeStored, JoinsAMapWithItselfAndKeepsTheImagesOfBoth) {
+  StoredMap a;
+  a.map = small_map();
+  StoredMap b = a;
+  a.settings = "seed: 1\n";
+  a.images[KeyframeId{0}] = std::make_shared<const std::string>("of a");
+  b.images[KeyframeId{0}] = std::make_shared<const std::string>("of b");
+  const MergedStored merged = merge_stored(a, b, 0);
+  EXPECT_EQ(merged.num_parts_before, 2u);
+  EXPECT_EQ(merged.num_parts, 1u);
+  EXPECT_GE(merged.num_joins, 1);
+  EXPECT_FALSE(merged.is_incomparable);
+  EXPECT_EQ(merged.stored.map->broken_invariants(), "");
+  EXPECT_EQ(merged.stored.settings, "seed: 1\n");
+  ASSERT_THAT(merged.stored.images, SizeIs(2));
+  EXPECT_EQ(*merged.stored.images.at(KeyframeId{0}), "of a");
+  EXPECT_EQ(*merged.stored.images.at(small_map()->keyframes().end_id()), "of b");
+}
+
+TEST(MergeStored, SaysWhenUnitsKeepMapsApart) {
+  StoredMap a;
+  a.map = small_map();
+  StoredMap b;
+  Map free;
+  Keyframe keyframe = *small_map()->keyframes().find(small_map()->submaps()[0].root);
+  keyframe.submap = free.add_submap(false);
+  keyframe.parent = {};
+  free.add_keyframe(std::move(keyframe));
+  b.map = free.freeze();
+  const MergedStored merged = merge_stored(a, b, 0);
+  EXPECT_TRUE(merged.is_incomparable);
+  EXPECT_EQ(merged.num_joins, 0);
+  EXPECT_EQ(merged.num_parts, 2u);
+}
+
+}  // namespace
+}  // namespace waymark
