@@ -16,7 +16,7 @@ namespace waymark {
 namespace {
 
 constexpr std::uint32_t kNumRestingFrames = 10000;
-constexpr int kNumViews = 16;
+constexpr int kNumRestingViews = 16;
 
 /// A pose near the origin.
 Rigid3 beside(double x) { return make_test_pose({x, 0.0, 0.0}, Eigen::Vector3d::Zero()); }
@@ -58,7 +58,7 @@ class RestingSession {
       look_from(beside(0.02 * i), 1);
       track();
     }
-    look_from(beside(0.02 * 29), kNumViews);
+    look_from(beside(0.02 * 29), kNumRestingViews);
   }
 
   const Map& map() const { return *visible_.map; }

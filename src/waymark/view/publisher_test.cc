@@ -109,7 +109,7 @@ TEST_F(Publisher, TellsOfEachFrame) {
     EXPECT_EQ(update.status.frame, FrameId{i});
     EXPECT_EQ(update.status.num_frames, i + 1);
     EXPECT_EQ(update.status.num_tracked, i + 1);
-    EXPECT_EQ(update.status.num_inliers, result.num_inliers);
+    EXPECT_EQ(update.status.newest.num_inliers, result.num_inliers);
     EXPECT_NEAR(update.status.time_s, 0.05 * i, 1e-12);
     EXPECT_EQ(update.map, session_.system().map());
     ASSERT_EQ(update.frames.size(), 1u);
@@ -139,17 +139,17 @@ TEST_F(Publisher, CountsLossesAndFramesThatWereNotFed) {
   feed(session_.black_input());
   feed(session_.black_input());
   EXPECT_EQ(listener_.status().lost_count, 1u);
-  EXPECT_EQ(listener_.status().reason, FrameReason::kNoFeatures);
+  EXPECT_EQ(listener_.status().newest.reason, FrameReason::kNoFeatures);
   EXPECT_FALSE(listener_.last().frames.back().pose);
   feed(session_.input());
   feed(session_.black_input());
   EXPECT_EQ(listener_.status().lost_count, 2u);
-  publisher_.skip(FrameState::kUnreadable, FrameReason::kUnreadableImage);
-  publisher_.skip(FrameState::kDropped, FrameReason::kLate);
+  publisher_.skip({.state = FrameState::kUnreadable, .reason = FrameReason::kUnreadableImage});
+  publisher_.skip({.state = FrameState::kDropped, .reason = FrameReason::kLate});
   EXPECT_EQ(listener_.status().num_unreadable, 1u);
   EXPECT_EQ(listener_.status().num_dropped, 1u);
   EXPECT_EQ(listener_.status().num_frames, 7u);
-  EXPECT_EQ(listener_.status().state, FrameState::kDropped);
+  EXPECT_EQ(listener_.status().newest.state, FrameState::kDropped);
 }
 
 TEST_F(Publisher, LosesNothingWhereTheViewerTakesNoUpdate) {
