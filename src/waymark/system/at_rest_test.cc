@@ -15,7 +15,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::uint32_t kNumFrames = 10000;
+constexpr std::uint32_t kNumFramesAtRest = 10000;
 constexpr int kNumViews = 16;
 
 /// A pose near the origin.
@@ -88,9 +88,9 @@ TEST_P(AtRest, NothingGrowsWithTime) {
   session.begin();
   ASSERT_GT(session.map().keyframes().size(), 0u);
   std::size_t bytes_early = 0, keyframes_early = 0, landmarks_early = 0;
-  for (std::uint32_t i = 0; i < kNumFrames; ++i) {
+  for (std::uint32_t i = 0; i < kNumFramesAtRest; ++i) {
     ASSERT_EQ(session.track().state, FrameState::kTracked) << "frame " << i;
-    if (i != kNumFrames / 10) continue;
+    if (i != kNumFramesAtRest / 10) continue;
     bytes_early = bytes_in_use();
     keyframes_early = session.map().keyframes().size();
     landmarks_early = session.map().landmarks().size();
