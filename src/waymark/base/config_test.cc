@@ -134,6 +134,7 @@ TEST(Config, EndlessNestingEnds) {
 TEST(Config, RandomTextsNeverCrash) {
   const std::string alphabet = "ab:-?[]{},&*!|>'\"%@` \n\t#0.~<=";
   Rng rng(11, 0);
+  int num_refused = 0;
   for (int round = 0; round < 5000; ++round) {
     std::string text;
     const std::uint32_t length = rng.below(60);
@@ -144,8 +145,11 @@ TEST(Config, RandomTextsNeverCrash) {
       parse(text);
     } catch (const InputError& error) {
       EXPECT_THAT(error.what(), StartsWith("a.yaml")) << text;
+      ++num_refused;
     }
   }
+  EXPECT_GT(num_refused, 1000);
+  EXPECT_LT(num_refused, 5000);
 }
 
 TEST(Config, FilesAreReadWhole) {

@@ -15,7 +15,6 @@
 #include "waymark/image/gaussian.h"
 #include "waymark/image/orientation.h"
 #include "waymark/image/spread.h"
-#include "waymark/image/subpixel.h"
 
 namespace waymark {
 namespace {

@@ -66,6 +66,7 @@ TEST(FrameBuilder, GridFindsEachPrimaryFeature) {
   const StereoImages images;
   FrameBuilder builder(make_stereo_rig(), {.features = {.count = 300}});
   const auto features = builder.build({.image0 = images.left(), .image1 = images.right()});
+  ASSERT_GT(features->num_primary, 200u);
   for (std::uint32_t i = 0; i < features->num_primary; ++i) {
     const Keypoint& keypoint = features->keypoints[i];
     int num_found = 0;

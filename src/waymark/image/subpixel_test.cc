@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/image/subpixel.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
+
+#include "waymark/image/fast.h"
 
 namespace waymark {
 namespace {

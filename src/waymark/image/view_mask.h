@@ -5,12 +5,17 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "waymark/camera/camera.h"
 #include "waymark/image/image.h"
 #include "waymark/image/settings.h"
 
 namespace waymark {
+
+/// Distance in pixels from each pixel to the nearest one that is 0, row by row; infinite where
+/// there is none (Felzenszwalb and Huttenlocher 2012, Distance transforms of sampled functions).
+std::vector<float> distances_to_zero(ImageView image);
 
 /// Where in the images of a camera features may be. Kept free are pixels without a bearing, the
 /// black surroundings of a lens's image circle, and directions that the settings exclude.

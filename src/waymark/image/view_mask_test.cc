@@ -10,7 +10,6 @@
 #include "waymark/camera/equirectangular.h"
 #include "waymark/camera/fisheye.h"
 #include "waymark/camera/perspective.h"
-#include "waymark/image/distance_transform.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/pyramid.h"

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <span>
 
+#include "waymark/base/rng.h"
 #include "waymark/image/image.h"
 
 namespace waymark {
@@ -42,5 +43,31 @@ class Canvas {
   Eigen::Vector2d size_m_;
   double texel_m_;
 };
+
+/// Random things to see, drawn on part of a canvas. Everything is drawn once and irregularly, so
+/// that no two places look alike.
+
+/// Polygons of about size_m that cover about a share coverage of the area; each differs from what
+/// is below it by contrast/2..contrast grey levels.
+void draw_polygons(
+    Canvas& canvas, const Area& area, double size_m, double coverage, int contrast, Rng& rng);
+
+/// Polygons of all sizes from largest_m down to two texels, an octave apart: corners at any viewing
+/// distance.
+void draw_octaves(
+    Canvas& canvas, const Area& area, double largest_m, double coverage, int contrast, Rng& rng);
+
+/// Rows of marks that look like text, letters height_m high, until the area is full.
+void draw_text(Canvas& canvas, const Area& area, double height_m, int grey, Rng& rng);
+
+/// A framed picture: polygons of all sizes, discs and some text.
+void draw_poster(Canvas& canvas, const Area& area, Rng& rng);
+
+/// Up to count posters of sides low_m..high_m that do not overlap, and keep off the border.
+void draw_posters(
+    Canvas& canvas, const Area& area, int count, double low_m, double high_m, Rng& rng);
+
+/// Smooth light and dark clouds of about size_m, +-contrast.
+void draw_clouds(Canvas& canvas, double size_m, double contrast, Rng& rng);
 
 }  // namespace waymark

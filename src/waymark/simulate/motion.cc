@@ -4,6 +4,7 @@
 
 #include <Eigen/Geometry>
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -32,6 +33,199 @@ Vector3d random_signs(Rng& rng, double amplitude) {
   const double y = rng.uniform(-amplitude, amplitude);
   return {x, y, rng.uniform(-amplitude, amplitude)};
 }
+
+using Eigen::Vector2d;
+
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
+
+/// Where one can go in a world. Paths run along the closed polygon; keys are spacing apart, and the
+/// spline rounds the corners by about as much.
+struct Course {
+  std::string_view world;
+  std::vector<Vector2d> path;
+  double spacing_m;
+  double height_m;
+  double look_around_deg;
+  Sway sway;
+  MotionKey start;  ///< With 1 m of free space around and 2 m ahead.
+};
+
+/// Around one of two rooms that look alike, along the corridor, around the other in the same way,
+/// and back. It begins in the middle of the first round, so that at the end there are places of the
+/// first room that were seen in the other one only.
+std::vector<Vector2d> rounds_of_both_rooms() {
+  constexpr double kDoor = 2.25;
+  constexpr double kApart = 5.2;
+  const auto at = [](double x, double y) { return Vector2d(x, y); };
+  std::vector<Vector2d> path = {
+      at(1.3, 2.8), at(3.2, 2.8), at(3.2, 1.3), at(kDoor, 0.8), at(kDoor, -1.3)};
+  for (const Vector2d& point : {at(kDoor, -1.3),
+                                at(kDoor, 0.8),
+                                at(1.3, 1.3),
+                                at(1.3, 2.8),
+                                at(3.2, 2.8),
+                                at(3.2, 1.3),
+                                at(kDoor, 0.8),
+                                at(kDoor, -1.3)}) {
+    path.emplace_back(point.x() + kApart, point.y());
+  }
+  for (const Vector2d& point : {at(kDoor, -1.3), at(kDoor, 0.8), at(1.3, 1.3)})
+    path.push_back(point);
+  return path;
+}
+
+std::vector<Course> courses() {
+  const Sway hand{0.02, 1.2, 11};
+  const Sway wheels{0.01, 0.25, 12};
+  const std::vector<Vector2d> around_table = {{1.3, 1.2}, {4.7, 1.2}, {4.7, 3.8}, {1.3, 3.8}};
+  const std::vector<Vector2d> ring = {{2.0, 1.75}, {6.2, 1.75}, {6.2, 5.45}, {2.0, 5.45}};
+  const std::vector<Vector2d> aisle = {{4.0, 4.2}, {20.0, 4.2}, {20.0, 11.8}, {4.0, 11.8}};
+  const std::vector<Vector2d> road = {{0.0, 0.0}, {40.0, 0.0}, {40.0, 28.0}, {0.0, 28.0}};
+  const std::vector<Vector2d> both_rooms = rounds_of_both_rooms();
+  return {{"room", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
+          {"bare", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
+          {"apartment", ring, 0.75, 1.5, 18.0, hand, {{1.5, 1.75, 1.5}, 0.0, -4.0, 0.0}},
+          {"hall", aisle, 2.0, 1.6, 20.0, hand, {{4.5, 4.5, 1.6}, 20.0, 2.0, 0.0}},
+          {"street", road, 8.0, 1.6, 0.0, wheels, {{10.0, 0.0, 1.6}, 0.0, 0.0, 0.0}},
+          {"twins", both_rooms, 0.7, 1.5, 15.0, hand, {{2.25, 1.5, 1.5}, 90.0, -4.0, 0.0}}};
+}
+
+double path_length(const Course& course) {
+  double length = 0.0;
+  const std::size_t count = course.path.size();
+  for (std::size_t i = 0; i < count; ++i) {
+    length += (course.path[(i + 1) % count] - course.path[i]).norm();
+  }
+  return length;
+}
+
+/// The point at arc length s.
+Vector2d path_point(const Course& course, double s) {
+  const std::size_t count = course.path.size();
+  const double length = path_length(course);
+  s -= length * std::floor(s / length);
+  for (std::size_t i = 0;; ++i) {
+    const Vector2d& from = course.path[i];
+    const Vector2d side = course.path[(i + 1) % count] - from;
+    if (s <= side.norm() || i == count - 1) return from + s / side.norm() * side;
+    s -= side.norm();
+  }
+}
+
+/// Keys so many times around the path and a bit on. head_deg(i) turns the head at key i.
+template <class HeadTurn>
+std::vector<MotionKey> along_path(const Course& course, int num_rounds, HeadTurn head_deg) {
+  const double length = path_length(course);
+  const double start = 0.4 * (course.path[1] - course.path[0]).norm();
+  const double end = start + (num_rounds + 0.06) * length + 2.0 * course.spacing_m;
+  const int count = std::max(4, static_cast<int>(std::ceil((end - start) / course.spacing_m)) + 1);
+  std::vector<MotionKey> keys;
+  double heading = 0.0;
+  for (int i = 0; i < count; ++i) {
+    const double s = start + (end - start) * i / (count - 1);
+    const Vector2d ahead = path_point(course, s + course.spacing_m);
+    const Vector2d tangent = ahead - path_point(course, s - course.spacing_m);
+    const double angle = kDegPerRad * std::atan2(tangent.y(), tangent.x());
+    heading = i == 0 ? angle : heading + std::remainder(angle - heading, 360.0);
+    const Vector2d point = path_point(course, s);
+    const double pitch = course.look_around_deg * 0.25 * std::sin(0.9 * i);
+    keys.push_back({{point.x(), point.y(), course.height_m}, heading + head_deg(i), pitch, 0.0});
+  }
+  return keys;
+}
+
+/// Keys that move about the start by offset(phase), phase from 0 to 1; offsets are to the right, up
+/// and ahead, and yaw, pitch, roll.
+template <class Offset>
+std::vector<MotionKey> about_start(const Course& course, Offset offset) {
+  constexpr int kCount = 40;
+  const Rigid3 start = pose_of(course.start);
+  std::vector<MotionKey> keys;
+  for (int i = -1; i <= kCount + 1; ++i) {
+    const MotionKey change = offset(static_cast<double>(i) / kCount);
+    MotionKey key = course.start;
+    key.position = start * Vector3d(change.position.x(), -change.position.y(), change.position.z());
+    key.yaw_deg += change.yaw_deg;
+    key.pitch_deg += change.pitch_deg;
+    key.roll_deg += change.roll_deg;
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+MotionKey slide_offset(double phase) { return {{0.7 * std::sin(kTwoPi * phase), 0.0, 0.0}}; }
+
+MotionKey forward_offset(double phase) {
+  return {{0.0, 0.0, 0.8 * (1.0 - std::cos(kTwoPi * phase))}};
+}
+
+MotionKey rotate_offset(double phase) {
+  return {Vector3d::Zero(),
+          100.0 * (1.0 - std::cos(kTwoPi * phase)),
+          6.0 * std::sin(3.0 * kTwoPi * phase),
+          0.0};
+}
+
+MotionKey inspect_offset(double phase) {
+  const double a = kTwoPi * phase;
+  return {{0.45 * std::sin(2.0 * a), 0.15 * std::sin(3.0 * a), 0.4 * std::sin(a)},
+          32.0 * std::sin(a) + 6.0 * std::sin(3.0 * a),
+          9.0 * std::sin(2.0 * a),
+          5.0 * std::sin(4.0 * a)};
+}
+
+Motion walk_around(const Course& course, int num_rounds, double duration_s) {
+  const auto look_around = [&](int i) { return course.look_around_deg * std::sin(0.55 * i); };
+  return Motion(along_path(course, num_rounds, look_around), duration_s, course.sway);
+}
+
+Motion loop(const Course& course, double duration_s) { return walk_around(course, 1, duration_s); }
+
+Motion rounds(const Course& course, double duration_s) {
+  return walk_around(course, 3, duration_s);
+}
+
+Motion fast_turn(const Course& course, double duration_s) {
+  const auto turn_head = [](int i) {
+    constexpr std::array<double, 8> kTurnDeg = {0.0, 0.0, 0.0, 75.0, 75.0, 0.0, 0.0, -75.0};
+    return kTurnDeg[static_cast<std::size_t>(i) % kTurnDeg.size()];
+  };
+  return Motion(along_path(course, 1, turn_head), duration_s, course.sway);
+}
+
+Motion inspect(const Course& course, double duration_s) {
+  return Motion(about_start(course, inspect_offset), duration_s, course.sway);
+}
+
+Motion slide(const Course& course, double duration_s) {
+  return Motion(about_start(course, slide_offset), duration_s);
+}
+
+Motion forward(const Course& course, double duration_s) {
+  return Motion(about_start(course, forward_offset), duration_s);
+}
+
+Motion rotate(const Course& course, double duration_s) {
+  return Motion(about_start(course, rotate_offset), duration_s);
+}
+
+Motion still(const Course& course, double duration_s) {
+  return Motion(std::vector<MotionKey>(4, course.start), duration_s);
+}
+
+struct NamedMotion {
+  std::string_view name;
+  Motion (*make)(const Course& course, double duration_s);
+};
+
+constexpr std::array<NamedMotion, 8> kMotions = {{{"loop", loop},
+                                                  {"rounds", rounds},
+                                                  {"fast_turn", fast_turn},
+                                                  {"inspect", inspect},
+                                                  {"slide", slide},
+                                                  {"forward", forward},
+                                                  {"rotate", rotate},
+                                                  {"still", still}}};
 
 }  // namespace
 
@@ -87,6 +281,28 @@ Rigid3 Motion::world_from_rig(double seconds) const {
     key.roll_deg += value * wave.angle_deg.z();
   }
   return pose_of(key);
+}
+
+std::vector<std::string> motion_names() {
+  std::vector<std::string> names;
+  for (const NamedMotion& motion : kMotions) names.emplace_back(motion.name);
+  return names;
+}
+
+Motion make_motion(std::string_view world, std::string_view name, double duration_s) {
+  const std::vector<Course> all = courses();
+  const auto course = std::find_if(
+      all.begin(), all.end(), [&](const Course& candidate) { return candidate.world == world; });
+  if (course == all.end()) {
+    throw InputError("world '" + std::string(world) + "'",
+                     "has no motions, expected a known world");
+  }
+  std::string known;
+  for (const NamedMotion& motion : kMotions) {
+    if (motion.name == name) return motion.make(*course, duration_s);
+    known += (known.empty() ? "" : ", ") + std::string(motion.name);
+  }
+  throw InputError("motion '" + std::string(name) + "'", "unknown, expected one of " + known);
 }
 
 }  // namespace waymark

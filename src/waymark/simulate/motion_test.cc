@@ -94,6 +94,7 @@ TEST(Motion, KeepsClearOfThings) {
         }
       }
       EXPECT_GT(nearest, 0.35);
+      EXPECT_LT(nearest, 30.0) << "something is there";
     }
   }
 }

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <utility>
 
-#include "waymark/simulate/marks.h"
+#include "waymark/simulate/canvas.h"
 
 namespace waymark {
 namespace {

@@ -163,6 +163,7 @@ TEST_F(Points, MeasuredRangesHaveTheSigmaAskedFor) {
 
 TEST_F(Points, WhatIsHiddenIsNotSeen) {
   const PointObservation seen = observe(cloud_, mono_, world_from_rig_, PointNoise(), 1);
+  ASSERT_GT(seen.landmark_of_feature.size(), 100u);
   for (const std::uint32_t landmark : seen.landmark_of_feature) {
     const Vector3d eye = world_from_rig_.translation;
     const auto hit = world_->intersect(eye, cloud_.landmarks[landmark].position - eye);

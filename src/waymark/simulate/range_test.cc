@@ -11,7 +11,6 @@
 
 #include "waymark/camera/registry.h"
 #include "waymark/image/frame_builder.h"
-#include "waymark/simulate/effects.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/render.h"

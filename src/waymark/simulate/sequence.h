@@ -11,7 +11,6 @@
 
 #include "waymark/base/thread_pool.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/simulate/effects.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
 

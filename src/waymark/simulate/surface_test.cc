@@ -1,13 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/surface.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <vector>
 
 #include "waymark/base/rng.h"
+#include "waymark/simulate/world.h"
 
 namespace waymark {
 namespace {

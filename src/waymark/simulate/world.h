@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <memory>
 #include <optional>
@@ -9,10 +11,103 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/simulate/surface.h"
-#include "waymark/simulate/texture.h"
+#include "waymark/image/image.h"
 
 namespace waymark {
+
+/// A grey image on a surface, with its mip levels (Williams 1983), addressed in metres.
+class Texture {
+ public:
+  /// The image covers [0, width * texel_m) x [0, height * texel_m). With wraps_u its columns
+  /// repeat.
+  Texture(Image base, double texel_m, bool wraps_u);
+
+  /// Mean grey over the parallelogram around centre_m with the edges edge_a_m and edge_b_m: the
+  /// footprint of a pixel. Long footprints are read at several places along their longer edge, so
+  /// that grazing views stay sharp (after Feline, McCormack et al. 1999).
+  float sample(const Eigen::Vector2f& centre_m,
+               const Eigen::Vector2f& edge_a_m,
+               const Eigen::Vector2f& edge_b_m) const;
+
+  /// Width of a texel of level 0.
+  double texel_m() const { return texel_m_; }
+  /// Of the whole image.
+  double width_m() const { return texel_m_ * levels_.front().width_px; }
+  /// Of the whole image.
+  double height_m() const { return texel_m_ * levels_.front().height_px; }
+
+ private:
+  /// Places along a line, in texels of level 0.
+  struct Probes {
+    Eigen::Vector2f first;
+    Eigen::Vector2f step;
+    int count;
+  };
+
+  template <bool kWraps>
+  float mean(int level, const Probes& probes) const;
+
+  std::vector<Image> levels_;
+  double texel_m_;
+  float texels_per_metre_;
+  bool wraps_u_;
+};
+
+/// The shapes there are.
+enum class SurfaceKind : std::uint8_t { kRectangle, kDisc, kCylinder, kSphere };
+
+/// A textured analytic surface, seen from its outer side only. Surface coordinates (u, v) are in
+/// metres; seen from outside, u runs to the right and v down, hence normal = v_axis x u_axis.
+struct Surface {
+  SurfaceKind kind = SurfaceKind::kRectangle;  ///< Its shape.
+  /// Rectangle and disc: the corner u = v = 0 (of the square around the disc). Cylinder: the centre
+  /// of the upper end. Sphere: the centre. World frame.
+  Eigen::Vector3d origin = Eigen::Vector3d::Zero();
+  /// Unit and orthogonal, in the world frame. The axis of a cylinder or sphere is -v_axis; there
+  /// u_axis and -normal() are where the angles 0 and 90 degrees point to.
+  Eigen::Vector3d u_axis = Eigen::Vector3d::UnitX();
+  Eigen::Vector3d v_axis = -Eigen::Vector3d::UnitZ();  ///< As u_axis: unit, in the world frame.
+  Eigen::Vector2d size = Eigen::Vector2d::Ones();      ///< Extent in u and v.
+  double radius = 0.0;                                 ///< Of disc, cylinder and sphere.
+  std::uint32_t texture = 0;                           ///< Index in the world's textures.
+
+  /// v_axis x u_axis, unit: of a rectangle or disc the outward normal.
+  Eigen::Vector3d normal() const { return v_axis.cross(u_axis); }
+};
+
+/// Makers of surfaces; the axes as in Surface.
+Surface make_rectangle(const Eigen::Vector3d& corner,
+                       const Eigen::Vector3d& u_axis,
+                       const Eigen::Vector3d& v_axis,
+                       const Eigen::Vector2d& size);
+/// Disc that faces normal.
+Surface make_disc(const Eigen::Vector3d& centre, const Eigen::Vector3d& normal, double radius);
+/// Upright cylinder without its ends.
+Surface make_cylinder(const Eigen::Vector3d& base_centre, double radius, double height);
+/// Sphere whose poles are above each other.
+Surface make_sphere(const Eigen::Vector3d& centre, double radius);
+
+/// Where a ray meets a surface.
+struct SurfaceHit {
+  double distance = 0.0;                         ///< In multiples of the length of the direction.
+  Eigen::Vector2d uv = Eigen::Vector2d::Zero();  ///< Surface coordinates, in metres.
+  Eigen::Vector3d normal = Eigen::Vector3d::Zero();  ///< Unit, outward, in the world frame.
+};
+
+/// First meeting of the ray origin + t * direction, t > 0, with the outer side of the surface, in
+/// closed form; nothing if there is none. The edges of rectangles give by 0.1 mm, which closes the
+/// seams between neighbours.
+std::optional<SurfaceHit> intersect(const Surface& surface,
+                                    const Eigen::Vector3d& origin,
+                                    const Eigen::Vector3d& direction);
+
+/// World point of surface coordinates (u, v).
+Eigen::Vector3d surface_point(const Surface& surface, const Eigen::Vector2d& uv);
+/// The outward normal at surface coordinates (u, v), unit, in the world frame.
+Eigen::Vector3d surface_normal(const Surface& surface, const Eigen::Vector2d& uv);
+
+/// How far the edges of rectangles give, see intersect().
+inline constexpr double kSeamM = 1e-4;
 
 /// Where a ray meets the world.
 struct WorldHit {

@@ -15,16 +15,16 @@
 namespace waymark {
 namespace {
 
-constexpr std::uint32_t kNumFramesAtRest = 10000;
-constexpr int kNumViews = 16;
+constexpr std::uint32_t kNumRestingFrames = 10000;
+constexpr int kNumRestingViews = 16;
 
 /// A pose near the origin.
 Rigid3 beside(double x) { return make_test_pose({x, 0.0, 0.0}, Eigen::Vector3d::Zero()); }
 
 /// Tracker and mapper by hand, the map being visible in the frame after each message.
-class Session {
+class RestingSession {
  public:
-  explicit Session(int num_cameras)
+  explicit RestingSession(int num_cameras)
       : rig_(make_test_rig(num_cameras)),
         tracker_(rig_, num_cameras > 1, TrackingSettings{}, 1),
         mapper_(rig_, MappingSettings{}, LoopSettings{}, 1),
@@ -58,7 +58,7 @@ class Session {
       look_from(beside(0.02 * i), 1);
       track();
     }
-    look_from(beside(0.02 * 29), kNumViews);
+    look_from(beside(0.02 * 29), kNumRestingViews);
   }
 
   const Map& map() const { return *visible_.map; }
@@ -84,13 +84,13 @@ std::size_t bytes_in_use() {
 class AtRest : public ::testing::TestWithParam<int> {};
 
 TEST_P(AtRest, NothingGrowsWithTime) {
-  Session session(GetParam());
+  RestingSession session(GetParam());
   session.begin();
   ASSERT_GT(session.map().keyframes().size(), 0u);
   std::size_t bytes_early = 0, keyframes_early = 0, landmarks_early = 0;
-  for (std::uint32_t i = 0; i < kNumFramesAtRest; ++i) {
+  for (std::uint32_t i = 0; i < kNumRestingFrames; ++i) {
     ASSERT_EQ(session.track().state, FrameState::kTracked) << "frame " << i;
-    if (i != kNumFramesAtRest / 10) continue;
+    if (i != kNumRestingFrames / 10) continue;
     bytes_early = bytes_in_use();
     keyframes_early = session.map().keyframes().size();
     landmarks_early = session.map().landmarks().size();
@@ -104,7 +104,7 @@ TEST_P(AtRest, NothingGrowsWithTime) {
 
 /// What the tracker counted meanwhile arrives with the next keyframe: each landmark once.
 TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
-  Session session(GetParam());
+  RestingSession session(GetParam());
   session.begin();
   constexpr std::uint32_t kRest = 500;
   for (std::uint32_t i = 0; i < kRest; ++i) session.track();

@@ -14,7 +14,7 @@
 namespace waymark {
 namespace {
 
-constexpr int kNumTurnedViews = 62;
+constexpr int kNumLoopViews = 62;
 constexpr double kTurnDeg = 8.0;  // Per frame: the first view is seen again in frame 45.
 constexpr double kUnitsPerMetre = 1000.0;
 
@@ -37,7 +37,7 @@ struct Turn {
                            Rigid3()});
     const Renderer renderer(make_world("room", 0), rig.cameras[0].camera);
     ThreadPool pool(2);
-    for (int i = 0; i < kNumTurnedViews; ++i) {
+    for (int i = 0; i < kNumLoopViews; ++i) {
       const double yaw_deg = kTurnDeg * i;
       const double yaw = yaw_deg * std::numbers::pi / 180.0;
       const Eigen::Vector3d middle(3.0, 1.6, 1.5);
@@ -50,20 +50,20 @@ struct Turn {
   }
 };
 
-struct PlayedTurn {
+struct PlayedLoop {
   std::vector<TrackingResult> results;
   std::vector<TrajectoryFrame> trajectory;
   SystemStatistics statistics;
   std::shared_ptr<const Map> map;
 };
 
-PlayedTurn play(const Turn& turn, Timing timing) {
+PlayedLoop play(const Turn& turn, Timing timing) {
   Settings settings;
   settings.features.count = 500;
   settings.depth.factor = kUnitsPerMetre;
   settings.global_latency = 5;  // The adjustment is taken in before the end.
   System system(turn.rig, settings, timing);
-  PlayedTurn played;
+  PlayedLoop played;
   for (const View& view : turn.views) {
     FrameImages input;
     input.timestamp_ns = view.timestamp_ns;
@@ -80,15 +80,15 @@ PlayedTurn play(const Turn& turn, Timing timing) {
 
 TEST(System, InlineAndLockstepCloseALoopAlike) {
   const Turn turn;
-  const PlayedTurn alone = play(turn, Timing::kInline);
+  const PlayedLoop alone = play(turn, Timing::kInline);
   ASSERT_GE(alone.statistics.num_loops, 1);
   ASSERT_EQ(alone.map->broken_invariants(), "");
   // Found and adjusted on the way, not at the end.
   const KeyframeId seen_again = alone.map->loop_edges().front().to;
-  EXPECT_LT(alone.map->keyframes().at(seen_again).frame.value, kNumTurnedViews - 10u);
-  const PlayedTurn threaded = play(turn, Timing::kLockstep);
+  EXPECT_LT(alone.map->keyframes().at(seen_again).frame.value, kNumLoopViews - 10u);
+  const PlayedLoop threaded = play(turn, Timing::kLockstep);
   EXPECT_EQ(threaded.statistics.num_loops, alone.statistics.num_loops);
-  ASSERT_EQ(threaded.trajectory.size(), static_cast<std::size_t>(kNumTurnedViews));
+  ASSERT_EQ(threaded.trajectory.size(), static_cast<std::size_t>(kNumLoopViews));
   ASSERT_EQ(alone.trajectory.size(), threaded.trajectory.size());
   for (std::size_t i = 0; i < alone.trajectory.size(); ++i) {
     EXPECT_EQ(alone.results[i].world_from_rig->matrix(),

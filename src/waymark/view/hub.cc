@@ -3,10 +3,13 @@
 #include "waymark/view/hub.h"
 
 #include <algorithm>
+#include <cmath>
 #include <iterator>
+#include <opencv2/core.hpp>
+#include <opencv2/imgcodecs.hpp>
+#include <opencv2/imgproc.hpp>
 #include <utility>
-
-#include "waymark/view/frame_message.h"
+#include <vector>
 
 namespace waymark {
 namespace {
@@ -29,7 +32,57 @@ void merge(ViewUpdate later, ViewUpdate& update) {
   update.status = later.status;
 }
 
+constexpr int kMaxWidth = 640;
+constexpr int kQuality = 70;
+
 }  // namespace
+
+void Outbox::add_snapshot(std::span<const Message> messages) {
+  scene_.assign(messages.begin(), messages.end());
+  num_snapshot_messages_ = messages.size();
+  num_difference_bytes_ = 0;
+  is_behind_ = false;
+}
+
+void Outbox::add(const Message& message) {
+  if (is_behind_) return;
+  scene_.push_back(message);
+  num_difference_bytes_ += message->size();
+  if (num_difference_bytes_ <= max_bytes_) return;
+  scene_.clear();
+  num_snapshot_messages_ = 0;
+  num_difference_bytes_ = 0;
+  is_behind_ = true;
+  status_.reset();  // It tells of what will not be sent.
+}
+
+bool Outbox::add_answer(Message text) {
+  num_answer_bytes_ += text->size();
+  answers_.push_back(std::move(text));
+  return num_answer_bytes_ <= max_bytes_;
+}
+
+std::optional<Outbox::Outgoing> Outbox::take() {
+  if (!answers_.empty()) {
+    Message answer = std::move(answers_.front());
+    answers_.pop_front();
+    num_answer_bytes_ -= answer->size();
+    return Outgoing{std::move(answer), true};
+  }
+  if (!scene_.empty()) {
+    Message message = std::move(scene_.front());
+    scene_.pop_front();
+    if (num_snapshot_messages_ > 0) {
+      --num_snapshot_messages_;
+    } else {
+      num_difference_bytes_ -= message->size();
+    }
+    return Outgoing{std::move(message), false};
+  }
+  if (status_) return Outgoing{std::exchange(status_, nullptr), true};
+  if (frame_) return Outgoing{std::exchange(frame_, nullptr), false};
+  return std::nullopt;
+}
 
 void ViewHub::tick(Clock::time_point now) {
   const bool is_news = take_updates();
@@ -183,6 +236,43 @@ bool ViewHub::is_idle() const {
 void ViewHub::close_clients() {
   const auto clients = clients_;
   for (const auto& [number, client] : clients) client->close();
+}
+
+std::string encode_preview(const Image& image) {
+  if (image.view().is_empty()) return {};
+  const cv::Mat whole(
+      image.height_px, image.width_px, CV_8U, const_cast<std::uint8_t*>(image.values.data()));
+  cv::Mat small = whole;
+  if (image.width_px > kMaxWidth) {
+    const double scale = static_cast<double>(kMaxWidth) / image.width_px;
+    const int height = std::max(1, static_cast<int>(std::lround(scale * image.height_px)));
+    cv::resize(whole, small, {kMaxWidth, height}, 0, 0, cv::INTER_AREA);
+  }
+  std::vector<std::uint8_t> bytes;
+  cv::imencode(".jpg", small, bytes, {cv::IMWRITE_JPEG_QUALITY, kQuality});
+  return {bytes.begin(), bytes.end()};
+}
+
+Message encode_frame(const DrawnFrame& frame, std::int64_t start_ns) {
+  const std::string jpeg = encode_preview(frame.image);
+  const std::size_t num_features = frame.features ? frame.features->num_primary : 0;
+  MessageWriter writer(MessageKind::kFrame, num_features);
+  writer.add(frame.frame.value);
+  writer.add(static_cast<float>(1e-9 * static_cast<double>(frame.timestamp_ns - start_ns)));
+  writer.add(static_cast<std::uint32_t>(frame.width_px));
+  writer.add(static_cast<std::uint32_t>(frame.height_px));
+  writer.add(static_cast<std::uint32_t>(jpeg.size()));
+  for (std::size_t i = 0; i < num_features; ++i) {
+    writer.add(frame.features->keypoints[i].x_px);
+    writer.add(frame.features->keypoints[i].y_px);
+  }
+  for (std::size_t i = 0; i < num_features; ++i) {
+    const bool sees = i < frame.landmarks.size() && frame.landmarks[i].is_valid();
+    writer.add(static_cast<std::uint8_t>(sees));
+  }
+  writer.pad_to(4);
+  writer.add_bytes(jpeg);
+  return writer.finish();
 }
 
 }  // namespace waymark

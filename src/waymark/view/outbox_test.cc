@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/view/outbox.h"
-
 #include <gmock/gmock.h>
+
+#include "waymark/view/hub.h"
 
 namespace waymark {
 namespace {

@@ -7,7 +7,7 @@
 #include <regex>
 #include <sstream>
 
-#include "waymark/view/frame_message.h"
+#include "waymark/view/hub.h"
 #include "waymark/view/test_messages.h"
 #include "waymark/view/text_message.h"
 

@@ -8,6 +8,8 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/view/channel.h"
+
 namespace waymark {
 namespace {
 
@@ -38,8 +40,8 @@ FeatureColors colors_of(const FrameDetails& details, const ImageView& image) {
 
 }  // namespace
 
-ViewPublisher::ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total)
-    : viewer_(viewer) {
+ViewPublisher::ViewPublisher(ViewChannel& channel, std::optional<std::size_t> num_frames_total)
+    : channel_(channel) {
   update_.status.num_frames_total = num_frames_total;
   push();
 }
@@ -59,7 +61,7 @@ void ViewPublisher::tell(const System& system,
   update_.map = system.map();
   note_frames(system, input, result);
   update_.colors.push_back(colors_of(details, input.image0));
-  if (viewer_.take_image_wish()) {
+  if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
     update_.image = std::make_shared<const DrawnFrame>(DrawnFrame{details.frame,
                                                                   input.timestamp_ns,
                                                                   input.image0.width_px,
@@ -170,7 +172,7 @@ void ViewPublisher::finish(const System& system) {
 
 void ViewPublisher::push() {
   const SessionStatus status = update_.status;
-  if (!viewer_.try_push(update_)) return;  // It goes with the next one.
+  if (!channel_.updates.try_push(update_)) return;  // It goes with the next one.
   update_ = ViewUpdate();
   update_.status = status;
 }

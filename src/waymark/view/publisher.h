@@ -17,7 +17,10 @@ namespace waymark {
 class ViewPublisher {
  public:
   /// num_frames_total: of the input, if it is known.
-  ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total);
+  ViewPublisher(ViewChannel& channel, std::optional<std::size_t> num_frames_total);
+  /// To a viewer, which lives longer.
+  ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total)
+      : ViewPublisher(viewer.channel(), num_frames_total) {}
 
   /// A frame was fed; input is what was fed.
   void tell(const System& system, const FrameImages& input, const TrackingResult& result);
@@ -40,7 +43,7 @@ class ViewPublisher {
   void measure(const TrackingResult& result);
   void push();
 
-  Viewer& viewer_;
+  ViewChannel& channel_;
   ViewUpdate update_;  ///< Not taken in by the viewer yet.
   FrameId first_frame_;
   std::deque<std::int64_t> timestamps_ns_;  ///< Of all frames fed.

@@ -2,9 +2,234 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/view/scene.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 namespace waymark {
+namespace {
+
+/// A frame may become a keyframe long after it came: the first one of a monocular start.
+constexpr std::uint32_t kMaxFrames = 1000;
+
+bool is_same_place(const Landmark& a, const Landmark& b) {
+  return a.position_in_world.cast<float>() == b.position_in_world.cast<float>();
+}
+
+bool is_same_otherwise(const Landmark& a, const Landmark& b) {
+  return a.submap == b.submap && a.reference == b.reference &&
+         saturate16(num_observers(a)) == saturate16(num_observers(b));
+}
+
+Message encode_positions(const Map& map, std::span<const LandmarkId> ids) {
+  MessageWriter writer(MessageKind::kLandmarkPositions, ids.size());
+  for (const LandmarkId id : ids) writer.add(id.value);
+  for (const LandmarkId id : ids) writer.add(map.landmarks().at(id).position_in_world);
+  return writer.finish();
+}
+
+/// The frame of the keyframe that a landmark was made from, or of what stands for it.
+std::uint32_t frame_of(const Map& map, const Landmark& landmark) {
+  const Keyframe* keyframe = map.keyframes().find(map.resolve(landmark.reference));
+  return keyframe ? keyframe->frame.value : FrameId{}.value;
+}
+
+struct Pose {
+  Rigid3 world_from_rig;
+  SubmapId submap;
+};
+
+bool is_known(KeyframeId id, const Map& map) { return id < map.keyframes().end_id(); }
+
+std::optional<Pose> pose_of(const FrameNote& note, const Map& map) {
+  if (note.final_pose) return Pose{*note.final_pose, note.submap};
+  if (!note.pose || !is_known(note.pose->reference, map)) return std::nullopt;
+  const Keyframe* keyframe = map.keyframes().find(map.resolve(note.pose->reference));
+  if (!keyframe) return std::nullopt;
+  const Rigid3 rig_from_world = map.rig_from_world(
+      note.pose->reference, note.pose->rig_from_reference, note.pose->reference_scale);
+  return Pose{rig_from_world.inverse(), keyframe->submap};
+}
+
+bool moves_frames(const Keyframe& before, const Keyframe& after) {
+  return before.rig_from_world.translation != after.rig_from_world.translation ||
+         before.rig_from_world.rotation.coeffs() != after.rig_from_world.rotation.coeffs() ||
+         before.applied_scale != after.applied_scale || before.submap != after.submap;
+}
+
+}  // namespace
+
+void LandmarkLayer::add_colors(FeatureColors colors) {
+  const std::uint32_t frame = colors.frame.value;
+  if (frame >= kMaxFrames) colors_of_frames_.erase(frame - kMaxFrames);
+  colors_of_frames_.insert_or_assign(frame, std::move(colors));
+}
+
+void LandmarkLayer::color_landmarks(const Map& before, const Map& after) {
+  colors_.resize(after.landmarks().end_id().value);
+  after.landmarks().for_each_difference(
+      before.landmarks(), [&](LandmarkId id, const Landmark* old, const Landmark* now) {
+        if (old || !now) return;
+        for (const Observation& observation : now->observations) {
+          const Keyframe& keyframe = after.keyframes().at(observation.keyframe);
+          const auto found = colors_of_frames_.find(keyframe.frame.value);
+          if (found == colors_of_frames_.end()) continue;
+          const auto& rgb = found->second.rgb;
+          if (observation.feature >= rgb.size()) continue;
+          colors_[id.value] = {rgb[observation.feature], 1};
+          return;
+        }
+      });
+}
+
+void LandmarkLayer::reset() {
+  colors_of_frames_.clear();
+  colors_.clear();
+}
+
+void LandmarkLayer::differences(const Map& before,
+                                const Map& after,
+                                std::vector<Message>& messages) const {
+  std::vector<LandmarkId> changed;
+  std::vector<LandmarkId> moved;
+  std::vector<std::uint32_t> erased;
+  after.landmarks().for_each_difference(
+      before.landmarks(), [&](LandmarkId id, const Landmark* old, const Landmark* now) {
+        if (!now) {
+          erased.push_back(id.value);
+        } else if (!old || !is_same_otherwise(*old, *now)) {
+          changed.push_back(id);
+        } else if (!is_same_place(*old, *now)) {
+          moved.push_back(id);
+        }
+      });
+  for_each_chunk<std::uint32_t>(erased, [&](auto ids) {
+    messages.push_back(encode_ids(MessageKind::kLandmarksErased, ids));
+  });
+  for_each_chunk<LandmarkId>(changed, [&](auto ids) { messages.push_back(encode(after, ids)); });
+  for_each_chunk<LandmarkId>(moved,
+                             [&](auto ids) { messages.push_back(encode_positions(after, ids)); });
+}
+
+void LandmarkLayer::snapshot(const Map& map, std::vector<Message>& messages) const {
+  std::vector<LandmarkId> all;
+  all.reserve(map.landmarks().size());
+  map.landmarks().for_each([&](LandmarkId id, const Landmark&) { all.push_back(id); });
+  for_each_chunk<LandmarkId>(all, [&](auto ids) { messages.push_back(encode(map, ids)); });
+}
+
+Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) const {
+  const auto& landmarks = map.landmarks();
+  MessageWriter writer(MessageKind::kLandmarks, ids.size());
+  for (const LandmarkId id : ids) writer.add(id.value);
+  for (const LandmarkId id : ids) writer.add(landmarks.at(id).position_in_world);
+  for (const LandmarkId id : ids) writer.add(frame_of(map, landmarks.at(id)));
+  for (const LandmarkId id : ids) writer.add(saturate16(num_observers(landmarks.at(id))));
+  for (const LandmarkId id : ids) writer.add(saturate16(landmarks.at(id).submap.value));
+  for (const LandmarkId id : ids) {
+    const Color color = id.value < colors_.size() ? colors_[id.value] : Color{};
+    for (const std::uint8_t value : color.rgb) writer.add(value);
+    writer.add(static_cast<std::uint8_t>(color.is_known ? 255 : 0));
+  }
+  return writer.finish();
+}
+
+void TrajectoryLayer::reset() { *this = TrajectoryLayer(); }
+
+void TrajectoryLayer::take(const FrameNote& note) {
+  if (notes_.empty()) start_ns_ = note.timestamp_ns;
+  const auto place = std::lower_bound(
+      notes_.begin(), notes_.end(), note, [](const FrameNote& a, const FrameNote& b) {
+        return a.frame < b.frame;
+      });
+  const auto index = static_cast<std::uint32_t>(place - notes_.begin());
+  if (place == notes_.end()) {
+    notes_.push_back(note);
+  } else if (place->frame == note.frame) {
+    // What is known better now is the pose; the time stays.
+    const float tracking_ms = std::max(note.tracking_ms, place->tracking_ms);
+    *place = note;
+    place->tracking_ms = tracking_ms;
+  } else {
+    return;  // Frames come in order.
+  }
+  changed_.push_back(index);
+  pending_.push_back(index);
+}
+
+void TrajectoryLayer::file(std::uint32_t index, const Map& map) {
+  const FrameNote& note = notes_[index];
+  if (!note.pose || note.final_pose) return;
+  if (!is_known(note.pose->reference, map)) {
+    pending_.push_back(index);
+    return;
+  }
+  const KeyframeId living = map.resolve(note.pose->reference);
+  if (!living.is_valid()) return;
+  followers_.resize(std::max<std::size_t>(followers_.size(), living.value + 1));
+  followers_[living.value].push_back(index);
+  changed_.push_back(index);
+}
+
+void TrajectoryLayer::follow_keyframes(const Map& before, const Map& after) {
+  after.keyframes().for_each_difference(
+      before.keyframes(), [&](KeyframeId id, const Keyframe* old, const Keyframe* now) {
+        if (!old || id.value >= followers_.size()) return;
+        std::vector<std::uint32_t>& followers = followers_[id.value];
+        if (!now) {
+          pending_.insert(pending_.end(), followers.begin(), followers.end());
+          followers = {};
+        } else if (moves_frames(*old, *now)) {
+          changed_.insert(changed_.end(), followers.begin(), followers.end());
+        }
+      });
+}
+
+void TrajectoryLayer::advance(std::span<const FrameNote> notes,
+                              const Map& before,
+                              const Map& after,
+                              std::vector<Message>& messages) {
+  for (const FrameNote& note : notes) take(note);
+  follow_keyframes(before, after);
+  for (const std::uint32_t index : std::exchange(pending_, {})) file(index, after);
+  std::sort(changed_.begin(), changed_.end());
+  changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
+  for_each_chunk<std::uint32_t>(changed_,
+                                [&](auto indices) { messages.push_back(encode(indices, after)); });
+  changed_.clear();
+}
+
+void TrajectoryLayer::snapshot(const Map& map, std::vector<Message>& messages) const {
+  std::vector<std::uint32_t> all;
+  for (std::uint32_t i = 0; i < notes_.size(); ++i) all.push_back(i);
+  for_each_chunk<std::uint32_t>(all,
+                                [&](auto indices) { messages.push_back(encode(indices, map)); });
+}
+
+Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Map& map) const {
+  MessageWriter writer(MessageKind::kTrajectory, indices.size());
+  std::vector<Pose> poses;
+  const Rigid3 unknown(Eigen::Quaterniond(NAN, NAN, NAN, NAN), Eigen::Vector3d::Constant(NAN));
+  for (const std::uint32_t index : indices) {
+    poses.push_back(pose_of(notes_[index], map).value_or(Pose{unknown, SubmapId{}}));
+  }
+  for (const std::uint32_t index : indices) writer.add(notes_[index].frame.value);
+  for (const Pose& pose : poses) writer.add(pose.world_from_rig.translation);
+  for (const Pose& pose : poses) writer.add(pose.world_from_rig.rotation);
+  for (const std::uint32_t index : indices) {
+    writer.add(
+        static_cast<float>(1e-9 * static_cast<double>(notes_[index].timestamp_ns - start_ns_)));
+  }
+  for (const std::uint32_t index : indices) writer.add(notes_[index].tracking_ms);
+  for (const Pose& pose : poses) writer.add(saturate16(pose.submap.value));
+  for (const std::uint32_t index : indices) {
+    writer.add(static_cast<std::uint8_t>(notes_[index].state));
+  }
+  for (const std::uint32_t index : indices) {
+    writer.add(static_cast<std::uint8_t>(notes_[index].reason));
+  }
+  return writer.finish();
+}
 
 void Scene::reset() {
   map_ = std::make_shared<const Map>();

@@ -2,17 +2,76 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
+#include <span>
+#include <unordered_map>
 #include <vector>
 
+#include "waymark/map/map.h"
 #include "waymark/view/keyframe_layer.h"
-#include "waymark/view/landmark_layer.h"
 #include "waymark/view/message.h"
-#include "waymark/view/trajectory_layer.h"
 #include "waymark/view/update.h"
 
 namespace waymark {
+
+/// Tells of the landmarks of a map: all of them, or the differences between two states of it.
+class LandmarkLayer {
+ public:
+  /// Colours at the features of a frame, which may become a keyframe. Remembers those of the newest
+  /// 1000 frames.
+  void add_colors(FeatureColors colors);
+  /// Gives new landmarks their colours. Before differences() and snapshot() of `after`.
+  void color_landmarks(const Map& before, const Map& after);
+  void reset();
+
+  /// What turns one state of a map into a later one.
+  void differences(const Map& before, const Map& after, std::vector<Message>& messages) const;
+  void snapshot(const Map& map, std::vector<Message>& messages) const;
+
+ private:
+  struct Color {
+    std::array<std::uint8_t, 3> rgb{};
+    std::uint8_t is_known = 0;
+  };
+
+  Message encode(const Map& map, std::span<const LandmarkId> ids) const;
+
+  std::unordered_map<std::uint32_t, FeatureColors>
+      colors_of_frames_;       ///< By frame; only looked up.
+  std::vector<Color> colors_;  ///< By landmark.
+};
+
+/// Tells of the frames of a session: their poses, which move with the map, and what became of them.
+class TrajectoryLayer {
+ public:
+  void reset();
+  std::size_t size() const { return notes_.size(); }
+  /// When the first frame came, 0 before.
+  std::int64_t start_ns() const { return start_ns_; }
+
+  /// Takes in new notes and the next state of the map; tells what became new by that.
+  void advance(std::span<const FrameNote> notes,
+               const Map& before,
+               const Map& after,
+               std::vector<Message>& messages);
+  void snapshot(const Map& map, std::vector<Message>& messages) const;
+
+ private:
+  void take(const FrameNote& note);
+  /// Files a frame under the living keyframe that it moves with, or under pending_.
+  void file(std::uint32_t index, const Map& map);
+  void follow_keyframes(const Map& before, const Map& after);
+  Message encode(std::span<const std::uint32_t> indices, const Map& map) const;
+
+  std::int64_t start_ns_ = 0;
+  std::vector<FrameNote> notes_;                       ///< Ascending by frame.
+  std::vector<std::vector<std::uint32_t>> followers_;  ///< By keyframe: indices of notes.
+  std::vector<std::uint32_t> pending_;                 ///< Whose keyframe is not in the map yet.
+  std::vector<std::uint32_t> changed_;                 ///< Since the last message.
+};
 
 /// What viewers are shown of a session: takes updates in and tells of it in binary messages, as a
 /// whole or as differences. A viewer that got the snapshot and all differences since has the same

@@ -186,9 +186,7 @@ Viewer::Viewer(const ViewerOptions& options, SessionInfo info)
     : impl_(std::make_unique<Impl>(options, std::move(info))) {}
 Viewer::~Viewer() = default;
 std::string Viewer::url() const { return impl_->url(); }
-bool Viewer::take_image_wish() {
-  return impl_->channel().wants_image.exchange(false, std::memory_order_relaxed);
-}
+ViewChannel& Viewer::channel() { return impl_->channel(); }
 bool Viewer::try_push(ViewUpdate& update) { return impl_->channel().updates.try_push(update); }
 std::optional<ViewRequest> Viewer::next_request() { return impl_->channel().requests.try_pop(); }
 void Viewer::reply(ViewReply reply) { impl_->channel().replies.try_push(reply); }

@@ -11,6 +11,8 @@
 
 namespace waymark {
 
+struct ViewChannel;
+
 /// Where the server listens.
 struct ViewerOptions {
   std::string host = "127.0.0.1";  ///< Address to listen at; "0.0.0.0" for all of the machine.
@@ -34,8 +36,8 @@ class Viewer {
 
   /// For browsers; with the token where one is needed.
   std::string url() const;
-  /// Whether an image would be taken; once for each.
-  bool take_image_wish();
+  /// What the session's thread shares with that of the server, as long as this lives.
+  ViewChannel& channel();
   /// False, and the update stays as it was, if the server has not taken in those before.
   bool try_push(ViewUpdate& update);
   /// What a client asked for, oldest first.
