@@ -2,30 +2,83 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/associate.h"
 
+#include <Eigen/LU>
 #include <algorithm>
+#include <cmath>
 
 #include "waymark/image/range_precision.h"
 
 namespace waymark {
+namespace {
+
+/// A point as the camera of a feature sees it.
+struct Sight {
+  Eigen::Vector3d direction_in_world;                    ///< Unit, from the camera to the point.
+  double range_m = 0.0;                                  ///< Distance from the camera.
+  std::optional<Eigen::Vector2d> residual_px;            ///< Nothing if behind the bearing.
+  Matrix23d residual_from_position = Matrix23d::Zero();  ///< Derivative by the point, px/m.
+};
+
+Sight look_at(const Keyframe& keyframe,
+              std::uint32_t feature,
+              const Eigen::Vector3d& point_in_world) {
+  const Features& features = *keyframe.features;
+  const RigCamera& camera = keyframe.rig->cameras[features.keypoints[feature].camera];
+  const Rigid3 cam_from_world = camera.cam_from_rig * keyframe.rig_from_world;
+  const Eigen::Matrix3d rotation = cam_from_world.rotation_matrix();
+  const Eigen::Vector3d point = rotation * point_in_world + cam_from_world.translation;
+  const Eigen::Vector3d measured = features.bearings[feature].cast<double>();
+  const Matrix23d w = features.level_pixel_from_bearing[feature].cast<double>();
+  Sight sight;
+  sight.range_m = point.norm();
+  const Eigen::Vector3d predicted = point / sight.range_m;
+  sight.direction_in_world = rotation.transpose() * predicted;
+  if (predicted.dot(measured) > 0.0) sight.residual_px = w * (predicted - measured);
+  const Matrix23d across = w - w * predicted * predicted.transpose();
+  sight.residual_from_position = across * rotation / sight.range_m;
+  return sight;
+}
+
+}  // namespace
 
 std::optional<double> squared_residual(const Keyframe& keyframe,
                                        std::uint32_t feature,
-                                       const Eigen::Vector3d& point_in_world) {
-  const Features& features = *keyframe.features;
-  const RigCamera& camera = keyframe.rig->cameras[features.keypoints[feature].camera];
-  const Eigen::Vector3d predicted =
-      (camera.cam_from_rig * (keyframe.rig_from_world * point_in_world)).normalized();
-  const Eigen::Vector3d measured = features.bearings[feature].cast<double>();
-  if (predicted.dot(measured) <= 0.0) return std::nullopt;
-  const Matrix23d w = features.level_pixel_from_bearing[feature].cast<double>();
-  return (w * (predicted - measured)).squaredNorm();
+                                       const Eigen::Vector3d& point_in_world,
+                                       const Eigen::Matrix3d& covariance) {
+  const Sight sight = look_at(keyframe, feature, point_in_world);
+  if (!sight.residual_px) return std::nullopt;
+  const Matrix23d& derivative = sight.residual_from_position;
+  const Eigen::Matrix2d variance =
+      Eigen::Matrix2d::Identity() + derivative * covariance * derivative.transpose();
+  return sight.residual_px->dot(variance.inverse() * *sight.residual_px);
 }
 
 bool agrees(const Keyframe& keyframe,
             std::uint32_t feature,
-            const Eigen::Vector3d& point_in_world) {
-  const std::optional<double> squared = squared_residual(keyframe, feature, point_in_world);
+            const Eigen::Vector3d& point_in_world,
+            const Eigen::Matrix3d& covariance) {
+  const std::optional<double> squared =
+      squared_residual(keyframe, feature, point_in_world, covariance);
   return squared && *squared < kMaxSquaredResidual;
+}
+
+Eigen::Matrix3d position_information(const Map& map, const Landmark& landmark) {
+  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
+  double min_range_m = INFINITY;
+  for (const Observation& observation : landmark.observations) {
+    const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
+    const Features& features = *keyframe.features;
+    const Sight sight = look_at(keyframe, observation.feature, landmark.position_in_world);
+    information += sight.residual_from_position.transpose() * sight.residual_from_position;
+    min_range_m = std::min(min_range_m, sight.range_m);
+    if (observation.feature >= features.num_primary) continue;
+    const double sigma = features.inverse_range_sigma[observation.feature];
+    if (sigma <= 0.0) continue;
+    const Eigen::Vector3d along =
+        sight.direction_in_world / (sight.range_m * sight.range_m * sigma);
+    information += along * along.transpose();
+  }
+  return information + Eigen::Matrix3d::Identity() / (min_range_m * min_range_m);
 }
 
 void observe_with_partner(Map& map, KeyframeId id, std::uint32_t feature, LandmarkId landmark) {
