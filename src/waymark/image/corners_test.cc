@@ -104,7 +104,7 @@ TEST(FindCorners, TakesWeakCornersOnlyWhereStrongOnesAreTooFew) {
   int num_weak_above = 0;
   int num_weak_below = 0;
   for (const Corner& corner : corners) {
-    if (corner.score > kStrongContrast) continue;
+    if (corner.score > strong_contrast(5)) continue;
     ++(corner.y_px < middle - 40 ? num_weak_above : num_weak_below);
   }
   EXPECT_EQ(num_weak_above, 0);
