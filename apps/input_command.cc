@@ -71,12 +71,12 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
   return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
              const FrameRecord& frame) mutable {
     const bool has_reason = frame.reason != FrameReason::kNone;
-    const std::string state =
-        fmt::format("{}{}{}{}",
-                    to_string(frame.state),
-                    frame.submap.is_valid() ? fmt::format(" in sub-map {}", frame.submap.value) : "",
-                    has_reason ? ": " : "",
-                    has_reason ? to_string(frame.reason) : "");
+    const std::string state = fmt::format(
+        "{}{}{}{}",
+        to_string(frame.state),
+        frame.submap.is_valid() ? fmt::format(" in sub-map {}", frame.submap.value) : "",
+        has_reason ? ": " : "",
+        has_reason ? to_string(frame.reason) : "");
     if (frame.state == FrameState::kUnreadable) {
       reporter.warning(fmt::format("frame {}: {}, skipped", frame.index, state));
     }

@@ -9,7 +9,6 @@
 namespace waymark {
 namespace {
 
-
 TEST(DriftTest, ShortestWayGoesAlongTheGraph) {
   LoopScene scene(cloud_all_round(kNumPoints), false, Vector7d::Zero());
   for (int step = 0; step < kRound / 2; ++step) scene.add_keyframe(step);

@@ -147,8 +147,7 @@ std::optional<Revisit> RevisitVerifier::compare_beside(const Map& map,
                                                        KeyframeId query,
                                                        KeyframeId match) {
   const Keyframe& in_query = map.keyframes().at(query);
-  const auto place =
-      locator_.locate_near(*in_query.features, map, match, in_query.rig_from_world);
+  const auto place = locator_.locate_near(*in_query.features, map, match, in_query.rig_from_world);
   if (!place) return std::nullopt;
   Revisit revisit;
   revisit.query = query;

@@ -11,7 +11,6 @@
 namespace waymark {
 namespace {
 
-
 /// As the mapper looks for the place of a new keyframe.
 std::optional<Revisit> find_revisit(RevisitVerifier& verifier,
                                     const LoopScene& scene,

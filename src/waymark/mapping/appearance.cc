@@ -2,41 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/appearance.h"
 
-#include <array>
-#include <span>
-
-#include "waymark/base/median.h"
-#include "waymark/image/hamming.h"
-
 namespace waymark {
-namespace {
-
-/// More descriptors than this do not change the middle one by much; the newest are taken.
-constexpr std::size_t kMaxDescriptors = 10;
-
-Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) {
-  std::size_t best = 0;
-  int best_median = INT32_MAX;
-  for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    std::array<int, kMaxDescriptors> distances{};
-    for (std::size_t k = 0; k < descriptors.size(); ++k) {
-      distances[k] = hamming_distance(*descriptors[i], *descriptors[k]);
-    }
-    const int middle = median(std::span(distances).first(descriptors.size()));
-    if (middle < best_median) {
-      best_median = middle;
-      best = i;
-    }
-  }
-  return *descriptors[best];
-}
-
-}  // namespace
 
 Appearance describe_landmark(const Map& map, LandmarkId id) {
   const Landmark& landmark = map.landmarks().at(id);
   Appearance appearance;
-  std::vector<const Descriptor*> descriptors;
+  bool is_described = false;
   for (const Observation& observation : landmark.observations) {
     const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
     const Features& features = *keyframe.features;
@@ -46,18 +17,14 @@ Appearance describe_landmark(const Map& map, LandmarkId id) {
         cam_from_world.origin_in_source() - landmark.position_in_world;
     const double distance = to_camera.norm();
     appearance.direction += to_camera / distance;
-    descriptors.push_back(&features.descriptors[observation.feature]);
+    appearance.descriptor = features.descriptors[observation.feature];
+    is_described = true;
     if (observation.keyframe == landmark.reference || appearance.size_m == 0.0) {
       appearance.size_m = distance * features.size_rad[observation.feature];
     }
   }
-  if (descriptors.empty()) return landmark.appearance;
-  if (descriptors.size() > kMaxDescriptors) {
-    descriptors.erase(descriptors.begin(),
-                      descriptors.end() - static_cast<std::ptrdiff_t>(kMaxDescriptors));
-  }
+  if (!is_described) return landmark.appearance;
   appearance.direction.normalize();
-  appearance.descriptor = middle_descriptor(descriptors);
   return appearance;
 }
 

@@ -96,9 +96,8 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
       const std::size_t pose = index_of(keyframes, observation.keyframe);
       if (pose == keyframes.size()) continue;
       const Features& features = *map.keyframes().at(observation.keyframe).features;
-      problem.observations.push_back({features.measurement(observation.feature),
-                                      static_cast<std::uint32_t>(pose),
-                                      point});
+      problem.observations.push_back(
+          {features.measurement(observation.feature), static_cast<std::uint32_t>(pose), point});
       result.observations.push_back(observation);
     }
   }

@@ -30,7 +30,8 @@ class Probation {
   std::deque<Entry> entries_;
 };
 
-/// Erases keyframes around one whose landmarks others see just as well. Returns them.
+/// Erases keyframes covisible with one whose landmarks others see just as well: neither roots nor
+/// ends of loop edges nor the newest. Returns them.
 std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
                                                  KeyframeId centre,
                                                  DirtyLandmarks& dirty);

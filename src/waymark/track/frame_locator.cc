@@ -50,8 +50,7 @@ std::vector<LandmarkId> FrameLocator::find(const Features& features,
                                            const LandmarkSet& set,
                                            const Rigid3& rig_from_world,
                                            const ProjectionOptions& options) {
-  const ProjectionMatches& matches =
-      matcher_.match(set, features, {}, rig_from_world, options);
+  const ProjectionMatches& matches = matcher_.match(set, features, {}, rig_from_world, options);
   is_visible_ = matches.is_visible;
   std::vector<LandmarkId> landmarks(features.size());
   for (std::size_t i = 0; i < set.size(); ++i) {

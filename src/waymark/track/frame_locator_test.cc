@@ -4,9 +4,8 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
-
 #include <Eigen/Cholesky>
+#include <algorithm>
 
 #include "waymark/track/test_map.h"
 

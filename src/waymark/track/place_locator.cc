@@ -84,8 +84,7 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
   attempt_ = {FrameReason::kTooFewMatches, num_matches, 0};
   if (num_matches < kMinMatches) return std::nullopt;
   attempt_.failure = FrameReason::kTooFewInliers;
-  std::optional<LocatedFrame> located =
-      find_consensus(features, map, stream, std::move(landmarks));
+  std::optional<LocatedFrame> located = find_consensus(features, map, stream, std::move(landmarks));
   if (!located) return std::nullopt;
   constexpr std::array<std::pair<double, int>, 2> kRounds = {
       {{kFirstRadiusPx, kMinInliers / 2}, {kSecondRadiusPx, kMinInliers}}};

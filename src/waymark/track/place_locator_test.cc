@@ -62,8 +62,7 @@ TEST_P(PlaceLocatorTest, FindsThePoseNearAGuess) {
   const Rigid3 guess =
       Rigid3::exp((Vector6d() << 0.1, -0.1, 0.1, 0.03, 0.03, 0.0).finished()) * truth.inverse();
   const PointObservation view = scene_.look(truth, 100);
-  const auto place =
-      locator_.locate_near(*view.features, scene_.map, KeyframeId{0}, guess);
+  const auto place = locator_.locate_near(*view.features, scene_.map, KeyframeId{0}, guess);
   ASSERT_TRUE(place);
   EXPECT_LT(error_m(place->frame.rig_from_world, truth), 0.02);
   EXPECT_GT(place->frame.num_inliers, 200);

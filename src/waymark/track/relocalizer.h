@@ -27,9 +27,7 @@ class Relocalizer {
 
   /// Pose of a frame in whichever sub-map shows the place. The index may know more or fewer
   /// keyframes than the map.
-  std::optional<LocatedFrame> locate(const Frame& frame,
-                                     const Map& map,
-                                     const PlaceIndex& places);
+  std::optional<LocatedFrame> locate(const Frame& frame, const Map& map, const PlaceIndex& places);
 
   /// The same with the keyframes to compare given, the likeliest first.
   std::optional<LocatedFrame> locate_among(const Frame& frame,

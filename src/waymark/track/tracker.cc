@@ -140,11 +140,8 @@ std::optional<LocatedFrame> Tracker::locate_in_local_map(const Frame& frame,
   if (!first) return std::nullopt;
   StageTimer timer(times, Stage::kLocalMap);
   refresh_local_map(*frame.features, *first);
-  LocatedFrame located = locator_.locate_again(*frame.features,
-                                               *map_,
-                                               *std::move(first),
-                                               local_.landmarks,
-                                               {.radius_px = kLocatedRadiusPx});
+  LocatedFrame located = locator_.locate_again(
+      *frame.features, *map_, *std::move(first), local_.landmarks, {.radius_px = kLocatedRadiusPx});
   count_sightings(*frame.features, located);
   if (located.num_inliers < settings_.min_inliers) return std::nullopt;
   return located;

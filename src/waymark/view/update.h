@@ -57,15 +57,15 @@ struct SessionStatus {
   std::optional<FrameId> frame;                  ///< The newest.
   double time_s = 0.0;                           ///< Of the newest frame, since the first.
   FrameStatus newest = {.state = FrameState::kInitializing};  ///< Of the newest frame.
-  StageTimes stages;                             ///< Of the newest frame.
-  double median_tracking_ms = 0.0;               ///< Of the recent frames.
-  std::size_t num_frames = 0;                    ///< So far.
-  std::optional<std::size_t> num_frames_total;   ///< Of the input, if it is known.
-  std::size_t num_tracked = 0;                   ///< Frames with a pose.
-  std::size_t num_unreadable = 0;                ///< Frames whose images could not be used.
-  std::size_t num_dropped = 0;                   ///< Frames that came too late.
-  std::size_t lost_count = 0;                    ///< Transitions to lost.
-  double frames_per_s = 0.0;                     ///< Of the recent frames.
+  StageTimes stages;                                          ///< Of the newest frame.
+  double median_tracking_ms = 0.0;                            ///< Of the recent frames.
+  std::size_t num_frames = 0;                                 ///< So far.
+  std::optional<std::size_t> num_frames_total;                ///< Of the input, if it is known.
+  std::size_t num_tracked = 0;                                ///< Frames with a pose.
+  std::size_t num_unreadable = 0;  ///< Frames whose images could not be used.
+  std::size_t num_dropped = 0;     ///< Frames that came too late.
+  std::size_t lost_count = 0;      ///< Transitions to lost.
+  double frames_per_s = 0.0;       ///< Of the recent frames.
 };
 
 /// What changed in the session since the update before.
