@@ -112,12 +112,11 @@ TEST(OpenvslamMapRecorded, LocalisesAnotherCamera) {
   const std::vector<StampedPose> truth = read_trajectory(query / "groundtruth.txt");
   const auto input = open_input(query, reading);
   std::vector<double> errors;
-  std::vector<LandmarkId> landmarks;
   while (const std::optional<InputFrame> image = input->next()) {
     const auto index = static_cast<std::uint32_t>(image->index);
     const Frame frame = {
         FrameId{index}, image->timestamp_ns, builder.build({.image0 = image->images[0].view()})};
-    const auto located = relocalizer.locate(frame, imported.map, places, landmarks);
+    const auto located = relocalizer.locate(frame, imported.map, places);
     if (!located) continue;
     const Eigen::Vector3d position =
         truth_from_estimate * located->rig_from_world.origin_in_source();

@@ -177,4 +177,7 @@ std::vector<KeyframeId> strongest_neighbours(const Map& map,
                                              KeyframeId keyframe,
                                              std::size_t max_count);
 
+/// The sub-maps that have keyframes, that with most of them first, of equal ones the older.
+std::vector<SubmapId> submaps_by_size(const Map& map);
+
 }  // namespace waymark

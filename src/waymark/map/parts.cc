@@ -125,18 +125,4 @@ Map unite(const Map& a, const Map& b) {
   return Map::restore(std::move(parts));
 }
 
-std::vector<SubmapId> submaps_by_size(const Map& map) {
-  std::vector<std::size_t> sizes(map.submaps().size(), 0);
-  map.keyframes().for_each(
-      [&](KeyframeId, const Keyframe& keyframe) { ++sizes.at(keyframe.submap.value); });
-  std::vector<SubmapId> submaps;
-  for (std::uint32_t i = 0; i < sizes.size(); ++i) {
-    if (sizes[i] > 0) submaps.push_back(SubmapId{i});
-  }
-  std::stable_sort(submaps.begin(), submaps.end(), [&](SubmapId a, SubmapId b) {
-    return sizes[a.value] > sizes[b.value];
-  });
-  return submaps;
-}
-
 }  // namespace waymark

@@ -20,7 +20,4 @@ MapParts take_apart(const Map& map);
 /// a: keyframe k of b is k + a.keyframes().end_id().
 Map unite(const Map& a, const Map& b);
 
-/// The sub-maps that have keyframes, that with most of them first, of equal ones the older.
-std::vector<SubmapId> submaps_by_size(const Map& map);
-
 }  // namespace waymark
