@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/triangulate.h"
 
-#include "waymark/base/median.h"
+#include <algorithm>
+
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/geometry/triangulation.h"
 
@@ -22,25 +23,28 @@ std::vector<std::uint8_t> taken_features(const Keyframe& keyframe) {
   return is_taken;
 }
 
-/// Median distance from a keyframe to the landmarks it sees.
-double median_distance(const Map& map, const Keyframe& keyframe) {
+/// Distance from a keyframe within which the nearest tenth of the landmarks that it sees lie.
+double near_distance(const Map& map, const Keyframe& keyframe) {
   const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
   std::vector<double> distances;
   for (std::size_t i = 0; i < keyframe.features->num_primary; ++i) {
     const Landmark* landmark = map.landmarks().find(keyframe.landmarks[i]);
     if (landmark) distances.push_back((landmark->position_in_world - centre).norm());
   }
-  return distances.empty() ? 0.0 : median(distances);
+  if (distances.empty()) return 0.0;
+  const auto tenth = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 10);
+  std::nth_element(distances.begin(), tenth, distances.end());
+  return *tenth;
 }
 
-/// Covisible keyframes that tell depths, those that share most first: the parallax at the distance
-/// of what the keyframe sees is at least what the matcher asks for. With one pixel of noise in
+/// Covisible keyframes that tell depths, those that share most first: the nearest tenth of what the
+/// keyframe sees has at least the parallax that the matcher asks for. With one pixel of noise in
 /// either view, depths are then known to sqrt(2) / 4 or better. Closer ones would be searched in
 /// vain.
 std::vector<KeyframeId> choose_partners(const Map& map, KeyframeId id, double min_parallax_px) {
   const Keyframe& keyframe = map.keyframes().at(id);
   const double pixel_rad = central_pixel_angle(*keyframe.rig->cameras[0].camera);
-  const double min_baseline = min_parallax_px * pixel_rad * median_distance(map, keyframe);
+  const double min_baseline = min_parallax_px * pixel_rad * near_distance(map, keyframe);
   const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
   std::vector<KeyframeId> partners = strongest_neighbours(map, id, map.covisible(id).size());
   std::erase_if(partners, [&](KeyframeId other) {
