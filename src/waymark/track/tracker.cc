@@ -142,7 +142,6 @@ std::optional<LocatedFrame> Tracker::locate_in_local_map(const Frame& frame,
   refresh_local_map(*frame.features, *first);
   LocatedFrame located = locator_.locate_again(
       *frame.features, *map_, *std::move(first), local_.landmarks, {.radius_px = kLocatedRadiusPx});
-  count_sightings(*frame.features, located);
   if (located.num_inliers < settings_.min_inliers) return std::nullopt;
   return located;
 }
@@ -178,6 +177,7 @@ bool Tracker::is_keyframe(const Frame& frame, const LocatedFrame& located) const
 
 TrackOutcome Tracker::accept(const Frame& frame, LocatedFrame located, StageTimes& times) {
   StageTimer timer(times, Stage::kKeyframe);
+  count_sightings(*frame.features, located);
   const Keyframe& reference = map_->keyframes().at(local_.reference);
   const RelativePose pose{local_.reference,
                           located.rig_from_world * reference.rig_from_world.inverse(),

@@ -74,6 +74,7 @@ class Tracker {
                                                   std::optional<LocatedFrame> first,
                                                   StageTimes& times);
   void refresh_local_map(const Features& features, const LocatedFrame& located);
+  /// Of an accepted pose, the local map having been searched with it.
   void count_sightings(const Features& features, const LocatedFrame& located);
   bool is_keyframe(const Frame& frame, const LocatedFrame& located) const;
   TrackOutcome accept(const Frame& frame, LocatedFrame located, StageTimes& times);
