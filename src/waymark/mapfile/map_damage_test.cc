@@ -114,6 +114,14 @@ TEST_F(MapDamage, OfNothingThereIsNoError) {
   EXPECT_EQ(error_of(join_records(records_)), "no error");
 }
 
+TEST_F(MapDamage, KeysMayBeInLongerFormats) {
+  for (std::string& record : records_) {
+    record.replace(record.size() - 12, 1, std::string("\xdb\x00\x00\x00\x06", 5));
+    testing::seal_record(record);
+  }
+  EXPECT_EQ(error_of(join_records(records_)), "no error");
+}
+
 TEST_F(MapDamage, OtherFiles) {
   expect_error("", "record 0 at byte 0: is truncated");
   expect_error("Hello, I am a text.\n", "is no map file");

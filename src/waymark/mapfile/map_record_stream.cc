@@ -129,9 +129,7 @@ void MapRecordStream::check_checksum(std::string_view record) const {
   if (num_records_ == 0 && find_value(record, "format").kind == Kind::kNone) {
     throw InputError(name_, "is no map file, expected one written by waymark");
   }
-  constexpr std::string_view kLastKey =
-      "\xa6"
-      "crc32c\xce";  // And the type of what follows.
+  constexpr std::string_view kLastKey = "crc32c\xce";  // And the type of what follows.
   constexpr std::size_t kChecksumBytes = 5;
   const std::size_t size = record.size() - std::min(record.size(), kChecksumBytes);
   const MsgpackValue stated = find_value(record, "crc32c");
