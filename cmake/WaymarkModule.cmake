@@ -1,7 +1,8 @@
 # Warnings for our own code; no fused multiply-add contraction, so that results do not depend on
 # what the compiler chose to fuse.
 add_library(waymark_options INTERFACE)
-target_compile_options(waymark_options INTERFACE "$<BUILD_INTERFACE:-Wall;-Wextra>" -ffp-contract=off)
+target_compile_options(waymark_options INTERFACE "$<BUILD_INTERFACE:-Wall;-Wextra>" -ffp-contract=off
+  "$<BUILD_INTERFACE:-ffile-prefix-map=${PROJECT_SOURCE_DIR}/=>") # Nothing built knows where.
 target_compile_features(waymark_options INTERFACE cxx_std_20)
 target_include_directories(waymark_options INTERFACE
   "$<BUILD_INTERFACE:${PROJECT_SOURCE_DIR}/src>" "$<INSTALL_INTERFACE:${CMAKE_INSTALL_INCLUDEDIR}>")

@@ -6,9 +6,9 @@
 
 namespace waymark {
 
-/// What a landmark looks like, from its observations: as in the newest of them, since the next view
-/// is most like it; the mean direction towards its observers; and the metric size of a pixel at its
-/// reference.
+/// What a landmark looks like, from its observations: bit by bit what most of their descriptors
+/// have, and the newest where as many have the one as the other; the mean direction towards its
+/// observers; and the metric size of a pixel at its reference.
 Appearance describe_landmark(const Map& map, LandmarkId id);
 
 }  // namespace waymark

@@ -47,14 +47,15 @@ class AppearanceTest : public ::testing::Test {
   std::shared_ptr<const Rig> rig_;
 };
 
-TEST_F(AppearanceTest, IsAsInTheNewestKeyframe) {
-  const std::vector<int> bits = {0, 200, 14};
-  for (const int count : bits) add_keyframe({0, 0, 0}, with_bits(count), 0.002f);
+TEST_F(AppearanceTest, HasOfEachBitWhatMostHave) {
+  for (const int count : {20, 200, 70, 14}) add_keyframe({0, 0, 0}, with_bits(count), 0.002f);
   const LandmarkId id = map_.add_landmark(submap_, {0, 0, 5}, KeyframeId{0});
   for (std::uint32_t k : {2u, 0u, 1u}) map_.observe(KeyframeId{k}, 0, id);
-  EXPECT_EQ(describe_landmark(map_, id).descriptor, with_bits(14));
-  map_.forget(KeyframeId{2}, 0);
-  EXPECT_EQ(describe_landmark(map_, id).descriptor, with_bits(200));
+  EXPECT_EQ(describe_landmark(map_, id).descriptor, with_bits(70));
+  map_.observe(KeyframeId{3}, 0, id);  // Bits 20 to 69 are set in two, but not in the newest.
+  EXPECT_EQ(describe_landmark(map_, id).descriptor, with_bits(20));
+  for (std::uint32_t k : {0u, 3u}) map_.forget(KeyframeId{k}, 0);
+  EXPECT_EQ(describe_landmark(map_, id).descriptor, with_bits(70)) << "the newer of two";
 }
 
 TEST_F(AppearanceTest, LooksTowardsItsObserversOnAverage) {
