@@ -32,7 +32,7 @@ class Wheel(Test):
             notices = wheel.read(name).decode()
             self.assertEqual(wheel.read(name.replace("copyright", "LICENSE")), (ROOT / "LICENSE").read_bytes())
         for holder in ("2009 Willow Garage", "(OpenCV,", "(Highway,", "(fmt,", "(yaml-cpp,", "(nlohmann-json,",
-                       "(CLI11,", "(pybind11,", "(Boost,", "(msgpack-cxx,", "(Eigen,", "three.js authors"):
+                       "(CLI11,", "(pybind11,", "(Boost,", "(Eigen,", "three.js authors"):
             self.assertIn(holder, notices)
         self.run_python(sys.executable, "-m", "venv", "--system-site-packages", "--without-pip",
                         self.folder / "venv")

@@ -119,7 +119,7 @@ Corner* find_in_band(const PaddedImage& image,
                      const CornerRequest& request,
                      CornerWorkspace& workspace,
                      Corner* next) {
-  const int strong = strong_contrast(request.min_contrast);
+  const int strong = std::max(kStrongContrast, request.min_contrast);
   fast_scores(image, with_frame(band), strong, workspace.band);
   const std::ptrdiff_t stride = workspace.band.stride();
   TileMaxima maxima;

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <span>
 #include <vector>
@@ -15,7 +14,7 @@ namespace waymark {
 /// Which corners to find.
 struct CornerRequest {
   int border_px = 4;     ///< Nearest to the border of the image, at least kFastRadius + 1.
-  int min_contrast = 0;  ///< Scores are larger.
+  int min_contrast = 7;  ///< Scores are larger.
   double density = 0.0;  ///< How many are needed per pixel.
 };
 
@@ -25,9 +24,8 @@ struct CornerWorkspace {
   PaddedImage tile;
 };
 
-/// A corner is strong if it would still be one at half its contrast, as a step of scale or blur
-/// leaves it: such last twice as often as those of the least contrast (docs/decisions.md).
-inline int strong_contrast(int min_contrast) { return std::min(2 * min_contrast, 254); }
+/// Contrast of a corner that noise and a change of view do not easily move or remove.
+inline constexpr int kStrongContrast = 20;
 
 /// The largest number of corners that find_corners can find: no two of them are neighbours.
 inline std::size_t max_num_corners(int width_px, int height_px) {

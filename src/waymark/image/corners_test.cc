@@ -93,19 +93,19 @@ TEST(FindCorners, AgreesWithOpenCv) {
 }
 
 TEST(FindCorners, TakesWeakCornersOnlyWhereStrongOnesAreTooFew) {
-  // Strong texture above, the same at a twentieth of the contrast below.
+  // Strong texture above, the same at a quarter of the contrast below.
   PaddedImage image = testing::make_texture(200, 20 * kBorder + 160, 5);
   const int middle = image.height_px() / 2;
   for (int y = middle; y < image.height_px(); ++y) {
     for (int x = 0; x < image.width_px(); ++x) {
-      image.row(y)[x] = static_cast<std::uint8_t>(100 + image.row(y - middle)[x] / 20);
+      image.row(y)[x] = static_cast<std::uint8_t>(100 + image.row(y - middle)[x] / 8);
     }
   }
   const std::vector<Corner> corners = find(image, 5, 0.001);
   int num_weak_above = 0;
   int num_weak_below = 0;
   for (const Corner& corner : corners) {
-    if (corner.score > strong_contrast(5)) continue;
+    if (corner.score > kStrongContrast) continue;
     ++(corner.y_px < middle - 40 ? num_weak_above : num_weak_below);
   }
   EXPECT_EQ(num_weak_above, 0);

@@ -9,7 +9,7 @@ namespace waymark {
 /// Corners and descriptors.
 struct FeatureSettings {
   int count = 1000;      ///< Features per image.
-  int min_contrast = 9;  ///< In grey values.
+  int min_contrast = 7;  ///< In grey values.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

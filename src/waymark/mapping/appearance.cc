@@ -3,30 +3,32 @@
 #include "waymark/mapping/appearance.h"
 
 #include <array>
-#include <bit>
-#include <vector>
+#include <span>
+
+#include "waymark/base/median.h"
+#include "waymark/image/hamming.h"
 
 namespace waymark {
 namespace {
 
-/// Of each bit what most descriptors have (Grana et al. 2013); of as many, the newest's.
-Descriptor majority(const std::vector<const Descriptor*>& descriptors) {
-  Descriptor result = *descriptors.back();
-  if (descriptors.size() < 3) return result;
-  for (std::size_t word = 0; word < result.size(); ++word) {
-    std::array<std::uint16_t, 64> counts{};
-    for (const Descriptor* descriptor : descriptors) {
-      for (std::uint64_t bits = (*descriptor)[word]; bits != 0; bits &= bits - 1) {
-        ++counts[static_cast<std::size_t>(std::countr_zero(bits))];
-      }
+/// More descriptors than this do not change the middle one by much; the newest are taken.
+constexpr std::size_t kMaxDescriptors = 10;
+
+Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) {
+  std::size_t best = 0;
+  int best_median = INT32_MAX;
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    std::array<int, kMaxDescriptors> distances{};
+    for (std::size_t k = 0; k < descriptors.size(); ++k) {
+      distances[k] = hamming_distance(*descriptors[i], *descriptors[k]);
     }
-    for (std::size_t bit = 0; bit < counts.size(); ++bit) {
-      const std::uint64_t mask = std::uint64_t{1} << bit;
-      if (2 * counts[bit] > descriptors.size()) result[word] |= mask;
-      if (2 * counts[bit] < descriptors.size()) result[word] &= ~mask;
+    const int middle = median(std::span(distances).first(descriptors.size()));
+    if (middle < best_median) {
+      best_median = middle;
+      best = i;
     }
   }
-  return result;
+  return *descriptors[best];
 }
 
 }  // namespace
@@ -50,8 +52,12 @@ Appearance describe_landmark(const Map& map, LandmarkId id) {
     }
   }
   if (descriptors.empty()) return landmark.appearance;
-  appearance.descriptor = majority(descriptors);
+  if (descriptors.size() > kMaxDescriptors) {
+    descriptors.erase(descriptors.begin(),
+                      descriptors.end() - static_cast<std::ptrdiff_t>(kMaxDescriptors));
+  }
   appearance.direction.normalize();
+  appearance.descriptor = middle_descriptor(descriptors);
   return appearance;
 }
 

@@ -2,79 +2,28 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/associate.h"
 
-#include <Eigen/LU>
-#include <algorithm>
-
 #include "waymark/image/range_precision.h"
-#include "waymark/optimize/residual.h"
 
 namespace waymark {
-namespace {
-
-/// A point as the camera of a feature sees it.
-struct SeenPoint {
-  Measurement measured;
-  InverseRangePoint in_cam;
-  Eigen::Matrix3d cam_from_world_rotation;
-
-  Matrix23d residual_by_position() const {
-    return bearing_residual_by_point(in_cam, measured.level_pixel_from_bearing) *
-           cam_from_world_rotation;
-  }
-};
-
-SeenPoint look_at(const Keyframe& keyframe,
-                  std::uint32_t feature,
-                  const Eigen::Vector3d& point_in_world) {
-  const Measurement measured = keyframe.features->measurement(feature);
-  const Rigid3 cam_from_world =
-      keyframe.rig->cameras[measured.camera].cam_from_rig * keyframe.rig_from_world;
-  return {measured,
-          in_inverse_range(cam_from_world * point_in_world),
-          cam_from_world.rotation_matrix()};
-}
-
-}  // namespace
 
 std::optional<double> squared_residual(const Keyframe& keyframe,
                                        std::uint32_t feature,
-                                       const Eigen::Vector3d& point_in_world,
-                                       const Eigen::Matrix3d& covariance) {
-  const SeenPoint seen = look_at(keyframe, feature, point_in_world);
-  if (!is_ahead(seen.in_cam, seen.measured.bearing)) return std::nullopt;
-  const Eigen::Vector2d residual_px =
-      bearing_residual(seen.in_cam, seen.measured.bearing, seen.measured.level_pixel_from_bearing);
-  const Matrix23d derivative = seen.residual_by_position();
-  const Eigen::Matrix2d variance =
-      Eigen::Matrix2d::Identity() + derivative * covariance * derivative.transpose();
-  return residual_px.dot(variance.inverse() * residual_px);
+                                       const Eigen::Vector3d& point_in_world) {
+  const Features& features = *keyframe.features;
+  const RigCamera& camera = keyframe.rig->cameras[features.keypoints[feature].camera];
+  const Eigen::Vector3d predicted =
+      (camera.cam_from_rig * (keyframe.rig_from_world * point_in_world)).normalized();
+  const Eigen::Vector3d measured = features.bearings[feature].cast<double>();
+  if (predicted.dot(measured) <= 0.0) return std::nullopt;
+  const Matrix23d w = features.level_pixel_from_bearing[feature].cast<double>();
+  return (w * (predicted - measured)).squaredNorm();
 }
 
 bool agrees(const Keyframe& keyframe,
             std::uint32_t feature,
-            const Eigen::Vector3d& point_in_world,
-            const Eigen::Matrix3d& covariance) {
-  const std::optional<double> squared =
-      squared_residual(keyframe, feature, point_in_world, covariance);
+            const Eigen::Vector3d& point_in_world) {
+  const std::optional<double> squared = squared_residual(keyframe, feature, point_in_world);
   return squared && *squared < kMaxSquaredResidual;
-}
-
-Eigen::Matrix3d position_information(const Map& map, const Landmark& landmark) {
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  double max_inverse_range = 0.0;
-  for (const Observation& observation : landmark.observations) {
-    const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
-    const SeenPoint seen = look_at(keyframe, observation.feature, landmark.position_in_world);
-    const Matrix23d derivative = seen.residual_by_position();
-    information += derivative.transpose() * derivative;
-    max_inverse_range = std::max(max_inverse_range, seen.in_cam.inverse_range);
-    const double sigma = seen.measured.inverse_range_sigma;
-    if (sigma <= 0.0) continue;
-    const Eigen::RowVector3d along =
-        range_residual_by_point(seen.in_cam, sigma) * seen.cam_from_world_rotation;
-    information += along.transpose() * along;
-  }
-  return information + max_inverse_range * max_inverse_range * Eigen::Matrix3d::Identity();
 }
 
 void observe_with_partner(Map& map, KeyframeId id, std::uint32_t feature, LandmarkId landmark) {

@@ -4,10 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include <Eigen/LU>
-#include <algorithm>
-#include <cmath>
-
 #include "waymark/image/range_precision.h"
 #include "waymark/track/test_map.h"
 
@@ -58,44 +54,6 @@ TEST_F(AssociateTest, ResidualIsInPixelsOfTheLevelInEitherCamera) {
     EXPECT_NEAR(std::sqrt(*squared_residual(keyframe(), feature, beside)), 3.0, 0.6);
     EXPECT_FALSE(agrees(keyframe(), feature, beside));
   }
-}
-
-TEST_F(AssociateTest, AnUncertainPointMayLookFartherOff) {
-  const Features& features = *keyframe().features;
-  const Rigid3 world_from_rig = keyframe().rig_from_world.inverse();
-  const double pixel_m = features.size_rad[feature_] * (point_ - world_from_rig.translation).norm();
-  const Eigen::Vector3d across = world_from_rig.rotation * Eigen::Vector3d::UnitY();
-  const Eigen::Vector3d beside = point_ + 3.0 * pixel_m * across;
-  const Eigen::Matrix3d along_error = 4.0 * pixel_m * pixel_m * across * across.transpose();
-  EXPECT_FALSE(agrees(keyframe(), feature_, beside));
-  EXPECT_TRUE(agrees(keyframe(), feature_, beside, along_error));
-  EXPECT_NEAR(*squared_residual(keyframe(), feature_, beside, along_error), 9.0 / 5.0, 0.8);
-  const Eigen::Vector3d other = world_from_rig.rotation * Eigen::Vector3d::UnitX();
-  EXPECT_FALSE(
-      agrees(keyframe(), feature_, beside, 4.0 * pixel_m * pixel_m * other * other.transpose()));
-}
-
-TEST_F(AssociateTest, InformationIsThatOfTheViews) {
-  TestMap scene(1, cloud_ahead(), {.seed = 8, .miss_probability = 0.0}, false);
-  const PointObservation view = scene.look(pose_at(0.0), 0);
-  const auto& bearings = view.features->bearings;
-  const auto ahead = std::max_element(
-      bearings.begin(), bearings.end(), [](auto& a, auto& b) { return a.z() < b.z(); });
-  const std::uint32_t point =
-      view.landmark_of_feature[static_cast<std::size_t>(ahead - bearings.begin())];
-  for (const double x : {-0.3, 0.3}) scene.add_keyframe(pose_at(x));
-  const Landmark& landmark = scene.map.landmarks().at(scene.landmark_at(point, KeyframeId{0}));
-  ASSERT_EQ(landmark.observations.size(), 2u);
-  const Eigen::Matrix3d covariance = position_information(scene.map, landmark).inverse();
-  // Across: the mean of two views. Along: the parallax of 0.6 m.
-  const double range = landmark.position_in_world.norm();
-  const Eigen::Vector3d along = landmark.position_in_world / range;
-  const Eigen::Vector3d up = along.cross(Eigen::Vector3d::UnitX()).normalized();
-  const double sigma_rad = scene.seen[0].features->size_rad[landmark.observations[0].feature];
-  EXPECT_NEAR(std::sqrt(up.dot(covariance * up)) / (range * sigma_rad / std::sqrt(2.0)), 1.0, 0.15);
-  const double base = 0.6 * Eigen::Vector3d::UnitX().cross(along).norm();
-  const double expected = std::sqrt(2.0) * range * range * sigma_rad / base;
-  EXPECT_NEAR(std::sqrt(along.dot(covariance * along)) / expected, 1.0, 0.15);
 }
 
 TEST_F(AssociateTest, APointBehindHasNoResidual) {

@@ -9,45 +9,33 @@
 namespace waymark {
 namespace {
 
-// Mur-Artal et al. 2015, VI.B: a landmark must pass a test during its first three keyframes. It has
-// to be found in more than a quarter of the frames that should see it and, once another keyframe
-// has passed, be seen from three; a range that was measured stands for one of them. The three
-// newest keyframes are not judged while what they added is on probation.
 constexpr std::size_t kProbationKeyframes = 3;
-constexpr std::uint32_t kFramesPerFind = 4;
-constexpr std::size_t kMinObservers = 3;
-
-// Mur-Artal et al. 2015, VI.E: a keyframe is redundant when 90 % of what it sees is seen by at
-// least three others at the same or a finer scale.
-constexpr double kRedundantRatio = 0.9;
+constexpr double kMinFoundRatio = 0.25;
+/// A keyframe is redundant when this part of its landmarks is seen by that many others.
+constexpr double kRedundantRatio = 0.92;
 constexpr std::size_t kRedundantObservers = 3;
-/// Scale is the size of a pixel on the landmark here, which distance changes, too. Half a pyramid
-/// level is still the same: features of one point lie no closer.
-constexpr double kSameScale = 1.1;
+/// The newest keyframes stay: the tracker and pending messages refer to them.
+constexpr std::size_t kNumNewest = 3;
 
 bool is_weak(const Map& map, const Landmark& landmark, std::size_t age) {
-  if (landmark.num_found < landmark.num_visible / kFramesPerFind) return true;
+  if (landmark.num_visible >= 4 &&
+      landmark.num_found < kMinFoundRatio * static_cast<double>(landmark.num_visible)) {
+    return true;
+  }
   if (age < 2) return false;
   const bool is_metric = map.submaps()[landmark.submap.value].is_metric;
-  return num_observers(landmark) + (is_metric ? 1 : 0) < kMinObservers;
+  return num_observers(landmark) < (is_metric ? 2u : 3u);
 }
 
-/// Extent in map units of a pixel of the feature that sees a landmark, at the landmark.
-double pixel_size(const Map& map, const Landmark& landmark, const Observation& observation) {
-  const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
-  return keyframe.features->size_rad[observation.feature] *
-         (keyframe.rig_from_world * landmark.position_in_world).norm();
-}
-
-/// Whether enough keyframes other than that of an observation see its landmark as finely.
-bool is_seen_as_well(const Map& map, const Landmark& landmark, const Observation& own) {
-  const double max_size = kSameScale * pixel_size(map, landmark, own);
+/// Whether enough other keyframes see a landmark from as near or nearer, judged by size.
+bool is_seen_as_well(const Map& map, const Landmark& landmark, KeyframeId id, float size_rad) {
   std::size_t others = 0;
   KeyframeId last;
   for (const Observation& observation : landmark.observations) {
-    if (observation.keyframe == own.keyframe || observation.keyframe == last) continue;
+    if (observation.keyframe == id || observation.keyframe == last) continue;
     last = observation.keyframe;
-    others += pixel_size(map, landmark, observation) <= max_size;
+    const Features& features = *map.keyframes().at(observation.keyframe).features;
+    others += features.size_rad[observation.feature] <= 1.3f * size_rad;
   }
   return others >= kRedundantObservers;
 }
@@ -59,7 +47,8 @@ bool is_redundant(const Map& map, KeyframeId id) {
   for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
     if (!keyframe.landmarks[i].is_valid()) continue;
     ++num_landmarks;
-    num_redundant += is_seen_as_well(map, map.landmarks().at(keyframe.landmarks[i]), {id, i});
+    num_redundant += is_seen_as_well(
+        map, map.landmarks().at(keyframe.landmarks[i]), id, keyframe.features->size_rad[i]);
   }
   return static_cast<double>(num_redundant) > kRedundantRatio * static_cast<double>(num_landmarks);
 }
@@ -84,12 +73,10 @@ std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
                                                  KeyframeId centre,
                                                  DirtyLandmarks& dirty) {
   std::vector<KeyframeId> erased;
-  const std::vector<CovisibilityEdge> edges = map.covisible(centre);
-  for (const auto& [id, num_shared] : edges) {
+  for (KeyframeId id : strongest_neighbours(map, centre, 30)) {
     const Keyframe* keyframe = map.keyframes().find(id);
-    // Roots are the origin of a world, and loop edges were measured between two views.
     if (!keyframe || !keyframe->parent.is_valid() || map.has_loop_edge(id)) continue;
-    if (id.value + kProbationKeyframes > centre.value || !is_redundant(map, id)) continue;
+    if (id.value + kNumNewest > centre.value || !is_redundant(map, id)) continue;
     for (LandmarkId landmark : keyframe->landmarks) {
       if (landmark.is_valid()) dirty.insert(landmark);
     }

@@ -30,8 +30,7 @@ class Probation {
   std::deque<Entry> entries_;
 };
 
-/// Erases keyframes covisible with one whose landmarks others see just as well: neither roots nor
-/// ends of loop edges nor the newest. Returns them.
+/// Erases keyframes around one whose landmarks others see just as well. Returns them.
 std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
                                                  KeyframeId centre,
                                                  DirtyLandmarks& dirty);

@@ -85,42 +85,6 @@ TEST_F(Cull, KeepsKeyframesThatSeeWhatFewOthersSee) {
   EXPECT_TRUE(dirty_.empty());
 }
 
-TEST_F(Cull, ATenthSeenByTooFewKeepsAKeyframe) {
-  for (const std::uint32_t k : {0u, 1u, 2u, 5u, 7u}) observe_all(k);
-  // Keyframes 1 and 2 see four landmarks that nobody else sees.
-  for (const std::uint32_t k : {0u, 5u, 7u}) {
-    for (std::uint32_t i = 0; i < 4; ++i) map_.forget(KeyframeId{k}, i);
-  }
-  cull_redundant_keyframes(map_, KeyframeId{7}, dirty_);
-  EXPECT_TRUE(map_.keyframes().contains(KeyframeId{1})) << "36 of 40";
-  map_.forget(KeyframeId{1}, 0);
-  cull_redundant_keyframes(map_, KeyframeId{7}, dirty_);
-  EXPECT_FALSE(map_.keyframes().contains(KeyframeId{1})) << "36 of 39";
-}
-
-TEST_F(Cull, KeepsAKeyframeThatSeesFromNearer) {
-  for (std::uint32_t k = 0; k < kNumKeyframes; ++k) observe_all(k);
-  // The features are alike: from half the distance they show half the extent.
-  map_.move_keyframe(KeyframeId{3}, Rigid3(Eigen::Quaterniond::Identity(), {-0.3, 0.0, -2.0}));
-  cull_redundant_keyframes(map_, KeyframeId{kNumKeyframes - 1}, dirty_);
-  for (const std::uint32_t k : {0u, 3u, 5u, 6u, 7u}) {
-    EXPECT_TRUE(map_.keyframes().contains(KeyframeId{k})) << k;
-  }
-  EXPECT_EQ(map_.keyframes().size(), 5u);
-}
-
-TEST_F(Cull, FewFramesDoNotTellWhatIsRarelyFound) {
-  for (std::uint32_t k = 0; k < 3; ++k) map_.observe(KeyframeId{k}, 0, landmarks_[0]);
-  Probation probation;
-  probation.add(landmarks_[0], 2);
-  map_.count_sightings(landmarks_[0], 3, 0);
-  probation.review(map_, 3, dirty_);
-  EXPECT_TRUE(map_.landmarks().contains(landmarks_[0]));
-  map_.count_sightings(landmarks_[0], 1, 0);
-  probation.review(map_, 4, dirty_);
-  EXPECT_FALSE(map_.landmarks().contains(landmarks_[0]));
-}
-
 TEST_F(Cull, ProbationErasesWhatIsRarelyFound) {
   for (std::uint32_t k = 0; k < 4; ++k) observe_all(k);
   Probation probation;

@@ -17,11 +17,12 @@ void fuse_into(Map& map,
                ProjectionMatcher& matcher,
                DirtyLandmarks& dirty);
 
-/// Makes one landmark of two; the one whose position is known better survives.
+/// Makes one landmark of two; the one with more observers survives.
 void merge(Map& map, LandmarkId a, LandmarkId b, DirtyLandmarks& dirty);
 
-/// Looks for what a keyframe sees in the keyframes that share most with it. The other way round the
-/// tracker has looked already.
+/// Finds landmarks that are one and the same, between a keyframe and its surroundings, by
+/// projecting what either side sees into the other: adds missing observations and merges
+/// duplicates.
 void fuse_with_neighbours(Map& map,
                           KeyframeId keyframe,
                           ProjectionMatcher& matcher,

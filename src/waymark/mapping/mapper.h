@@ -47,6 +47,7 @@ class Mapper {
 
  private:
   KeyframeId insert(const NewKeyframe& message);
+  void put_on_probation(KeyframeId keyframe);
   void refresh_appearances();
 
   const std::shared_ptr<const Rig> rig_;

@@ -2,17 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/triangulate.h"
 
-#include <algorithm>
-
-#include "waymark/camera/pixel_angles.h"
+#include "waymark/base/median.h"
 #include "waymark/geometry/triangulation.h"
 
 namespace waymark {
 namespace {
 
-/// From the ninth partner on, each adds less than a twentieth of what those before it gave
-/// (docs/decisions.md).
-constexpr std::size_t kMaxPartners = 8;
+constexpr std::size_t kMaxTriangulationNeighbours = 10;
+/// Baselines below this part of the scene's distance give no useful depth.
+constexpr double kMinBaselineRatio = 0.01;
 
 /// The matcher has asked for enough parallax in pixels; this only guards the division.
 constexpr double kMinParallaxRad = 1e-3;
@@ -23,37 +21,15 @@ std::vector<std::uint8_t> taken_features(const Keyframe& keyframe) {
   return is_taken;
 }
 
-/// Distance from a keyframe within which the nearest tenth of the landmarks that it sees lie.
-double near_distance(const Map& map, const Keyframe& keyframe) {
+/// Median distance from a keyframe to the landmarks it sees.
+double median_distance(const Map& map, const Keyframe& keyframe) {
   const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
   std::vector<double> distances;
   for (std::size_t i = 0; i < keyframe.features->num_primary; ++i) {
     const Landmark* landmark = map.landmarks().find(keyframe.landmarks[i]);
     if (landmark) distances.push_back((landmark->position_in_world - centre).norm());
   }
-  if (distances.empty()) return 0.0;
-  const auto tenth = distances.begin() + static_cast<std::ptrdiff_t>(distances.size() / 10);
-  std::nth_element(distances.begin(), tenth, distances.end());
-  return *tenth;
-}
-
-/// Covisible keyframes that tell depths, those that share most first: the nearest tenth of what the
-/// keyframe sees has at least the parallax that the matcher asks for. With one pixel of noise in
-/// either view, depths are then known to sqrt(2) / 4 or better. Closer ones would be searched in
-/// vain.
-std::vector<KeyframeId> choose_partners(const Map& map, KeyframeId id, double min_parallax_px) {
-  const Keyframe& keyframe = map.keyframes().at(id);
-  const double pixel_rad = central_pixel_angle(*keyframe.rig->cameras[0].camera);
-  const double min_baseline = min_parallax_px * pixel_rad * near_distance(map, keyframe);
-  const Eigen::Vector3d centre = keyframe.rig_from_world.origin_in_source();
-  std::vector<KeyframeId> partners = strongest_neighbours(map, id, map.covisible(id).size());
-  std::erase_if(partners, [&](KeyframeId other) {
-    const Rigid3& rig_from_world = map.keyframes().at(other).rig_from_world;
-    const double baseline = (rig_from_world.origin_in_source() - centre).norm();
-    return baseline == 0.0 || baseline < min_baseline;
-  });
-  if (partners.size() > kMaxPartners) partners.resize(kMaxPartners);
-  return partners;
+  return distances.empty() ? 0.0 : median(distances);
 }
 
 std::optional<Eigen::Vector3d> triangulate_match(const Keyframe& a,
@@ -80,14 +56,19 @@ std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
                                                     EpipolarMatcher& matcher,
                                                     DirtyLandmarks& dirty) {
   std::vector<LandmarkId> added;
-  const EpipolarOptions options;
-  for (KeyframeId neighbour : choose_partners(map, id, options.min_parallax_px)) {
+  const double distance = median_distance(map, map.keyframes().at(id));
+  for (KeyframeId neighbour : strongest_neighbours(map, id, kMaxTriangulationNeighbours)) {
     const Keyframe a = map.keyframes().at(id);
     const Keyframe b = map.keyframes().at(neighbour);
     const Rigid3 b_from_a = (b.rig->cameras[0].cam_from_rig * b.rig_from_world) *
                             (a.rig->cameras[0].cam_from_rig * a.rig_from_world).inverse();
-    const auto matches = matcher.match(
-        *a.features, taken_features(a), *b.features, taken_features(b), b_from_a, options);
+    if (b_from_a.translation.norm() < kMinBaselineRatio * distance) continue;
+    const auto matches = matcher.match(*a.features,
+                                       taken_features(a),
+                                       *b.features,
+                                       taken_features(b),
+                                       b_from_a,
+                                       EpipolarOptions{});
     for (const FeatureMatch& match : matches) {
       const auto point = triangulate_match(a, b, b_from_a, match);
       if (!point) continue;

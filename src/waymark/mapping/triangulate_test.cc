@@ -86,16 +86,6 @@ TEST_F(TriangulateTest, FindsThemOnce) {
 
 TEST_F(TriangulateAtTheSamePlace, FindsNothing) { EXPECT_TRUE(triangulate().empty()); }
 
-TEST_F(TriangulateTest, KeyframesAtTheSamePlaceTakeNoPartnersPlace) {
-  // More than would be looked at, and each shares more than the first keyframe does.
-  for (int i = 1; i <= 12; ++i) newest_ = scene_.add_keyframe(pose_at(0.5 + 1e-4 * i), 3);
-  const std::vector<LandmarkId> added = triangulate();
-  EXPECT_GT(added.size(), 100u);
-  for (const LandmarkId id : added) {
-    EXPECT_TRUE(is_observed_by(scene_.map.landmarks().at(id), KeyframeId{0}));
-  }
-}
-
 TEST_F(TriangulateTest, NeedsNeighbours) {
   const KeyframeId alone = scene_.add_bare_keyframe(pose_at(1.0));
   EXPECT_TRUE(triangulate_with_neighbours(scene_.map, alone, matcher_, dirty_).empty());

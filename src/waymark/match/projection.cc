@@ -36,8 +36,7 @@ const ProjectionMatches& ProjectionMatcher::match(const LandmarkSet& landmarks,
   distance_of_feature_.assign(features.num_primary, UINT16_MAX);
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (!matches_.is_visible[i]) continue;
-    const double radius_px = options.radii_px.empty() ? options.radius_px : options.radii_px[i];
-    find_candidates(i, landmarks, features, is_taken, radius_px);
+    find_candidates(i, landmarks, features, is_taken, options.radius_px);
     choose(i, landmarks, features, options);
   }
   return matches_;

@@ -16,7 +16,6 @@ namespace waymark {
 /// How far to look for a landmark and how alike it must be.
 struct ProjectionOptions {
   double radius_px = 4.0;  ///< Search radius in pixels of the landmark's expected level.
-  std::span<const double> radii_px = {};  ///< Instead one for each landmark, where there are any.
   AppearanceOptions appearance{.max_distance = 64, .max_ratio = 0.85};
   /// Between the viewing direction and the known one (Mur-Artal et al. 2015, V.D).
   double min_direction_cos = 0.5;
