@@ -54,7 +54,8 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
 std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
                                                       const Map& map,
                                                       std::span<const KeyframeId> candidates) {
-  std::optional<LocatedPlace> best;
+  std::optional<LocatedFrame> best;
+  double best_confidence = 0;
   matched_.clear();
   diagnosis_ = {.reason = FrameReason::kNoCandidate};
   for (const KeyframeId candidate : candidates) {
@@ -66,12 +67,12 @@ std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
     PlaceAttempt attempt = locator_.attempt();
     if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;
     note(attempt);
-    if (!has_inliers || (best && place->confidence <= best->confidence)) continue;
-    best = std::move(place);
-    if (best->confidence >= kCertainConfidence) break;
+    if (!has_inliers || (best && place->confidence <= best_confidence)) continue;
+    best_confidence = place->confidence;
+    best = std::move(place->frame);
+    if (best_confidence >= kCertainConfidence) break;
   }
-  if (!best) return std::nullopt;
-  return std::move(best->frame);
+  return best;
 }
 
 void Relocalizer::note(const PlaceAttempt& attempt) {
