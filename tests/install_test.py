@@ -39,7 +39,7 @@ class Install(unittest.TestCase):
         return done.stdout
 
     def configure(self, source, folder, **options):
-        return run("cmake", "-S", source, "-B", folder, f"-DCMAKE_PREFIX_PATH={PREFIX}",
+        return run("cmake", "-G", "Ninja", "-S", source, "-B", folder, f"-DCMAKE_PREFIX_PATH={PREFIX}",
                    f"-DCMAKE_CXX_COMPILER={os.environ['CXX']}",
                    f"-DCMAKE_CXX_COMPILER_LAUNCHER={os.environ['WAYMARK_LAUNCHER']}", **options)
 

@@ -88,7 +88,7 @@ class Package(unittest.TestCase):
         run(self.program, "map", "check", out / "map.wmap")
 
     def test_another_project(self):
-        run("cmake", "-S", ROOT / "examples", "-B", self.work / "examples", f"-DCMAKE_PREFIX_PATH={CLEAN}/usr",
+        run("cmake", "-G", "Ninja", "-S", ROOT / "examples", "-B", self.work / "examples", f"-DCMAKE_PREFIX_PATH={CLEAN}/usr",
             f"-DCMAKE_CXX_COMPILER_LAUNCHER={shutil.which('ccache') or ''}")
         run("cmake", "--build", self.work / "examples", "--target", "waymark_example_map_images")
         camera = self.work / "camera.yaml"

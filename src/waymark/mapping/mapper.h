@@ -47,7 +47,6 @@ class Mapper {
 
  private:
   KeyframeId insert(const NewKeyframe& message);
-  void put_on_probation(KeyframeId keyframe);
   void refresh_appearances();
 
   const std::shared_ptr<const Rig> rig_;
