@@ -9,12 +9,10 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/input/calibration.h"
 #include "waymark/input/color_frame.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/listing.h"
-#include "waymark/input/mask.h"
-#include "waymark/input/selection.h"
+#include "waymark/input/reading.h"
 
 namespace waymark {
 namespace {

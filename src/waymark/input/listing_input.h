@@ -6,11 +6,9 @@
 #include <filesystem>
 #include <optional>
 
-#include "waymark/input/calibration.h"
 #include "waymark/input/input.h"
 #include "waymark/input/listing.h"
-#include "waymark/input/mask.h"
-#include "waymark/input/selection.h"
+#include "waymark/input/reading.h"
 
 namespace waymark {
 

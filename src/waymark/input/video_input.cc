@@ -10,13 +10,11 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/calibration.h"
 #include "waymark/input/color_frame.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
-#include "waymark/input/mask.h"
-#include "waymark/input/selection.h"
+#include "waymark/input/reading.h"
 
 namespace waymark {
 namespace {

@@ -1,0 +1,103 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+// What InputOptions ask of every kind of input: calibration, choice of frames, masks.
+
+#include <algorithm>
+#include <cstddef>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "waymark/base/check.h"
+#include "waymark/input/input.h"
+
+namespace waymark {
+
+struct ImageSize {
+  int width_px = 0;
+  int height_px = 0;
+
+  friend bool operator==(const ImageSize&, const ImageSize&) = default;
+};
+
+/// The calibration to use: the given one, else that of the data set, else nothing; with as many
+/// cameras as the setup needs. Throws InputError when it has fewer.
+std::optional<CameraChain> choose_calibration(const std::filesystem::path& path,
+                                              const std::optional<CameraChain>& given,
+                                              const std::optional<CameraChain>& carried,
+                                              Setup setup);
+
+/// Compares a camera with the first image of it. A camera without a resolution takes the size of
+/// the image; InputError that names the image when they differ.
+void fit_first_image(CameraChain& chain,
+                     std::size_t camera,
+                     const ImageSize& size,
+                     const std::filesystem::path& image);
+
+/// In words, for people.
+std::string describe_calibration(bool is_given, const std::optional<CameraChain>& chain);
+
+/// Which frames of an input are used: first, first + every, ...
+struct FrameSelection {
+  std::size_t first = 0;
+  std::size_t every = 1;
+  std::optional<std::size_t> limit;
+
+  /// Frames selected of so many.
+  std::size_t count(std::size_t num_frames) const {
+    if (num_frames <= first) return 0;
+    const std::size_t available = (num_frames - first - 1) / every + 1;
+    return limit ? std::min(*limit, available) : available;
+  }
+};
+
+/// The selection of the options; InputError when it selects nothing.
+inline FrameSelection select_frames(const std::filesystem::path& path,
+                                    const InputOptions& options,
+                                    std::optional<std::size_t> num_frames) {
+  const FrameSelection selection{options.first, options.every, options.frames};
+  if (options.every == 0) throw InputError("--every", "is 0, expected 1 or more");
+  if (options.frames == std::size_t{0}) throw InputError("--frames", "is 0, expected 1 or more");
+  if (num_frames && selection.count(*num_frames) == 0) {
+    throw InputError("--first",
+                     std::to_string(options.first) + " is beyond the " +
+                         std::to_string(*num_frames) + " frames of " + path.string() +
+                         ", expected less");
+  }
+  return selection;
+}
+
+/// Masks of camera 0: one image for all frames, or a folder with one image per frame, named as the
+/// frame's image but for the extension.
+class MaskSource {
+ public:
+  /// Path empty: no masks. Throws InputError when it is missing or unreadable.
+  explicit MaskSource(const std::filesystem::path& path);
+
+  /// Throws InputError for a folder of masks of which none belongs to a frame with one of these
+  /// names: a wrong name would otherwise go unnoticed.
+  void expect_one_of(const std::vector<std::string>& stems) const;
+
+  /// Whether the frame whose image has this name (without extension) has a mask.
+  bool has(const std::string& stem) const;
+
+  /// Gives a frame with images its mask, if there is one. One that cannot be read or has not the
+  /// size of the image is a fault of the frame and takes its images away.
+  void attach(const std::string& stem, InputFrame& frame) const;
+
+  /// Throws InputError unless the frame, the first good one, got along with its mask.
+  void check_first(const std::string& stem, const InputFrame& frame) const;
+
+ private:
+  std::filesystem::path path_of(const std::string& stem) const;
+
+  std::filesystem::path path_;
+  std::optional<Image> fixed_;
+  std::map<std::string, std::filesystem::path> by_name_;
+};
+
+}  // namespace waymark
