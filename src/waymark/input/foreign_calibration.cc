@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <initializer_list>
 #include <string>
@@ -13,6 +14,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/config_value.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
@@ -99,6 +101,78 @@ CameraChain checked_chain(const CameraDescription& camera) {
   return chain;
 }
 
+/// A model of COLMAP's documentation ("Camera Models") in terms of ours: where each number comes
+/// from, as an index into its parameters, or kZero.
+struct ColmapCameraModel {
+  std::string_view name;
+  std::size_t num_parameters;
+  std::array<int, 4> intrinsics;  ///< fu fv pu pv.
+  const char* distortion_model;
+  std::vector<int> distortion;
+};
+
+constexpr int kZero = -1;
+
+const std::vector<ColmapCameraModel>& colmap_models() {
+  static const std::vector<ColmapCameraModel> models = {
+      {"SIMPLE_PINHOLE", 3, {0, 0, 1, 2}, "none", {}},
+      {"PINHOLE", 4, {0, 1, 2, 3}, "none", {}},
+      {"SIMPLE_RADIAL", 4, {0, 0, 1, 2}, "radtan", {3, kZero, kZero, kZero}},
+      {"RADIAL", 5, {0, 0, 1, 2}, "radtan", {3, 4, kZero, kZero}},
+      {"OPENCV", 8, {0, 1, 2, 3}, "radtan", {4, 5, 6, 7}},
+      {"FULL_OPENCV", 12, {0, 1, 2, 3}, "radtan", {4, 5, 6, 7, 8, 9, 10, 11}},
+      {"OPENCV_FISHEYE", 8, {0, 1, 2, 3}, "equidistant", {4, 5, 6, 7}},
+      {"SIMPLE_RADIAL_FISHEYE", 4, {0, 0, 1, 2}, "equidistant", {3, kZero, kZero, kZero}},
+      {"RADIAL_FISHEYE", 5, {0, 0, 1, 2}, "equidistant", {3, 4, kZero, kZero}},
+  };
+  return models;
+}
+
+const ColmapCameraModel& find_model(std::string_view name, const std::string& where) {
+  std::string known;
+  for (const ColmapCameraModel& model : colmap_models()) {
+    if (model.name == name) return model;
+    known += (known.empty() ? "" : ", ") + std::string(model.name);
+  }
+  throw InputError(where,
+                   fmt::format("model is {}, expected one of: {}", quote_for_message(name), known));
+}
+
+int pixels(const RowReader& rows, std::size_t index) {
+  const double value = rows.number(index);
+  if (value >= 1.0 && value <= 1e6 && value == static_cast<int>(value)) {
+    return static_cast<int>(value);
+  }
+  throw InputError(rows.where(),
+                   fmt::format("size is {} pixels, expected an integer from 1", value));
+}
+
+CameraDescription read_camera(const RowReader& rows) {
+  constexpr std::size_t kFirst = 4;  // CAMERA_ID MODEL WIDTH HEIGHT, then the parameters.
+  rows.expect_at_least(kFirst, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS...");
+  const ColmapCameraModel& model = find_model(rows.fields()[1], rows.where());
+  const std::size_t count = rows.fields().size() - kFirst;
+  if (count != model.num_parameters) {
+    throw InputError(
+        rows.where(),
+        fmt::format("{} has {} parameters, expected {}", model.name, count, model.num_parameters));
+  }
+  const auto parameter = [&](int index) {
+    return index == kZero ? 0.0 : rows.number(kFirst + static_cast<std::size_t>(index));
+  };
+  CameraDescription camera;
+  camera.where = rows.where();
+  camera.camera_model = "pinhole";
+  camera.width_px = pixels(rows, 2);
+  camera.height_px = pixels(rows, 3);
+  for (const int index : model.intrinsics) camera.intrinsics.push_back(parameter(index));
+  camera.intrinsics[2] -= 0.5;
+  camera.intrinsics[3] -= 0.5;
+  camera.distortion_model = model.distortion_model;
+  for (const int index : model.distortion) camera.distortion_coeffs.push_back(parameter(index));
+  return camera;
+}
+
 }  // namespace
 
 ConfigSource without_opencv_header(ConfigSource source) {
@@ -142,6 +216,23 @@ CameraChain read_ros_calibration(const ConfigSource& source) {
                                  describe_value(model_node)));
   }
   return checked_chain(camera);
+}
+
+CameraChain read_colmap_calibration(const ConfigSource& source) {
+  RowReader rows(source.text, source.name, ' ');
+  if (!rows.next()) {
+    throw InputError(source.name, "holds no camera, expected cameras.txt of a COLMAP text model");
+  }
+  CameraChain chain;
+  chain.cameras.push_back({read_camera(rows), Rigid3()});
+  make_rig(chain);  // Refuses what no model accepts.
+  std::size_t num_cameras = 1;
+  while (rows.next()) ++num_cameras;
+  if (num_cameras > 1) {
+    chain.notes.push_back(
+        fmt::format("{}: the first of {} cameras is taken", source.name, num_cameras));
+  }
+  return chain;
 }
 
 }  // namespace waymark
