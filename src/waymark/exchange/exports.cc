@@ -1,18 +1,36 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include "waymark/exchange/exports.h"
+
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <bit>
 #include <iterator>
+#include <type_traits>
 #include <vector>
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/exchange/exports.h"
-#include "waymark/exchange/little_endian.h"
 
 namespace waymark {
 namespace {
+
+/// Appends the bytes of a number, the lowest first, whatever the order of the machine.
+template <class T>
+void append_little_endian(std::string& bytes, T value) {
+  static_assert(std::is_arithmetic_v<T>);
+  if constexpr (std::is_same_v<T, double>) {
+    append_little_endian(bytes, std::bit_cast<std::uint64_t>(value));
+  } else if constexpr (std::is_same_v<T, float>) {
+    append_little_endian(bytes, std::bit_cast<std::uint32_t>(value));
+  } else {
+    const auto bits = static_cast<std::make_unsigned_t<T>>(value);
+    for (std::size_t i = 0; i < sizeof(T); ++i) {
+      bytes += static_cast<char>(static_cast<std::uint64_t>(bits) >> (8 * i) & 0xff);
+    }
+  }
+}
 
 /// A camera in COLMAP's words: the models of its documentation and their numbers.
 struct ColmapCamera {
@@ -199,6 +217,26 @@ void write_colmap(const std::filesystem::path& folder, const ExportScene& scene,
   write_file_atomically(folder / ("cameras" + suffix), model.cameras);
   write_file_atomically(folder / ("images" + suffix), model.images);
   write_file_atomically(folder / ("points3D" + suffix), model.points);
+}
+
+std::string format_ply(const ExportScene& scene) {
+  std::string bytes = fmt::format(
+      "ply\nformat binary_little_endian 1.0\ncomment landmarks of a Waymark map\n"
+      "element vertex {}\n"
+      "property float x\nproperty float y\nproperty float z\n"
+      "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
+      scene.points.size());
+  for (const ExportPoint& point : scene.points) {
+    for (const double coordinate : point.position_in_world) {
+      append_little_endian(bytes, static_cast<float>(coordinate));
+    }
+    for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);
+  }
+  return bytes;
+}
+
+void write_ply(const std::filesystem::path& path, const ExportScene& scene) {
+  write_file_atomically(path, format_ply(scene));
 }
 
 }  // namespace waymark
