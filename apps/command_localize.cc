@@ -11,7 +11,7 @@
 #include "interrupt.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
-#include "waymark/session/localization.h"
+#include "waymark/session/session.h"
 
 namespace waymark {
 namespace {

@@ -12,7 +12,9 @@
 #include "waymark/exchange/results.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
+#include "waymark/map/map.h"
 #include "waymark/session/frame_feed.h"
+#include "waymark/system/localizer.h"
 #include "waymark/system/system.h"
 
 namespace waymark {
@@ -52,5 +54,17 @@ void write_results(const std::filesystem::path& folder, const SessionResults& re
 
 /// "inline", "lockstep", "realtime".
 std::string_view to_string(Timing timing);
+
+/// Whether images follow each other or have nothing to do with each other.
+enum class ImageOrder { kStream, kUnordered };
+
+/// Finds all frames of an input in the map of a localizer until it ends or should_stop() says so.
+/// The trajectories are in the map's frames, keyframes and counts those of the map. setup, timing,
+/// seed and version of the summary are left to the caller.
+SessionResults localize_input(Input& input,
+                              Localizer& localizer,
+                              ImageOrder order,
+                              const std::function<bool()>& should_stop,
+                              const FrameObserver& observer);
 
 }  // namespace waymark

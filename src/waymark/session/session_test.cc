@@ -8,7 +8,6 @@
 
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
-#include "waymark/session/localization.h"
 #include "waymark/session/merging.h"
 #include "waymark/session/testing/memory_input.h"
 #include "waymark/simulate/sequence.h"
