@@ -12,7 +12,6 @@
 #include "commands.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/evaluate/plot.h"
 #include "waymark/evaluate/report.h"
 #include "waymark/exchange/trajectory.h"
 

@@ -16,8 +16,8 @@
 #include "waymark/base/config.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/exchange/openvslam_map.h"
-#include "waymark/exchange/openvslam_settings.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/simulate/dataset.h"
 

@@ -11,7 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/exchange/openvslam_settings.h"
+#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/input/foreign_calibration.h"
 

@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/evaluate/plot.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,6 +9,7 @@
 
 #include "waymark/evaluate/association.h"
 #include "waymark/evaluate/chart.h"
+#include "waymark/evaluate/report.h"
 
 namespace waymark {
 namespace {

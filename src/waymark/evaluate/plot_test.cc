@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/evaluate/plot.h"
-
 #include <gmock/gmock.h>
 
 #include <cmath>
 
 #include "waymark/evaluate/chart.h"
+#include "waymark/evaluate/report.h"
 
 namespace waymark {
 namespace {

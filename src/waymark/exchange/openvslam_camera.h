@@ -7,6 +7,7 @@
 #include <string>
 #include <string_view>
 
+#include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/input/input.h"
 
@@ -37,5 +38,11 @@ Setup openvslam_setup(const OpenvslamCamera& camera);
 /// The camera in our words. Of a stereo pair, which is rectified, camera 1 is the same camera
 /// focal_x_baseline / fx to the right. InputError for what is missing or accepted by no model.
 CameraChain openvslam_camchain(const OpenvslamCamera& camera);
+
+/// The cameras of a settings file of OpenVSLAM or stella_vslam (YAML), in sections or with the flat
+/// keys of 2019 and 2020 (`Camera.fx`), as a camchain. A StereoRectifier gives the two cameras as
+/// they are, before rectification, which is not needed here. Notes say what was passed over.
+/// Throws InputError with its line for what is missing, malformed or has no counterpart.
+CameraChain read_openvslam_settings(const ConfigSource& source);
 
 }  // namespace waymark

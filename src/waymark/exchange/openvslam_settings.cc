@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/openvslam_settings.h"
-
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

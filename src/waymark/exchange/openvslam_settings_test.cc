@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/openvslam_settings.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -10,6 +8,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/testing/errors.h"
+#include "waymark/exchange/openvslam_camera.h"
 
 namespace waymark {
 namespace {

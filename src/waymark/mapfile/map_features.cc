@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapfile/map_features.h"
-
 #include <fmt/format.h>
 
 #include <utility>
 
 #include "waymark/image/pyramid.h"
+#include "waymark/mapfile/map_reader.h"
 
 namespace waymark {
 namespace {

@@ -9,7 +9,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/mapfile/map_features.h"
 #include "waymark/mapfile/map_layout.h"
 
 namespace waymark {

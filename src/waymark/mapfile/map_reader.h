@@ -13,6 +13,9 @@
 
 namespace waymark {
 
+/// Reads the features of a keyframe that the rig made. Throws InputError for what cannot be.
+std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig);
+
 /// Gathers a map from the records of version 1, which come in the order of kinds that
 /// docs/map-format.md gives. What one record says is checked here; how they fit together is left to
 /// Map::list_broken_invariants().
