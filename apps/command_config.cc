@@ -2,12 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <vector>
 
-#include "choice_option.h"
 #include "commands.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"

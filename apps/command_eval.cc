@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <vector>
 
-#include "choice_option.h"
 #include "commands.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/evaluate/evaluation.h"

@@ -2,14 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <filesystem>
 #include <memory>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "choice_option.h"
 #include "commands.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"

@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <atomic>
 #include <memory>
 #include <optional>
 #include <string>
 
-#include "choice_option.h"
 #include "commands.h"
 #include "input_command.h"
 #include "interrupt.h"

@@ -2,13 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <CLI/CLI.hpp>
 #include <functional>
+#include <map>
 #include <string>
 #include <vector>
-
-namespace CLI {
-class App;
-}
 
 namespace waymark {
 
@@ -39,5 +37,19 @@ inline constexpr int kNoPose = 3;          ///< Ran, but found no pose at all.
 
 /// What `map` has besides; adds one subcommand to it.
 void add_align_task(CLI::App& maps, Command& command);
+
+/// Adds an option that takes one of a few names, each standing for a value.
+template <class Value>
+void add_choice(CLI::App& command,
+                const std::string& name,
+                Value& value,
+                const std::map<std::string, Value>& choices,
+                const std::string& help) {
+  command
+      .add_option_function<std::string>(
+          name, [&value, choices](const std::string& chosen) { value = choices.at(chosen); }, help)
+      ->check(CLI::IsMember(choices))
+      ->type_name("NAME");
+}
 
 }  // namespace waymark

@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <CLI/CLI.hpp>
 #include <algorithm>
 #include <exception>
 #include <map>
@@ -13,7 +12,7 @@
 #include <utility>
 #include <vector>
 
-#include "choice_option.h"
+#include "commands.h"
 #include "waymark/base/frame_state.h"
 #include "waymark/input/decode.h"
 
