@@ -31,7 +31,9 @@ class CheckError : public std::logic_error {
 };
 
 /// Throws the CheckError of WAYMARK_CHECK.
-[[noreturn]] void fail_check(const char* condition, const char* file, int line);
+[[noreturn]] inline void fail_check(const char* condition, const char* file, int line) {
+  throw CheckError(std::string(file) + ":" + std::to_string(line) + ": check failed: " + condition);
+}
 
 }  // namespace waymark
 

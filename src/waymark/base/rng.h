@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cmath>
 #include <cstdint>
 
 namespace waymark {
@@ -32,7 +33,10 @@ class Rng {
   double uniform(double low, double high) { return low + (high - low) * uniform(); }
 
   /// Standard normal (Box and Muller 1958).
-  double normal();
+  double normal() {
+    const double radius = std::sqrt(-2.0 * std::log(1.0 - uniform()));
+    return radius * std::cos(6.283185307179586 * uniform());
+  }
 
  private:
   static std::uint64_t mix(std::uint64_t z) {

@@ -3,6 +3,7 @@
 #include "waymark/base/settings.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cctype>
@@ -73,10 +74,113 @@ void read_section(const std::vector<SettingField>& fields,
   }
 }
 
+constexpr std::size_t kLineWidth = 100;
+
+/// A value as YAML.
+struct ValuePrinter {
+  std::string operator()(Section) const { return ""; }
+  std::string operator()(const bool* value) const { return *value ? "true" : "false"; }
+  std::string operator()(const int* value) const { return fmt::format("{}", *value); }
+  std::string operator()(const double* value) const { return fmt::format("{}", *value); }
+  std::string operator()(const std::string* value) const {
+    std::string quoted = "\"";
+    for (const char c : *value) {
+      if (c == '"' || c == '\\') quoted += '\\';
+      quoted += c == '\n' ? std::string("\\n") : std::string(1, c);
+    }
+    return quoted + "\"";
+  }
+  std::string operator()(const std::vector<double>* values) const {
+    return fmt::format("[{}]", fmt::join(*values, ", "));
+  }
+};
+
+/// What may be written for a field, without its range.
+struct NounPrinter {
+  const char* operator()(Section) const { return ""; }
+  const char* operator()(const bool*) const { return "true or false"; }
+  const char* operator()(const int*) const { return "integer"; }
+  const char* operator()(const double*) const { return "number"; }
+  const char* operator()(const std::string*) const { return "text"; }
+  const char* operator()(const std::vector<double>*) const { return "list of numbers"; }
+};
+
+std::string printed_value(const SettingField& field) {
+  return std::visit(ValuePrinter{}, field.value);
+}
+
+std::string printed_range(const SettingField& field) {
+  return describe_range(std::visit(NounPrinter{}, field.value), {field.info.low, field.info.high});
+}
+
+/// The text as comment lines of at most kLineWidth characters.
+std::string comment(std::string_view text, std::size_t indent) {
+  const std::string start = std::string(indent, ' ') + "#";
+  std::string result, line = start;
+  while (!text.empty()) {
+    const std::size_t space = std::min(text.find(' '), text.size());
+    const std::string_view word = text.substr(0, space);
+    if (line.size() + 1 + word.size() > kLineWidth && line != start) {
+      result += line + "\n";
+      line = start;
+    }
+    line += fmt::format(" {}", word);
+    text.remove_prefix(std::min(space + 1, text.size()));
+  }
+  return line == start ? result : result + line + "\n";
+}
+
+std::string describe_field(const SettingField& field, const SettingField& default_field) {
+  std::string text = field.info.help;
+  if (!text.empty()) text += " ";
+  text += fmt::format("({}", printed_range(field));
+  if (*field.info.unit != '\0') text += fmt::format(", in {}", field.info.unit);
+  return text + fmt::format("; default {})", printed_value(default_field));
+}
+
 }  // namespace
 
 void read_settings(const std::vector<SettingField>& fields, const ConfigNode& config) {
   read_section(fields, config, "");
+}
+
+std::string settings_as_yaml(const std::vector<SettingField>& fields,
+                             const std::vector<SettingField>& defaults) {
+  WAYMARK_CHECK(fields.size() == defaults.size());
+  std::string yaml;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const std::string& key = fields[i].key;
+    const std::size_t indent =
+        2 * static_cast<std::size_t>(std::count(key.begin(), key.end(), '.'));
+    const std::string name = std::string(indent, ' ') + key.substr(key.rfind('.') + 1);
+    if (std::holds_alternative<Section>(fields[i].value)) {
+      if (!yaml.empty()) yaml += "\n";
+      yaml += comment(fields[i].info.help, indent) + name + ":\n";
+    } else {
+      yaml += comment(describe_field(fields[i], defaults[i]), indent);
+      yaml += fmt::format("{}: {}\n", name, printed_value(fields[i]));
+    }
+  }
+  return yaml;
+}
+
+std::string settings_as_markdown(const std::vector<SettingField>& fields) {
+  constexpr const char* kHead =
+      "| key | default | range | unit | meaning |\n|---|---|---|---|---|\n";
+  std::string text = kHead;
+  for (const SettingField& field : fields) {
+    if (std::holds_alternative<Section>(field.value)) {
+      text += fmt::format("\n## {}\n\n{}\n\n{}", field.key, field.info.help, kHead);
+    } else {
+      text += fmt::format("| `{}` | `{}` | {} | {} | {} |\n",
+                          field.key,
+                          printed_value(field),
+                          printed_range(field),
+                          field.info.unit,
+                          field.info.help);
+    }
+  }
+  return text;
 }
 
 }  // namespace waymark
