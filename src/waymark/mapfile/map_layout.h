@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <string_view>
+#include <type_traits>
 #include <vector>
 
 #include "waymark/base/id.h"
@@ -37,58 +38,25 @@ struct MapArrayLayout {
   std::vector<std::size_t> element_shape;
 };
 
+/// Of numbers, ids, vectors and matrices of fixed size, and descriptors.
 template <class T>
-MapArrayLayout map_array_layout();
-
-template <>
-inline MapArrayLayout map_array_layout<std::uint8_t>() {
-  return {"|u1", 1, {}};
-}
-template <>
-inline MapArrayLayout map_array_layout<std::uint32_t>() {
-  return {"<u4", 4, {}};
-}
-template <>
-inline MapArrayLayout map_array_layout<float>() {
-  return {"<f4", 4, {}};
-}
-template <>
-inline MapArrayLayout map_array_layout<double>() {
-  return {"<f8", 8, {}};
-}
-template <>
-inline MapArrayLayout map_array_layout<Eigen::Vector2f>() {
-  return {"<f4", 4, {2}};
-}
-template <>
-inline MapArrayLayout map_array_layout<Eigen::Vector3f>() {
-  return {"<f4", 4, {3}};
-}
-template <>
-inline MapArrayLayout map_array_layout<Eigen::Vector3d>() {
-  return {"<f8", 8, {3}};
-}
-/// Eigen keeps columns together: the transposed matrix in the order of C.
-template <>
-inline MapArrayLayout map_array_layout<Matrix23f>() {
-  return {"<f4", 4, {3, 2}};
-}
-/// Bit i of the descriptor is bit i % 8 of byte i / 8.
-template <>
-inline MapArrayLayout map_array_layout<Descriptor>() {
-  return {"|u1", 1, {32}};
-}
-template <>
-inline MapArrayLayout map_array_layout<KeyframeId>() {
-  return map_array_layout<std::uint32_t>();
-}
-template <>
-inline MapArrayLayout map_array_layout<LandmarkId>() {
-  return map_array_layout<std::uint32_t>();
-}
-template <>
-inline MapArrayLayout map_array_layout<SubmapId>() {
-  return map_array_layout<std::uint32_t>();
+MapArrayLayout map_array_layout() {
+  if constexpr (requires { typename T::Scalar; }) {
+    // Eigen keeps columns together: the transposed matrix in the order of C.
+    MapArrayLayout layout = map_array_layout<typename T::Scalar>();
+    if (T::ColsAtCompileTime > 1) layout.element_shape.push_back(T::ColsAtCompileTime);
+    layout.element_shape.push_back(T::RowsAtCompileTime);
+    return layout;
+  } else if constexpr (std::is_same_v<T, Descriptor>) {
+    return {"|u1", 1, {32}};  // Bit i of the descriptor is bit i % 8 of byte i / 8.
+  } else if constexpr (std::is_floating_point_v<T>) {
+    return {sizeof(T) == 4 ? "<f4" : "<f8", sizeof(T), {}};
+  } else if constexpr (std::is_same_v<T, std::uint8_t>) {
+    return {"|u1", 1, {}};
+  } else {
+    static_assert(std::is_same_v<T, std::uint32_t> || requires(T id) { id.is_valid(); });
+    return {"<u4", 4, {}};
+  }
 }
 
 static_assert(sizeof(Descriptor) == 32 && sizeof(Matrix23f) == 24 && sizeof(LandmarkId) == 4);

@@ -3,7 +3,6 @@
 #include "waymark/mapfile/map_record_writer.h"
 
 #include "waymark/mapfile/crc32c.h"
-#include "waymark/mapfile/msgpack.h"
 
 namespace waymark {
 
@@ -21,41 +20,6 @@ void MapRecordWriter::begin(std::string_view kind, std::uint64_t id) {
   add_text("kind", kind);
   add("id", id);
   ++counts_[std::string(kind)];
-}
-
-void MapRecordWriter::add(std::string_view key, std::uint64_t value) {
-  add_key(key);
-  pack_unsigned(body_, value);
-}
-
-void MapRecordWriter::add_signed(std::string_view key, std::int64_t value) {
-  add_key(key);
-  pack_signed(body_, value);
-}
-
-void MapRecordWriter::add_flag(std::string_view key, bool value) {
-  add_key(key);
-  pack_flag(body_, value);
-}
-
-void MapRecordWriter::add_text(std::string_view key, std::string_view value) {
-  add_key(key);
-  pack_text(body_, value);
-}
-
-void MapRecordWriter::add_bytes(std::string_view key, std::string_view value) {
-  add_key(key);
-  pack_bytes(body_, value);
-}
-
-void MapRecordWriter::add_number(std::string_view key, double value) {
-  add_key(key);
-  pack_number(body_, value);
-}
-
-void MapRecordWriter::add_numbers(std::string_view key, std::span<const double> values) {
-  add_key(key);
-  pack_numbers(body_, values);
 }
 
 void MapRecordWriter::add_transform(std::string_view key, const Rigid3& transform) {
@@ -90,14 +54,10 @@ void MapRecordWriter::write_counts() {
   end();
 }
 
-void MapRecordWriter::add_key(std::string_view key) {
+std::string& MapRecordWriter::add_key(std::string_view key) {
   ++num_keys_;
   pack_text(body_, key);
-}
-
-void MapRecordWriter::add_nothing(std::string_view key) {
-  add_key(key);
-  pack_nil(body_);
+  return body_;
 }
 
 void MapRecordWriter::add_raw_array(std::string_view key,

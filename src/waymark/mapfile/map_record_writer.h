@@ -12,6 +12,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/mapfile/map_layout.h"
+#include "waymark/mapfile/msgpack.h"
 
 namespace waymark {
 
@@ -25,18 +26,20 @@ class MapRecordWriter {
   void write_header(int version, std::string_view producer);
 
   void begin(std::string_view kind, std::uint64_t id);
-  void add(std::string_view key, std::uint64_t value);
-  void add_signed(std::string_view key, std::int64_t value);
-  void add_flag(std::string_view key, bool value);
-  void add_text(std::string_view key, std::string_view value);
-  void add_bytes(std::string_view key, std::string_view value);
-  void add_number(std::string_view key, double value);
-  void add_numbers(std::string_view key, std::span<const double> values);
+  void add(std::string_view key, std::uint64_t value) { pack_unsigned(add_key(key), value); }
+  void add_signed(std::string_view key, std::int64_t value) { pack_signed(add_key(key), value); }
+  void add_flag(std::string_view key, bool value) { pack_flag(add_key(key), value); }
+  void add_text(std::string_view key, std::string_view value) { pack_text(add_key(key), value); }
+  void add_bytes(std::string_view key, std::string_view value) { pack_bytes(add_key(key), value); }
+  void add_number(std::string_view key, double value) { pack_number(add_key(key), value); }
+  void add_numbers(std::string_view key, std::span<const double> values) {
+    pack_numbers(add_key(key), values);
+  }
   void add_transform(std::string_view key, const Rigid3& transform);
   /// nil where the id is invalid.
   template <class Tag>
   void add_id(std::string_view key, Id<Tag> id) {
-    id.is_valid() ? add(key, id.value) : add_nothing(key);
+    id.is_valid() ? add(key, id.value) : pack_nil(add_key(key));
   }
   template <class T>
   void add_array(std::string_view key, const std::vector<T>& values) {
@@ -51,8 +54,8 @@ class MapRecordWriter {
   void write_counts();
 
  private:
-  void add_key(std::string_view key);
-  void add_nothing(std::string_view key);
+  /// Begins a value; what it is goes to the bytes that come back.
+  std::string& add_key(std::string_view key);
   void add_raw_array(std::string_view key,
                      const MapArrayLayout& layout,
                      std::size_t count,

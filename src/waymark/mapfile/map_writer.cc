@@ -80,12 +80,11 @@ void write_submaps(MapRecordWriter& writer, const Map& map) {
   }
 }
 
-/// A column of a table of structs.
-template <class T, class Rows, class Get>
-std::vector<T> column(const Rows& rows, const Get& get) {
+/// A member of every keypoint.
+template <class T>
+std::vector<T> column(const std::vector<Keypoint>& keypoints, T Keypoint::*member) {
   std::vector<T> values;
-  values.reserve(rows.size());
-  for (const auto& row : rows) values.push_back(get(row));
+  for (const Keypoint& keypoint : keypoints) values.push_back(keypoint.*member);
   return values;
 }
 
@@ -99,18 +98,13 @@ void add_features(MapRecordWriter& writer, const Features& features) {
                 features.range_m.size() == features.num_primary &&
                 features.inverse_range_sigma.size() == features.num_primary);
   const std::vector<Keypoint>& keypoints = features.keypoints;
-  using Point = const Keypoint&;
-  writer.add_array("pixel", column<Eigen::Vector2f>(keypoints, [](Point point) {
-                     return Eigen::Vector2f(point.x_px, point.y_px);
-                   }));
-  writer.add_array("angle_rad",
-                   column<float>(keypoints, [](Point point) { return point.angle_rad; }));
-  writer.add_array("response",
-                   column<float>(keypoints, [](Point point) { return point.response; }));
-  writer.add_array("level",
-                   column<std::uint8_t>(keypoints, [](Point point) { return point.level; }));
-  writer.add_array("camera",
-                   column<std::uint8_t>(keypoints, [](Point point) { return point.camera; }));
+  std::vector<Eigen::Vector2f> pixels;
+  for (const Keypoint& keypoint : keypoints) pixels.emplace_back(keypoint.x_px, keypoint.y_px);
+  writer.add_array("pixel", pixels);
+  writer.add_array("angle_rad", column(keypoints, &Keypoint::angle_rad));
+  writer.add_array("response", column(keypoints, &Keypoint::response));
+  writer.add_array("level", column(keypoints, &Keypoint::level));
+  writer.add_array("camera", column(keypoints, &Keypoint::camera));
   writer.add_array("descriptor", features.descriptors);
   writer.add_array("bearing", features.bearings);
   writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing);
