@@ -4,15 +4,46 @@
 
 #include <cstddef>
 #include <memory>
+#include <utility>
 
+#include "waymark/base/rng.h"
 #include "waymark/map/map.h"
+#include "waymark/map/parts.h"
 
 namespace waymark {
+
+inline Descriptor random_descriptor(Rng& rng) {
+  return {rng.next(), rng.next(), rng.next(), rng.next()};
+}
+
+/// Each keyframe's own features, as if all of it had been seen.
+inline void copy_features(MapParts& parts, std::size_t num_recognised, Rng& rng) {
+  for (std::size_t i = 0; i < parts.keyframes.size(); ++i) {
+    Keyframe& keyframe = parts.keyframes[i].keyframe;
+    auto features = std::make_shared<Features>(*keyframe.features);
+    if (i >= num_recognised) {
+      for (Descriptor& descriptor : features->descriptors) descriptor = random_descriptor(rng);
+    }
+    keyframe.features = std::move(features);
+  }
+}
 
 /// A large map from a small one: it again and again, as further sub-maps, until there are so many
 /// keyframes.
 /// \param looks_alike  whether the copies have its descriptors; else they have random ones, so that
 ///                     nothing is recognised there.
-std::shared_ptr<const Map> repeat_map(const Map& map, std::size_t num_keyframes, bool looks_alike);
+inline std::shared_ptr<const Map> repeat_map(const Map& map,
+                                             std::size_t num_keyframes,
+                                             bool looks_alike) {
+  Rng rng(0, 0);
+  MapParts parts;
+  while (parts.keyframes.size() < num_keyframes) append_parts(map, parts);
+  copy_features(parts, looks_alike ? parts.keyframes.size() : map.keyframes().size(), rng);
+  const std::size_t num_landmarks = looks_alike ? parts.landmarks.size() : map.landmarks().size();
+  for (std::size_t i = num_landmarks; i < parts.landmarks.size(); ++i) {
+    parts.landmarks[i].landmark.appearance.descriptor = random_descriptor(rng);
+  }
+  return Map::restore(std::move(parts)).freeze();
+}
 
 }  // namespace waymark
