@@ -20,9 +20,8 @@ class TemporaryMap {
   /// rig: the one that sees the stream.
   TemporaryMap(std::shared_ptr<const Rig> rig, const MapSnapshot& lasting);
 
-  /// Both parts together.
+  /// The map that stays and what was added to it, together.
   const MapSnapshot& visible() const { return visible_; }
-  const MapSnapshot& lasting() const { return lasting_; }
 
   /// Adds a keyframe and makes landmarks of what it shows that no landmark explains yet.
   void add(const NewKeyframe& message);
