@@ -11,7 +11,6 @@
 #include <vector>
 
 #include "commands.h"
-#include "interrupt.h"
 #include "waymark/input/input.h"
 
 namespace waymark {

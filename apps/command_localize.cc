@@ -7,7 +7,6 @@
 
 #include "commands.h"
 #include "input_command.h"
-#include "interrupt.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/session.h"

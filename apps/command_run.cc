@@ -9,7 +9,6 @@
 
 #include "commands.h"
 #include "input_command.h"
-#include "interrupt.h"
 #include "live_control.h"
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"

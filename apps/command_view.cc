@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "commands.h"
-#include "interrupt.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/session_options.h"

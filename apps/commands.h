@@ -52,4 +52,11 @@ void add_choice(CLI::App& command,
       ->type_name("NAME");
 }
 
+/// From now on the first Ctrl-C or SIGTERM is remembered, and the second one ends the program at
+/// once with status 130.
+void catch_interrupts();
+
+/// Whether the user asked to end early.
+bool is_interrupted();
+
 }  // namespace waymark

@@ -1,9 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "interrupt.h"
-
 #include <signal.h>
 #include <unistd.h>
+
+#include "commands.h"
 
 namespace waymark {
 namespace {
