@@ -11,7 +11,6 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "session_config.h"
-#include "trajectory.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/system.h"

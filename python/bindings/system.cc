@@ -14,7 +14,6 @@
 #include "bindings.h"
 #include "frame_arguments.h"
 #include "session_config.h"
-#include "trajectory.h"
 
 namespace waymark::python {
 namespace {
