@@ -65,18 +65,16 @@ Its frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-lef
            [](auto& self) { return array_of(self.cam_from_rig); })
       .get("intrinsics",
            "list of float: as in a camchain.",
-           [](auto& self) {
-             return self.description ? self.description->intrinsics : std::vector<double>();
-           })
+           [](auto& self) { return self.description.value_or(CameraDescription()).intrinsics; })
       .get("distortion_model",
            "str: as in a camchain.",
            [](auto& self) {
-             return self.description ? self.description->distortion_model : std::string("none");
+             return self.description.value_or(CameraDescription()).distortion_model;
            })
       .get("distortion_coeffs",
            "list of float: as in a camchain.",
            [](auto& self) {
-             return self.description ? self.description->distortion_coeffs : std::vector<double>();
+             return self.description.value_or(CameraDescription()).distortion_coeffs;
            })
       .def("project", &project, py::arg("points_in_cam"), R"(project(self, points_in_cam)
 --

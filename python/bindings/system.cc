@@ -31,21 +31,101 @@ class PythonSystem {
  public:
   PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map);
 
-  TrackingResult feed(const py::object& timestamp_ns, const ImageArguments& images);
-  void finish();
-  void reset();
-  void set_mapping(bool is_on);
-  std::shared_ptr<PythonMap> map();
-  Trajectory trajectory();
-  std::vector<std::string> frame_states();
-  SystemStatistics statistics();
-  std::optional<FocalCheck> focal_check();
-  FrameDetails details();
-  void save(const std::filesystem::path& path);
+  TrackingResult feed(const py::object& timestamp_ns, const ImageArguments& images) {
+    const Turn turn = take();
+    expect_unfinished("feed");
+    const FrameArguments frame(images, config_.setup, config_.settings.depth);
+    if (config_.setup == Setup::kRgbd && !frame.has_depth() && system_.frame_states().empty()) {
+      fail_value("depth", images.depth, "the depth of the first frame in setup rgbd");
+    }
+    const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
+    TrackingResult result;
+    {
+      const py::gil_scoped_release release;
+      result = system_.feed(input);
+    }
+    // The first frame decides.
+    if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
+    return result;
+  }
+
+  void finish() {
+    const Turn turn = take();
+    const py::gil_scoped_release release;
+    system_.finish();
+    is_finished_ = true;
+  }
+
+  void reset() {
+    const Turn turn = take();
+    expect_unfinished("reset");
+    const py::gil_scoped_release release;
+    system_.reset();
+    images_.clear();
+  }
+
+  void set_mapping(bool is_on) {
+    const Turn turn = take();
+    expect_unfinished("set_mapping");
+    system_.set_mapping(is_on);
+  }
+
+  std::shared_ptr<PythonMap> map() {
+    const Turn turn = take();
+    const std::shared_ptr<const Map> newest = system_.map();
+    if (!last_map_ || last_map_->stored.map != newest) {
+      last_map_ = std::make_shared<PythonMap>();
+      last_map_->stored = {newest, settings_yaml_, images_};
+    }
+    return last_map_;
+  }
+
+  Trajectory trajectory() {
+    const Turn turn = take();
+    return {system_.trajectory()};
+  }
+
+  std::vector<std::string> frame_states() {
+    const Turn turn = take();
+    std::vector<std::string> names;
+    for (const FrameState state : system_.frame_states()) names.emplace_back(to_string(state));
+    return names;
+  }
+
+  SystemStatistics statistics() {
+    const Turn turn = take();
+    if (!is_finished_)
+      throw std::runtime_error("System: statistics() before finish(), expected after");
+    return system_.statistics();
+  }
+
+  std::optional<FocalCheck> focal_check() {
+    const Turn turn = take();
+    const FocalCheck* check = system_.focal_check();
+    return check ? std::optional(*check) : std::nullopt;
+  }
+
+  FrameDetails details() {
+    const Turn turn = take();
+    return system_.details();
+  }
+
+  void save(const std::filesystem::path& path) {
+    const std::shared_ptr<PythonMap> newest = map();
+    const py::gil_scoped_release release;
+    save_map(path, newest->stored);
+  }
+
   bool is_finished() const { return is_finished_; }
 
  private:
-  void expect_unfinished(const char* method) const;
+  void expect_unfinished(const char* method) const {
+    if (is_finished_) {
+      throw std::runtime_error(std::string("System: ") + method +
+                               "() after finish(), expected before");
+    }
+  }
+
   Turn take() { return Turn(is_taken_, "System"); }
 
   SessionConfig config_;
@@ -62,98 +142,6 @@ PythonSystem::PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<
       settings_yaml_(settings_as_yaml(config_.settings)),
       system_(config_.rig, config_.settings, timing, map ? map->stored.map : nullptr) {
   if (map) images_ = map->stored.images;
-}
-
-void PythonSystem::expect_unfinished(const char* method) const {
-  if (is_finished_) {
-    throw std::runtime_error(std::string("System: ") + method +
-                             "() after finish(), expected before");
-  }
-}
-
-TrackingResult PythonSystem::feed(const py::object& timestamp_ns, const ImageArguments& images) {
-  const Turn turn = take();
-  expect_unfinished("feed");
-  const FrameArguments frame(images, config_.setup, config_.settings.depth);
-  if (config_.setup == Setup::kRgbd && !frame.has_depth() && system_.frame_states().empty()) {
-    fail_value("depth", images.depth, "the depth of the first frame in setup rgbd");
-  }
-  const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
-  TrackingResult result;
-  {
-    const py::gil_scoped_release release;
-    result = system_.feed(input);
-  }
-  // The first frame decides.
-  if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
-  return result;
-}
-
-void PythonSystem::finish() {
-  const Turn turn = take();
-  const py::gil_scoped_release release;
-  system_.finish();
-  is_finished_ = true;
-}
-
-void PythonSystem::reset() {
-  const Turn turn = take();
-  expect_unfinished("reset");
-  const py::gil_scoped_release release;
-  system_.reset();
-  images_.clear();
-}
-
-void PythonSystem::set_mapping(bool is_on) {
-  const Turn turn = take();
-  expect_unfinished("set_mapping");
-  system_.set_mapping(is_on);
-}
-
-std::shared_ptr<PythonMap> PythonSystem::map() {
-  const Turn turn = take();
-  const std::shared_ptr<const Map> newest = system_.map();
-  if (!last_map_ || last_map_->stored.map != newest) {
-    last_map_ = std::make_shared<PythonMap>();
-    last_map_->stored = {newest, settings_yaml_, images_};
-  }
-  return last_map_;
-}
-
-Trajectory PythonSystem::trajectory() {
-  const Turn turn = take();
-  return {system_.trajectory()};
-}
-
-std::vector<std::string> PythonSystem::frame_states() {
-  const Turn turn = take();
-  std::vector<std::string> names;
-  for (const FrameState state : system_.frame_states()) names.emplace_back(to_string(state));
-  return names;
-}
-
-SystemStatistics PythonSystem::statistics() {
-  const Turn turn = take();
-  if (!is_finished_)
-    throw std::runtime_error("System: statistics() before finish(), expected after");
-  return system_.statistics();
-}
-
-std::optional<FocalCheck> PythonSystem::focal_check() {
-  const Turn turn = take();
-  const FocalCheck* check = system_.focal_check();
-  return check ? std::optional(*check) : std::nullopt;
-}
-
-FrameDetails PythonSystem::details() {
-  const Turn turn = take();
-  return system_.details();
-}
-
-void PythonSystem::save(const std::filesystem::path& path) {
-  const std::shared_ptr<PythonMap> newest = map();
-  const py::gil_scoped_release release;
-  save_map(path, newest->stored);
 }
 
 std::unique_ptr<PythonSystem> make_system(const py::object& cameras,

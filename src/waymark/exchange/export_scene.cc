@@ -47,68 +47,63 @@ class SceneBuilder {
  public:
   SceneBuilder(const Map& map, SubmapId submap) : map_(map), submap_(submap) {}
 
-  ExportScene build();
+  ExportScene build() {
+    map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      if (keyframe.submap == submap_) add_view(id, keyframe);
+    });
+    map_.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+      if (landmark.submap == submap_) add_point(id, landmark);
+    });
+    return std::move(scene_);
+  }
 
  private:
-  void add_view(KeyframeId id, const Keyframe& keyframe);
-  void add_point(LandmarkId id, const Landmark& landmark);
+  void add_view(KeyframeId id, const Keyframe& keyframe) {
+    ExportView view;
+    view.name = fmt::format("{:06}_{}.jpg", id.value, keyframe.timestamp_ns);
+    view.keyframe = id;
+    view.camera = index_of(keyframe.rig->cameras[0], scene_.cameras);
+    view.cam_from_world = keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+    const Features& features = *keyframe.features;
+    for (std::size_t i = 0; i < features.num_primary; ++i) {
+      view.pixels.emplace_back(features.keypoints[i].x_px, features.keypoints[i].y_px);
+    }
+    view.points.assign(features.num_primary, kNoPoint);
+    view_of_[id] = static_cast<std::uint32_t>(scene_.views.size());
+    scene_.views.push_back(std::move(view));
+  }
+
+  void add_point(LandmarkId id, const Landmark& landmark) {
+    ExportPoint point;
+    point.landmark = id;
+    point.position_in_world = landmark.position_in_world;
+    KeyframeId last;
+    for (const Observation& observation : landmark.observations) {
+      const std::uint32_t view_index = view_of_.at(observation.keyframe);
+      const ExportView& view = scene_.views[view_index];
+      if (observation.feature >= view.pixels.size() || observation.keyframe == last) continue;
+      const Camera& camera = *map_.keyframes().at(observation.keyframe).rig->cameras[0].camera;
+      const std::optional<double> error = reprojection_error(
+          camera, view.cam_from_world * point.position_in_world, view.pixels[observation.feature]);
+      if (!error || *error > kMaxExportErrorPx) continue;
+      point.sightings.push_back({view_index, observation.feature});
+      point.error_px += *error;
+      last = observation.keyframe;
+    }
+    if (point.sightings.size() < 2) return;
+    point.error_px /= static_cast<double>(point.sightings.size());
+    for (const ExportSighting& sighting : point.sightings) {
+      scene_.views[sighting.view].points[sighting.feature] =
+          static_cast<std::uint32_t>(scene_.points.size());
+    }
+    scene_.points.push_back(std::move(point));
+  }
 
   const Map& map_;
   SubmapId submap_;
   ExportScene scene_;
   std::map<KeyframeId, std::uint32_t> view_of_;
 };
-
-ExportScene SceneBuilder::build() {
-  map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.submap == submap_) add_view(id, keyframe);
-  });
-  map_.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
-    if (landmark.submap == submap_) add_point(id, landmark);
-  });
-  return std::move(scene_);
-}
-
-void SceneBuilder::add_view(KeyframeId id, const Keyframe& keyframe) {
-  ExportView view;
-  view.name = fmt::format("{:06}_{}.jpg", id.value, keyframe.timestamp_ns);
-  view.keyframe = id;
-  view.camera = index_of(keyframe.rig->cameras[0], scene_.cameras);
-  view.cam_from_world = keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
-  const Features& features = *keyframe.features;
-  for (std::size_t i = 0; i < features.num_primary; ++i) {
-    view.pixels.emplace_back(features.keypoints[i].x_px, features.keypoints[i].y_px);
-  }
-  view.points.assign(features.num_primary, kNoPoint);
-  view_of_[id] = static_cast<std::uint32_t>(scene_.views.size());
-  scene_.views.push_back(std::move(view));
-}
-
-void SceneBuilder::add_point(LandmarkId id, const Landmark& landmark) {
-  ExportPoint point;
-  point.landmark = id;
-  point.position_in_world = landmark.position_in_world;
-  KeyframeId last;
-  for (const Observation& observation : landmark.observations) {
-    const std::uint32_t view_index = view_of_.at(observation.keyframe);
-    const ExportView& view = scene_.views[view_index];
-    if (observation.feature >= view.pixels.size() || observation.keyframe == last) continue;
-    const Camera& camera = *map_.keyframes().at(observation.keyframe).rig->cameras[0].camera;
-    const std::optional<double> error = reprojection_error(
-        camera, view.cam_from_world * point.position_in_world, view.pixels[observation.feature]);
-    if (!error || *error > kMaxExportErrorPx) continue;
-    point.sightings.push_back({view_index, observation.feature});
-    point.error_px += *error;
-    last = observation.keyframe;
-  }
-  if (point.sightings.size() < 2) return;
-  point.error_px /= static_cast<double>(point.sightings.size());
-  for (const ExportSighting& sighting : point.sightings) {
-    scene_.views[sighting.view].points[sighting.feature] =
-        static_cast<std::uint32_t>(scene_.points.size());
-  }
-  scene_.points.push_back(std::move(point));
-}
 
 /// The mean of what the images show of each point.
 void color_points(const KeyframeImages& images, ExportScene& scene) {

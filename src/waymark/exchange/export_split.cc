@@ -116,93 +116,84 @@ class Splitter {
     }
   }
 
-  SplitScene split();
+  SplitScene split() {
+    for (const ExportView& view : scene_.views) {
+      const std::vector<SplitPart>& parts = parts_[view.camera];
+      if (parts.empty()) {
+        keep(view);
+        continue;
+      }
+      std::vector<Eigen::Vector3d> bearings(view.pixels.size());
+      std::vector<std::uint8_t> has_bearing(view.pixels.size());
+      parts.front().camera->unproject(view.pixels, bearings, has_bearing);
+      for (std::size_t i = 0; i < parts.size(); ++i) add_part(view, bearings, has_bearing, i);
+    }
+    finish_points();
+    return std::move(result_);
+  }
 
  private:
-  void keep(const ExportView& view);
+  void keep(const ExportView& view) {
+    result_.scene.views.push_back(view);
+    result_.scene.views.back().camera = first_camera_[view.camera];
+    result_.parts.emplace_back();
+  }
+
   void add_part(const ExportView& view,
                 const std::vector<Eigen::Vector3d>& bearings,
                 const std::vector<std::uint8_t>& has_bearing,
-                std::size_t part);
-  void finish_points();
+                std::size_t part) {
+    const SplitPart& split = parts_[view.camera][part];
+    const PerspectiveModel model = perspective_of(split);
+    ExportView added;
+    added.name = fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
+    if (!split.sees_all) added.mask_name = added.name + ".png";
+    added.keyframe = view.keyframe;
+    added.camera = first_camera_[view.camera];
+    added.cam_from_world =
+        Rigid3(split.part_from_camera, Eigen::Vector3d::Zero()) * view.cam_from_world;
+    const double end_px = split.size_px - 0.5;
+    for (std::size_t i = 0; i < bearings.size(); ++i) {
+      if (!has_bearing[i]) continue;
+      const std::optional<Eigen::Vector2d> pixel =
+          model.project(split.part_from_camera * bearings[i]);
+      if (!pixel || pixel->minCoeff() < -0.5 || !(pixel->maxCoeff() < end_px)) continue;
+      added.pixels.push_back(*pixel);
+      added.points.push_back(view.points[i]);
+    }
+    result_.scene.views.push_back(std::move(added));
+    result_.parts.emplace_back(split);
+  }
+
+  /// Points with the sightings of the parts; those that no part sees twice go.
+  void finish_points() {
+    ExportScene& scene = result_.scene;
+    std::vector<ExportPoint> points = scene_.points;
+    for (ExportPoint& point : points) point.sightings.clear();
+    for (std::uint32_t v = 0; v < scene.views.size(); ++v) {
+      for (std::uint32_t i = 0; i < scene.views[v].points.size(); ++i) {
+        const std::uint32_t point = scene.views[v].points[i];
+        if (point != kNoPoint) points[point].sightings.push_back({v, i});
+      }
+    }
+    std::vector<std::uint32_t> new_index(points.size(), kNoPoint);
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      if (points[i].sightings.size() < 2) continue;
+      new_index[i] = static_cast<std::uint32_t>(scene.points.size());
+      scene.points.push_back(std::move(points[i]));
+    }
+    for (ExportView& view : scene.views) {
+      for (std::uint32_t& point : view.points) {
+        if (point != kNoPoint) point = new_index[point];
+      }
+    }
+  }
 
   const ExportScene& scene_;
   std::vector<std::vector<SplitPart>> parts_;  // Per camera; none where it is perspective.
   std::vector<std::size_t> first_camera_;
   SplitScene result_;
 };
-
-SplitScene Splitter::split() {
-  for (const ExportView& view : scene_.views) {
-    const std::vector<SplitPart>& parts = parts_[view.camera];
-    if (parts.empty()) {
-      keep(view);
-      continue;
-    }
-    std::vector<Eigen::Vector3d> bearings(view.pixels.size());
-    std::vector<std::uint8_t> has_bearing(view.pixels.size());
-    parts.front().camera->unproject(view.pixels, bearings, has_bearing);
-    for (std::size_t i = 0; i < parts.size(); ++i) add_part(view, bearings, has_bearing, i);
-  }
-  finish_points();
-  return std::move(result_);
-}
-
-void Splitter::keep(const ExportView& view) {
-  result_.scene.views.push_back(view);
-  result_.scene.views.back().camera = first_camera_[view.camera];
-  result_.parts.emplace_back();
-}
-
-void Splitter::add_part(const ExportView& view,
-                        const std::vector<Eigen::Vector3d>& bearings,
-                        const std::vector<std::uint8_t>& has_bearing,
-                        std::size_t part) {
-  const SplitPart& split = parts_[view.camera][part];
-  const PerspectiveModel model = perspective_of(split);
-  ExportView added;
-  added.name = fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
-  if (!split.sees_all) added.mask_name = added.name + ".png";
-  added.keyframe = view.keyframe;
-  added.camera = first_camera_[view.camera];
-  added.cam_from_world =
-      Rigid3(split.part_from_camera, Eigen::Vector3d::Zero()) * view.cam_from_world;
-  const double end_px = split.size_px - 0.5;
-  for (std::size_t i = 0; i < bearings.size(); ++i) {
-    if (!has_bearing[i]) continue;
-    const std::optional<Eigen::Vector2d> pixel =
-        model.project(split.part_from_camera * bearings[i]);
-    if (!pixel || pixel->minCoeff() < -0.5 || !(pixel->maxCoeff() < end_px)) continue;
-    added.pixels.push_back(*pixel);
-    added.points.push_back(view.points[i]);
-  }
-  result_.scene.views.push_back(std::move(added));
-  result_.parts.emplace_back(split);
-}
-
-/// Points with the sightings of the parts; those that no part sees twice go.
-void Splitter::finish_points() {
-  ExportScene& scene = result_.scene;
-  std::vector<ExportPoint> points = scene_.points;
-  for (ExportPoint& point : points) point.sightings.clear();
-  for (std::uint32_t v = 0; v < scene.views.size(); ++v) {
-    for (std::uint32_t i = 0; i < scene.views[v].points.size(); ++i) {
-      const std::uint32_t point = scene.views[v].points[i];
-      if (point != kNoPoint) points[point].sightings.push_back({v, i});
-    }
-  }
-  std::vector<std::uint32_t> new_index(points.size(), kNoPoint);
-  for (std::size_t i = 0; i < points.size(); ++i) {
-    if (points[i].sightings.size() < 2) continue;
-    new_index[i] = static_cast<std::uint32_t>(scene.points.size());
-    scene.points.push_back(std::move(points[i]));
-  }
-  for (ExportView& view : scene.views) {
-    for (std::uint32_t& point : view.points) {
-      if (point != kNoPoint) point = new_index[point];
-    }
-  }
-}
 
 /// Between the four pixels around; columns go on at the other side where they repeat.
 Rgb sample(const ColorImage& image, const Eigen::Vector2d& pixel, bool wraps) {
