@@ -9,7 +9,6 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/input/color_frame.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"

@@ -2,12 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-// What InputOptions ask of every kind of input: calibration, choice of frames, masks.
+// What kinds of input have in common: calibration, choice of frames, masks, grey images.
 
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <opencv2/core.hpp>
 #include <optional>
 #include <string>
 #include <vector>
@@ -99,5 +100,9 @@ class MaskSource {
   std::optional<Image> fixed_;
   std::map<std::string, std::filesystem::path> by_name_;
 };
+
+/// A frame of a video or a camera in grey; nothing if it has not 8 bits per channel or an odd
+/// number of channels.
+std::optional<Image> grey_of(const cv::Mat& frame);
 
 }  // namespace waymark

@@ -10,7 +10,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/color_frame.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
