@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/openvslam_features.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/exchange/openvslam_records.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
 

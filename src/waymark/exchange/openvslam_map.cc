@@ -13,7 +13,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/openvslam_features.h"
 #include "waymark/exchange/openvslam_records.h"
 #include "waymark/mapping/appearance.h"
 

@@ -6,13 +6,16 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 #include <map>
+#include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "waymark/camera/rig.h"
 #include "waymark/exchange/openvslam_camera.h"
 #include "waymark/image/features.h"
+#include "waymark/input/input.h"
 
 namespace waymark {
 
@@ -58,5 +61,26 @@ struct OpenvslamRecords {
 /// Reads both the keys of stella_vslam and those of OpenVSLAM of 2019 and 2020. Throws InputError
 /// for whatever is missing, malformed or beyond all bounds; name is what errors call the file.
 OpenvslamRecords read_openvslam_records(std::string_view bytes, const std::string& name);
+
+/// What the key points of a keyframe were seen by.
+struct OpenvslamView {
+  OpenvslamPyramid pyramid;
+  Setup setup = Setup::kMono;
+  std::shared_ptr<const Rig> rig;
+  /// Of camera 0; nothing where key points are pixels of the camera itself (equirectangular).
+  std::vector<double> undistorted_intrinsics;
+  std::string where;  ///< Begins error messages.
+};
+
+struct OpenvslamFeatures {
+  std::shared_ptr<const Features> features;
+  std::vector<std::uint32_t> feature_of_keypoint;  ///< kNoFeature where it has no bearing.
+};
+
+/// The key points of a keyframe as our features: distorted again, with the level of our pyramid
+/// that comes next to theirs, and with what follows from the camera computed by our own code. Key
+/// points that the camera cannot have seen are left out.
+OpenvslamFeatures convert_openvslam_features(const OpenvslamKeyframe& keyframe,
+                                             const OpenvslamView& view);
 
 }  // namespace waymark
