@@ -76,11 +76,7 @@ PreparedInput prepare_input(const SessionOptions& options) {
 }
 
 Session open_session(const SessionOptions& options) {
-  PreparedInput prepared = prepare_input(options);
-  Session session;
-  session.input = std::move(prepared.input);
-  session.settings = std::move(prepared.settings);
-  session.description = std::move(prepared.description);
+  Session session{prepare_input(options), {}, nullptr};
   std::shared_ptr<const Map> map;
   if (!options.map_in.empty()) {
     StoredMap stored = load_map(options.map_in);
@@ -93,8 +89,8 @@ Session open_session(const SessionOptions& options) {
     }
     session.description.push_back(describe(*map, options.map_in));
   }
-  session.system = std::make_unique<System>(
-      std::move(prepared.rig), session.settings, options.timing, std::move(map));
+  session.system =
+      std::make_unique<System>(session.rig, session.settings, options.timing, std::move(map));
   return session;
 }
 

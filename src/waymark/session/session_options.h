@@ -36,12 +36,9 @@ struct PreparedInput {
 };
 
 /// An input and the system to feed it to.
-struct Session {
-  std::unique_ptr<Input> input;
+struct Session : PreparedInput {
   KeyframeImages images;  ///< Of the map to go on in.
-  Settings settings;
   std::unique_ptr<System> system;
-  std::vector<std::string> description;  ///< What was understood, in words.
 };
 
 /// What is in a map, in words.
