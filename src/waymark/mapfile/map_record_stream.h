@@ -25,8 +25,6 @@ class MapRecordStream {
   bool is_at_end();
   /// The kind of the last record; empty for the header, which has none.
   const std::string& kind() const { return kind_; }
-  /// Its id; 0 where it has none.
-  std::uint64_t id() const { return id_; }
 
  private:
   bool read_more();
@@ -43,7 +41,7 @@ class MapRecordStream {
   std::uint64_t num_bytes_ = 0;  // Of the file before the buffer.
   std::uint64_t num_records_ = 0;
   std::string kind_;
-  std::uint64_t id_ = 0;
+  std::uint64_t id_ = 0;  // 0 where it has none.
 };
 
 }  // namespace waymark
