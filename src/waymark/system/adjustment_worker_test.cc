@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/system/adjustment_worker.h"
-
 #include <gtest/gtest.h>
 
 #include "waymark/base/check.h"
+#include "waymark/system/workers.h"
 
 namespace waymark {
 namespace {

@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/system/map_worker.h"
-
 #include <gtest/gtest.h>
 
 #include <stdexcept>
+
+#include "waymark/system/workers.h"
 
 namespace waymark {
 namespace {

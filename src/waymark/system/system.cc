@@ -8,8 +8,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/system/adjustment_worker.h"
-#include "waymark/system/map_worker.h"
+#include "waymark/system/workers.h"
 #include "waymark/track/tracker.h"
 #include "waymark/track/trajectory_memory.h"
 
