@@ -10,6 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
 
 namespace waymark {
 namespace {
@@ -72,6 +73,16 @@ std::vector<std::filesystem::path> list_files(const std::filesystem::path& folde
   std::vector<std::filesystem::path> paths;
   for (const std::string& name : names) paths.push_back(folder / name);
   return paths;
+}
+
+constexpr std::int64_t kAssumedRateHz = 30;
+
+std::filesystem::path find_image_times(const std::filesystem::path& images) {
+  for (const std::filesystem::path& folder : {images, images / ".."}) {
+    const std::filesystem::path candidate = (folder / "times.txt").lexically_normal();
+    if (std::filesystem::exists(candidate)) return candidate;
+  }
+  return {};
 }
 
 }  // namespace
@@ -139,6 +150,33 @@ std::string describe_rate(const std::vector<std::int64_t>& times_ns) {
   const double rate_hz = static_cast<double>(times_ns.size() - 1) / duration_s;
   return fmt::format(
       "{} frames over {:.1f} s, {:.4g} per second", times_ns.size(), duration_s, rate_hz);
+}
+
+Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options) {
+  Listing listing;
+  listing.format = "images";
+  listing.title = "folder of images";
+  listing.setup = choose_setup(folder, {Setup::kMono}, options.setup);
+
+  const bool is_nested = std::filesystem::is_directory(folder / "images");
+  const std::filesystem::path images_folder = is_nested ? folder / "images" : folder;
+  const std::vector<std::filesystem::path> images = list_images(images_folder);
+  const std::filesystem::path times_path = find_image_times(images_folder);
+  std::vector<std::int64_t> times_ns;
+  if (times_path.empty()) {
+    for (std::size_t i = 0; i < images.size(); ++i) {
+      times_ns.push_back(static_cast<std::int64_t>(i) * 1'000'000'000 / kAssumedRateHz);
+    }
+    listing.notes.push_back(
+        fmt::format("no times.txt: {} images per second assumed", kAssumedRateHz));
+  } else {
+    times_ns = read_times(times_path, images.size(), images_folder.string());
+    listing.notes.push_back(fmt::format("times from {}", times_path.string()));
+  }
+  for (std::size_t i = 0; i < images.size(); ++i) {
+    listing.frames.push_back({times_ns[i], {images[i]}, {}});
+  }
+  return listing;
 }
 
 }  // namespace waymark
