@@ -9,9 +9,9 @@
 #include <utility>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "session_config.h"
 #include "waymark/camera/rig.h"
 
 namespace waymark::python {

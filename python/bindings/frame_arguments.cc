@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "frame_arguments.h"
-
 #include <limits>
 #include <string>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "waymark/image/convert.h"
 

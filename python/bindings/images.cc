@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "session_config.h"
 #include "waymark/base/check.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/input.h"

@@ -7,10 +7,9 @@
 #include <memory>
 #include <utility>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "frame_arguments.h"
-#include "session_config.h"
 
 namespace waymark::python {
 namespace {

@@ -8,10 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "frame_arguments.h"
-#include "session_config.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 

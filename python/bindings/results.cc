@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "session_config.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/system.h"

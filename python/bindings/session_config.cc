@@ -1,9 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "session_config.h"
-
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"

@@ -10,10 +10,9 @@
 #include <utility>
 #include <vector>
 
+#include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
-#include "frame_arguments.h"
-#include "session_config.h"
 
 namespace waymark::python {
 namespace {
