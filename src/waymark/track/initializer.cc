@@ -23,6 +23,8 @@ constexpr std::uint32_t kReferenceInterval = 3;
 /// points are then known to a tenth of their depth and the pair to much better.
 constexpr double kMinParallaxPx = 12.0;
 constexpr double kSearchRadiusPx = 60.0;
+/// What noise moves a feature by at most; a camera at rest shows no more.
+constexpr double kRestPx = kMinParallaxPx / 4;
 
 /// Primary features whose range has at most this relative standard deviation.
 std::vector<std::uint32_t> features_with_range(const Rig& rig,
@@ -188,6 +190,10 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
     return static_cast<int>(reference.matches.size()) < kMinLandmarks;
   });
   for (const Reference& reference : references_) {
+    if (!has_moved(reference, frame)) {
+      reason_ = FrameReason::kTooLittleParallax;
+      continue;
+    }
     if (std::optional<Initialization> start = try_pair(reference, frame)) {
       fill(reference, *start);
       reason_ = FrameReason::kNone;
@@ -196,7 +202,8 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
   }
   passed_.push_back(frame);
   if (references_.empty() ||
-      frame.id.value - references_.back().frame.id.value >= kReferenceInterval) {
+      (frame.id.value - references_.back().frame.id.value >= kReferenceInterval &&
+       has_moved(references_.back(), frame))) {
     references_.push_back({frame, pixels_of(*frame.features), {}});
     if (references_.size() > kMaxReferences) references_.erase(references_.begin() + 1);
   }
@@ -217,6 +224,14 @@ void Initializer::match(Reference& reference, const Frame& frame) {
     const Keypoint& keypoint = frame.features->keypoints[match.b];
     reference.expected_pixels[match.a] = {keypoint.x_px, keypoint.y_px};
   }
+}
+
+bool Initializer::has_moved(const Reference& reference, const Frame& frame) const {
+  const auto moved = [&](const FeatureMatch& match) {
+    const Eigen::Vector3f& before = reference.frame.features->bearings[match.a];
+    return (frame.features->bearings[match.b] - before).norm() >= kRestPx * pixel_rad_;
+  };
+  return std::count_if(reference.matches.begin(), reference.matches.end(), moved) >= kMinLandmarks;
 }
 
 std::optional<Initialization> Initializer::try_pair(const Reference& reference,
