@@ -43,15 +43,10 @@ std::vector<Vote> count_votes(const Map& map, std::span<const LandmarkId> seen) 
 void add_neighbours(const Map& map, std::vector<KeyframeId>& keyframes) {
   const std::size_t num_observers = keyframes.size();
   for (std::size_t i = 0; i < num_observers && keyframes.size() < kMaxKeyframes; ++i) {
-    std::vector<CovisibilityEdge> edges = map.covisible(keyframes[i]);
-    std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
-      return a.num_shared > b.num_shared;
-    });
-    if (edges.size() > kNeighboursPerObserver) edges.resize(kNeighboursPerObserver);
-    for (const CovisibilityEdge& edge : edges) {
+    for (KeyframeId id : strongest_neighbours(map, keyframes[i], kNeighboursPerObserver)) {
       if (keyframes.size() == kMaxKeyframes) break;
-      if (std::find(keyframes.begin(), keyframes.end(), edge.keyframe) == keyframes.end()) {
-        keyframes.push_back(edge.keyframe);
+      if (std::find(keyframes.begin(), keyframes.end(), id) == keyframes.end()) {
+        keyframes.push_back(id);
       }
     }
   }

@@ -31,20 +31,6 @@ constexpr double kGuessRadiusPx = 40.0;
 constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio = 0.9};
 constexpr int kMinInliers = 30;
 
-void collect_strongest_neighbours(const Map& map,
-                                  KeyframeId candidate,
-                                  std::vector<KeyframeId>& keyframes) {
-  std::vector<CovisibilityEdge> edges = map.covisible(candidate);
-  std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
-    return a.num_shared > b.num_shared;
-  });
-  keyframes = {candidate};
-  for (const CovisibilityEdge& edge : edges) {
-    if (keyframes.size() == kNumMatchedKeyframes) break;
-    keyframes.push_back(edge.keyframe);
-  }
-}
-
 }  // namespace
 
 PlaceLocator::PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed)
@@ -54,7 +40,8 @@ std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  const Map& map,
                                                  KeyframeId candidate,
                                                  std::uint64_t stream) {
-  collect_strongest_neighbours(map, candidate, matched_keyframes_);
+  matched_keyframes_ = strongest_neighbours(map, candidate, kNumMatchedKeyframes - 1);
+  matched_keyframes_.insert(matched_keyframes_.begin(), candidate);
   std::optional<LocatedPlace> place =
       refine(features, map, candidate, stream, match_by_appearance(features, map));
   if (place && place->confidence < kMinConfidence) {
