@@ -9,6 +9,7 @@
 #include "waymark/geometry/two_view.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
+#include "waymark/track/search_radius.h"
 
 namespace waymark {
 namespace {
@@ -22,7 +23,9 @@ constexpr std::uint32_t kReferenceInterval = 3;
 /// Least parallax of a pair, in pixels of the full image: with about one pixel of noise, single
 /// points are then known to a tenth of their depth and the pair to much better.
 constexpr double kMinParallaxPx = 12.0;
-constexpr double kSearchRadiusPx = 60.0;
+/// Part of the side of the image by which a feature may move between frames: four times what the
+/// tracker's prediction errs by, as here nothing is predicted (docs/decisions.md).
+constexpr double kSearchPart = 0.1;
 /// What noise moves a feature by at most; a camera at rest shows no more.
 constexpr double kRestPx = kMinParallaxPx / 4;
 
@@ -155,6 +158,7 @@ Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::ui
       has_range_(has_range),
       seed_(seed),
       pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
+      search_radius_px_(search_radius_px(*rig->cameras.at(0).camera, kSearchPart)),
       projection_(rig) {}
 
 std::optional<Initialization> Initializer::add(const Frame& frame) {
@@ -216,7 +220,7 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
 void Initializer::match(Reference& reference, const Frame& frame) {
   const auto matches = appearance_.match_near(*reference.frame.features,
                                               reference.expected_pixels,
-                                              kSearchRadiusPx,
+                                              search_radius_px_,
                                               *frame.features,
                                               {.max_distance = 60, .max_ratio = 0.85});
   reference.matches.assign(matches.begin(), matches.end());
@@ -298,7 +302,7 @@ std::optional<Rigid3> Initializer::locate(const Frame& frame,
                                           const Rigid3& guess,
                                           const LandmarkSet& landmarks) {
   const ProjectionMatches& matches =
-      projection_.match(landmarks, *frame.features, {}, guess, {.radius_px = kSearchRadiusPx / 2});
+      projection_.match(landmarks, *frame.features, {}, guess, {.radius_px = search_radius_px_ / 2});
   PoseObservations observations;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;

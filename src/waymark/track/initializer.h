@@ -63,7 +63,8 @@ class Initializer {
   const std::shared_ptr<const Rig> rig_;
   const bool has_range_;
   const std::uint64_t seed_;
-  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
+  const double pixel_rad_;         ///< Angle of a pixel at the image centre.
+  const double search_radius_px_;  ///< Around where a feature was last seen.
   FrameReason reason_ = FrameReason::kNone;
   AppearanceMatcher appearance_;
   ProjectionMatcher projection_;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -91,6 +92,7 @@ class Tracker {
   FrameLocator locator_;
   Relocalizer relocalizer_;
   KeyframeAssessor keyframe_assessor_;
+  const std::array<double, 2> search_radii_px_;  ///< Around a prediction, and when that fails.
 
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;
