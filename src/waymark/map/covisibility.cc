@@ -1,49 +1,50 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/map/covisibility.h"
-
 #include <algorithm>
+#include <functional>
 #include <utility>
 
 #include "waymark/map/map.h"
 
 namespace waymark {
 
-Covisibility CovisibilityCounter::count(KeyframeId id, const Keyframe& keyframe) {
-  seen_.clear();
-  for (const LandmarkId landmark : keyframe.landmarks) {
-    if (landmark.is_valid()) seen_.push_back(landmark);
-  }
-  std::sort(seen_.begin(), seen_.end());
-  seen_.erase(std::unique(seen_.begin(), seen_.end()), seen_.end());
-  Covisibility result;
-  for (const LandmarkId landmark_id : seen_) {
-    const Landmark* landmark = landmarks_.find(landmark_id);
-    if (!landmark) continue;
-    KeyframeId last;
-    for (const Observation& observation : landmark->observations) {
-      const KeyframeId other = observation.keyframe;
-      if (other == last || other == id || !keyframes_.contains(other)) continue;
-      last = other;
-      if (num_shared_[other.value]++ == 0) result.edges.push_back({other, 0});
+CowTable<KeyframeId, Covisibility> Map::count_covisibility() const {
+  CowTable<KeyframeId, Covisibility> counted;
+  std::vector<std::uint32_t> num_shared(keyframes_.end_id().value, 0);
+  keyframes_.for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    std::vector<LandmarkId> seen = keyframe.landmarks;
+    std::erase(seen, LandmarkId{});
+    std::sort(seen.begin(), seen.end());
+    seen.erase(std::unique(seen.begin(), seen.end()), seen.end());
+    std::vector<CovisibilityEdge> edges;
+    for (const LandmarkId landmark_id : seen) {
+      const Landmark* landmark = landmarks_.find(landmark_id);
+      if (!landmark) continue;
+      KeyframeId last;
+      for (const Observation& observation : landmark->observations) {
+        const KeyframeId other = observation.keyframe;
+        if (other == last || other == id || !keyframes_.contains(other)) continue;
+        last = other;
+        if (num_shared[other.value]++ == 0) edges.push_back({other, 0});
+      }
     }
-  }
-  std::sort(
-      result.edges.begin(),
-      result.edges.end(),
-      [](const CovisibilityEdge& a, const CovisibilityEdge& b) { return a.keyframe < b.keyframe; });
-  for (CovisibilityEdge& edge : result.edges) {
-    edge.num_shared = std::exchange(num_shared_[edge.keyframe.value], 0u);
-  }
-  return result;
+    std::ranges::sort(edges, {}, &CovisibilityEdge::keyframe);
+    for (CovisibilityEdge& edge : edges) {
+      edge.num_shared = std::exchange(num_shared[edge.keyframe.value], 0u);
+    }
+    counted.skip_to(id);
+    counted.insert({std::move(edges)});
+  });
+  counted.skip_to(keyframes_.end_id());
+  return counted;
 }
 
 std::vector<KeyframeId> strongest_neighbours(const Map& map,
                                              KeyframeId keyframe,
                                              std::size_t max_count) {
   std::vector<CovisibilityEdge> edges = map.covisible(keyframe);
-  std::stable_sort(edges.begin(), edges.end(), [](const auto& a, const auto& b) {
-    return a.num_shared != b.num_shared ? a.num_shared > b.num_shared : a.keyframe > b.keyframe;
+  std::ranges::sort(edges, std::greater(), [](const CovisibilityEdge& edge) {
+    return std::pair(edge.num_shared, edge.keyframe);
   });
   if (edges.size() > max_count) edges.resize(max_count);
   std::vector<KeyframeId> ids;
@@ -59,9 +60,8 @@ std::vector<SubmapId> submaps_by_size(const Map& map) {
   for (std::uint32_t i = 0; i < sizes.size(); ++i) {
     if (sizes[i] > 0) submaps.push_back(SubmapId{i});
   }
-  std::stable_sort(submaps.begin(), submaps.end(), [&](SubmapId a, SubmapId b) {
-    return sizes[a.value] > sizes[b.value];
-  });
+  std::ranges::stable_sort(
+      submaps, std::greater(), [&](SubmapId submap) { return sizes[submap.value]; });
   return submaps;
 }
 

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "waymark/map/covisibility.h"
 #include "waymark/map/map.h"
 
 namespace waymark {
@@ -161,24 +160,20 @@ void find_broken_forwarding(const Map& map, Findings& findings) {
     findings.add(name(id), "its heirs go round in a cycle");
   }
   const LandmarkId end_landmark = map.landmarks().end_id();
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (!survivor.is_valid() || findings.is_full()) return;
-    if (map.landmarks().contains(id)) findings.add(name(id), "lives and was merged");
-    if (survivor >= end_landmark) findings.add(name(id), "was merged into one never there");
-  });
   std::vector<std::pair<LandmarkId, LandmarkId>> merged;
   map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (survivor.is_valid()) merged.push_back({id, survivor});
+    if (!survivor.is_valid()) return;
+    merged.push_back({id, survivor});
+    if (map.landmarks().contains(id)) findings.add(name(id), "lives and was merged");
+    if (survivor >= end_landmark) findings.add(name(id), "was merged into one never there");
   });
   // By place among the merged ones, so that ids which are gone cost nothing.
   struct PlaceTag;
   using Place = Id<PlaceTag>;
   const auto next = [&](Place place) {
     const LandmarkId survivor = merged[place.value].second;
-    const auto at = std::lower_bound(
-        merged.begin(), merged.end(), survivor, [](const auto& pair, LandmarkId id) {
-          return pair.first < id;
-        });
+    const auto at =
+        std::ranges::lower_bound(merged, survivor, {}, &std::pair<LandmarkId, LandmarkId>::first);
     const bool is_merged = at != merged.end() && at->first == survivor;
     return is_merged ? Place{static_cast<std::uint32_t>(at - merged.begin())} : Place{};
   };
@@ -203,15 +198,11 @@ void find_broken_loop_edges(const Map& map, Findings& findings) {
   }
 }
 
-void find_broken_covisibility(const Map& map, Findings& findings) {
-  const auto is_same = [](const CovisibilityEdge& a, const CovisibilityEdge& b) {
-    return a.keyframe == b.keyframe && a.num_shared == b.num_shared;
-  };
-  CovisibilityCounter counter(map.keyframes(), map.landmarks());
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    const std::vector<CovisibilityEdge>& stored = map.covisible(id);
-    const std::vector<CovisibilityEdge> counted = counter.count(id, keyframe).edges;
-    if (!std::equal(stored.begin(), stored.end(), counted.begin(), counted.end(), is_same)) {
+void find_broken_covisibility(const Map& map,
+                              const CowTable<KeyframeId, Covisibility>& counted,
+                              Findings& findings) {
+  counted.for_each([&](KeyframeId id, const Covisibility& covisibility) {
+    if (map.covisible(id) != covisibility.edges) {
       findings.add(name(id), "covisibility counts differ");
     }
   });
@@ -230,7 +221,7 @@ std::vector<std::string> Map::list_broken_invariants(std::size_t max_count) cons
   });
   find_broken_loop_edges(*this, findings);
   find_broken_forwarding(*this, findings);
-  find_broken_covisibility(*this, findings);
+  find_broken_covisibility(*this, count_covisibility(), findings);
   return findings.take();
 }
 

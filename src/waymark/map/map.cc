@@ -278,10 +278,7 @@ void Map::count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_
 void Map::change_covisibility(KeyframeId a, KeyframeId b, int change) {
   for (int side = 0; side < 2; ++side, std::swap(a, b)) {
     auto& edges = covisibility_.edit(a).edges;
-    const auto at = std::lower_bound(
-        edges.begin(), edges.end(), b, [](const CovisibilityEdge& edge, KeyframeId id) {
-          return edge.keyframe < id;
-        });
+    const auto at = std::ranges::lower_bound(edges, b, {}, &CovisibilityEdge::keyframe);
     if (at == edges.end() || at->keyframe != b) {
       WAYMARK_CHECK(change > 0);
       edges.insert(at, CovisibilityEdge{b, static_cast<std::uint32_t>(change)});

@@ -2,15 +2,111 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
+#include <algorithm>
+#include <compare>
+#include <cstdint>
 #include <memory>
 #include <string>
 #include <vector>
 
 #include "waymark/base/cow_table.h"
-#include "waymark/map/keyframe.h"
-#include "waymark/map/landmark.h"
+#include "waymark/base/id.h"
+#include "waymark/camera/rig.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/sim3.h"
+#include "waymark/image/features.h"
 
 namespace waymark {
+
+/// A frame that stays in the map.
+struct Keyframe {
+  FrameId frame;                  ///< Unique in a map: a session that extends one counts on.
+  std::int64_t timestamp_ns = 0;  ///< Of its images.
+  SubmapId submap;                ///< Whose frame the pose is in.
+  Rigid3 rig_from_world;          ///< In metres (map units where the scale is free).
+  KeyframeId parent;              ///< In the spanning tree; invalid for the root of a sub-map.
+  /// Product of the scale corrections applied to this keyframe's surroundings; poses stored
+  /// relative to it are rescaled by how much it changed since.
+  double applied_scale = 1.0;
+  std::shared_ptr<const Rig> rig;            ///< The cameras that saw it; never null.
+  std::shared_ptr<const Features> features;  ///< Never null.
+  std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
+};
+
+/// How many landmarks two keyframes share.
+struct CovisibilityEdge {
+  KeyframeId keyframe;           ///< The other one.
+  std::uint32_t num_shared = 0;  ///< At least 1.
+  /// Of the same keyframe, as strong.
+  friend bool operator==(const CovisibilityEdge&, const CovisibilityEdge&) = default;
+};
+
+/// Edges of one keyframe, ascending by id.
+struct Covisibility {
+  std::vector<CovisibilityEdge> edges;  ///< Without the keyframe itself.
+};
+
+/// Where an erased keyframe went: poses relative to it are read relative to its heir.
+struct KeyframeForwarding {
+  KeyframeId heir;          ///< Invalid while the keyframe lives.
+  Rigid3 rig_from_heir;     ///< The erased keyframe's rig from the heir's.
+  double heir_scale = 1.0;  ///< applied_scale of the heir at that time.
+  double scale = 1.0;       ///< That of the erased keyframe.
+};
+
+/// Two keyframes that were found to show the same place, and how they lie to each other.
+struct LoopEdge {
+  KeyframeId from;    ///< The one that was in the map before.
+  KeyframeId to;      ///< The one that shows its place again.
+  Sim3 to_from_from;  ///< Of the rigs; lengths in the units of the map around `to`.
+};
+
+/// A feature of a keyframe that sees a landmark.
+struct Observation {
+  KeyframeId keyframe;                 ///< That sees the landmark.
+  std::uint32_t feature = kNoFeature;  ///< Index in its Features.
+  /// By keyframe, then by feature.
+  friend constexpr auto operator<=>(const Observation&, const Observation&) = default;
+};
+
+/// What a landmark looks like and from where; a pure function of its observations.
+struct Appearance {
+  Descriptor descriptor{};  ///< The medoid of those of its newest observers.
+  Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Mean unit vector towards its observers.
+  /// Extent in metres of one pixel of the level it was seen at: distance times size_rad.
+  double size_m = 0.0;
+};
+
+/// A point of the map.
+struct Landmark {
+  SubmapId submap;  ///< Whose frame the position is in.
+  /// In metres (map units where the scale is free).
+  Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
+  KeyframeId reference;                   ///< The keyframe it was made from; moves with it.
+  std::vector<Observation> observations;  ///< Ascending.
+  Appearance appearance;                  ///< Brought up to date by the mapper.
+  std::uint32_t num_visible = 0;          ///< Frames in which it should have been seen.
+  std::uint32_t num_found = 0;            ///< Frames in which it was.
+};
+
+/// Number of distinct keyframes among observations in ascending order.
+inline std::size_t num_observers(const Landmark& landmark) {
+  std::size_t count = 0;
+  KeyframeId last;
+  for (const Observation& observation : landmark.observations) {
+    count += observation.keyframe != last;
+    last = observation.keyframe;
+  }
+  return count;
+}
+
+/// Whether a keyframe is among the observers.
+inline bool is_observed_by(const Landmark& landmark, KeyframeId keyframe) {
+  const auto first = std::lower_bound(
+      landmark.observations.begin(), landmark.observations.end(), Observation{keyframe, 0});
+  return first != landmark.observations.end() && first->keyframe == keyframe;
+}
 
 /// A connected part of the session's map with its own frame.
 struct Submap {
@@ -157,6 +253,8 @@ class Map {
 
  private:
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
+  /// From scratch; what is associated but not there is passed over.
+  CowTable<KeyframeId, Covisibility> count_covisibility() const;
 
   CowTable<KeyframeId, Keyframe> keyframes_;
   CowTable<LandmarkId, Landmark> landmarks_;
