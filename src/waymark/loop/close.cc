@@ -133,6 +133,10 @@ void join_submaps(Map& map, PlaceIndex& places, const Revisit& revisit) {
   }
 }
 
+/// Views further apart show too little of the same.
+constexpr BesideOptions kOverlapping = {.num_known_steps = 1, .distance = 0.6, .angle_rad = 0.5};
+constexpr std::size_t kMaxSources = 6;
+
 }  // namespace
 
 MapCorrection spread_drift(const Map& map, const LoopEdge& loop) {
@@ -171,6 +175,16 @@ bool close_revisit(Map& map,
   for (KeyframeId id : of_query) fuse_into(map, of_match, id, matcher, dirty);
   for (KeyframeId id : of_match) fuse_into(map, of_query, id, matcher, dirty);
   return is_join;
+}
+
+void fuse_overlaps(Map& map, ProjectionMatcher& matcher, DirtyLandmarks& dirty) {
+  const std::uint32_t end = map.keyframes().end_id().value;
+  for (KeyframeId id{0}; id.value < end; ++id.value) {
+    if (!map.keyframes().contains(id)) continue;
+    std::vector<KeyframeId> sources = find_beside(map, id, kOverlapping);
+    if (sources.size() > kMaxSources) sources.resize(kMaxSources);
+    if (!sources.empty()) fuse_into(map, sources, id, matcher, dirty);
+  }
 }
 
 }  // namespace waymark

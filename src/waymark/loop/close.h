@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include "waymark/loop/revisit.h"
+#include "waymark/loop/drift.h"
 #include "waymark/map/correction.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
@@ -28,5 +28,10 @@ bool close_revisit(Map& map,
 /// tree, strong covisibility and the loops so far, and of the new loop; over similarities where the
 /// scale is free. The root stays.
 MapCorrection spread_drift(const Map& map, const LoopEdge& loop);
+
+/// Makes one of what keyframes that look at the same from near each other hold for different
+/// landmarks, though they are not neighbours in the graph: the camera came by again later. For a
+/// map whose loops are closed and adjusted.
+void fuse_overlaps(Map& map, ProjectionMatcher& matcher, DirtyLandmarks& dirty);
 
 }  // namespace waymark

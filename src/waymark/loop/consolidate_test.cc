@@ -1,9 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/loop/consolidate.h"
-
 #include <gtest/gtest.h>
 
+#include "waymark/loop/close.h"
 #include "waymark/loop/test_loop.h"
 
 namespace waymark {

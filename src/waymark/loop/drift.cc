@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <queue>
-#include <tuple>
 #include <vector>
 
 #include "waymark/base/median.h"
@@ -31,13 +31,7 @@ struct Arrival {
   double length;
   int num_steps;
   KeyframeId keyframe;
-};
-
-struct IsLater {
-  bool operator()(const Arrival& a, const Arrival& b) const {
-    return std::tie(a.length, a.num_steps, a.keyframe) >
-           std::tie(b.length, b.num_steps, b.keyframe);
-  }
+  friend auto operator<=>(const Arrival&, const Arrival&) = default;
 };
 
 /// Children in the spanning tree per keyframe, by value of the id.
@@ -65,7 +59,7 @@ double median_depth(const Map& map, KeyframeId id) {
 std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to) {
   const auto children = list_children(map);
   std::vector<double> lengths(children.size(), std::numeric_limits<double>::infinity());
-  std::priority_queue<Arrival, std::vector<Arrival>, IsLater> queue;
+  std::priority_queue<Arrival, std::vector<Arrival>, std::greater<>> queue;
   const auto arrive = [&](KeyframeId id, double length, int num_steps) {
     if (!(length < lengths[id.value])) return;
     lengths[id.value] = length;

@@ -27,13 +27,6 @@ constexpr std::size_t kMaxConfirming = 5;
 constexpr std::size_t kMinFoundToConfirm = 25;
 constexpr double kMinShareToConfirm = 0.1;
 
-bool is_scale_free(const Map& map, KeyframeId a, KeyframeId b) {
-  const auto is_metric = [&](KeyframeId id) {
-    return map.submaps()[map.keyframes().at(id).submap.value].is_metric;
-  };
-  return !is_metric(a) || !is_metric(b);
-}
-
 Rigid3 cam_from_world(const Keyframe& keyframe) {
   return keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
 }
@@ -100,8 +93,9 @@ std::optional<SimilarityEstimate> EvidenceCollector::estimate(const Map& map, Re
   };
   LandmarkMatches matches = match_by_appearance(map, revisit.query, revisit.match);
   if (matches.size() < kMinMatches) return std::nullopt;
-  const SimilarityOptions options{.is_scale_free = is_scale_free(map, revisit.query, revisit.match),
-                                  .noise_px = kNoisePx};
+  const bool is_metric =
+      has_metric_submap(map, revisit.query) && has_metric_submap(map, revisit.match);
+  const SimilarityOptions options{.is_scale_free = !is_metric, .noise_px = kNoisePx};
   std::optional<SimilarityEstimate> found = find_similarity(
       matches, options, {.seed = seed_, .stream = revisit.query.value, .min_inlier_ratio = 0.2});
   constexpr int kRounds = 2;

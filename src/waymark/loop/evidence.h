@@ -8,7 +8,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/loop/revisit.h"
+#include "waymark/loop/drift.h"
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"

@@ -19,22 +19,17 @@ constexpr int kNumNearSteps = 2;
 /// Of the best score within the surroundings.
 constexpr double kMinRelativeScore = 0.1;
 
-bool contains(const std::vector<KeyframeId>& ascending, KeyframeId id) {
-  return std::binary_search(ascending.begin(), ascending.end(), id);
-}
-
 bool are_linked(const Map& map, KeyframeId a, KeyframeId b) {
-  const auto& edges = map.covisible(a);
-  return std::any_of(edges.begin(), edges.end(), [&](const CovisibilityEdge& edge) {
+  return std::ranges::any_of(map.covisible(a), [&](const CovisibilityEdge& edge) {
     return edge.keyframe == b && edge.num_shared >= kMinSharedOfLinked;
   });
 }
 
-bool is_metric(const Map& map, KeyframeId id) {
-  return map.submaps()[map.keyframes().at(id).submap.value].is_metric;
-}
-
 }  // namespace
+
+bool has_metric_submap(const Map& map, KeyframeId keyframe) {
+  return map.submaps()[map.keyframes().at(keyframe).submap.value].is_metric;
+}
 
 std::vector<KeyframeId> within_steps(const Map& map, KeyframeId keyframe, int num_steps) {
   std::vector<KeyframeId> near = {keyframe};
@@ -75,16 +70,17 @@ std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, Key
                    .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
   double best_near = 0.0;
   for (const PlaceCandidate& candidate : ranked) {
-    if (contains(near, candidate.keyframe)) best_near = std::max(best_near, candidate.score);
+    if (std::ranges::binary_search(near, candidate.keyframe))
+      best_near = std::max(best_near, candidate.score);
   }
   std::vector<KeyframeId> alike;
   for (const PlaceCandidate& candidate : ranked) {
     const KeyframeId id = candidate.keyframe;
-    if (contains(near, id) || !map.keyframes().contains(id)) continue;
-    if (is_metric(map, id) != is_metric(map, query)) continue;
+    if (std::ranges::binary_search(near, id) || !map.keyframes().contains(id)) continue;
+    if (has_metric_submap(map, id) != has_metric_submap(map, query)) continue;
     if (alike.size() == kMaxCandidates || candidate.score < kMinRelativeScore * best_near) break;
-    const auto num_linked = std::count_if(
-        alike.begin(), alike.end(), [&](KeyframeId chosen) { return are_linked(map, chosen, id); });
+    const auto num_linked = std::ranges::count_if(
+        alike, [&](KeyframeId chosen) { return are_linked(map, chosen, id); });
     if (num_linked < kMaxOfOnePlace) alike.push_back(id);
   }
   return alike;
@@ -102,16 +98,14 @@ std::vector<KeyframeId> find_beside(const Map& map,
   const std::vector<KeyframeId> known = within_steps(map, query, options.num_known_steps);
   std::vector<Beside> found;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& other) {
-    if (other.submap != here.submap || contains(known, id)) return;
+    if (other.submap != here.submap || std::ranges::binary_search(known, id)) return;
     const Rigid3 here_from_other = here.rig_from_world * other.rig_from_world.inverse();
     const double distance = here_from_other.translation.norm() / depth;
     const double angle = Eigen::AngleAxisd(here_from_other.rotation).angle();
     if (distance >= options.distance || angle >= options.angle_rad) return;
     found.push_back({distance + angle, id});
   });
-  std::stable_sort(found.begin(), found.end(), [](const Beside& a, const Beside& b) {
-    return a.distance < b.distance;
-  });
+  std::ranges::stable_sort(found, {}, &Beside::distance);
   std::vector<KeyframeId> ids;
   for (const Beside& beside : found) ids.push_back(beside.keyframe);
   return ids;

@@ -15,6 +15,9 @@ namespace waymark {
 /// 2015, III.D); fewer may have been seen again by chance.
 inline constexpr std::uint32_t kMinSharedOfLinked = 15;
 
+/// Whether the lengths around a keyframe are metres.
+bool has_metric_submap(const Map& map, KeyframeId keyframe);
+
 /// The keyframe and those so many steps away from it, by covisibility or up the spanning tree;
 /// ascending.
 std::vector<KeyframeId> within_steps(const Map& map, KeyframeId keyframe, int num_steps);

@@ -9,6 +9,7 @@
 #include "waymark/base/median.h"
 #include "waymark/camera/same_rig.h"
 #include "waymark/loop/drift.h"
+#include "waymark/loop/find.h"
 
 namespace waymark {
 namespace {
@@ -58,15 +59,11 @@ bool agree(const Map& map, const Revisit& a, const Revisit& b) {
 std::optional<Revisit> choose(const Map& map,
                               const std::vector<RevisitEvidence>& all,
                               const Demand& demand) {
-  const auto& best = *std::max_element(
-      all.begin(), all.end(), [](const RevisitEvidence& a, const RevisitEvidence& b) {
-        return a.revisit.num_inliers < b.revisit.num_inliers;
-      });
-  const bool is_clear = std::all_of(all.begin(), all.end(), [&](const RevisitEvidence& other) {
-    return agree(map, best.revisit, other.revisit);
-  });
-  if (!is_clear || !meets(best, demand)) return std::nullopt;
-  return best.revisit;
+  const RevisitEvidence& best = *std::ranges::max_element(
+      all, {}, [](const RevisitEvidence& one) { return one.revisit.num_inliers; });
+  const bool is_clear = std::ranges::all_of(
+      all, [&](const RevisitEvidence& other) { return agree(map, best.revisit, other.revisit); });
+  return is_clear && meets(best, demand) ? std::optional(best.revisit) : std::nullopt;
 }
 
 /// Features of a keyframe that show a landmark of its own and another one.
@@ -160,12 +157,11 @@ std::optional<Revisit> RevisitVerifier::compare_beside(const Map& map,
   const Rigid3 query_from_match =
       place->frame.rig_from_world * map.keyframes().at(match).rig_from_world.inverse();
   revisit.query_from_match = Sim3(query_from_match);
-  if (!map.submaps()[in_query.submap.value].is_metric) {
+  if (!has_metric_submap(map, query)) {
     revisit.query_from_match.scale = scale;
     revisit.query_from_match.translation *= scale;
   }
-  if (!is_plausible_loop(map, revisit)) return std::nullopt;
-  return revisit;
+  return is_plausible_loop(map, revisit) ? std::optional(revisit) : std::nullopt;
 }
 
 }  // namespace waymark

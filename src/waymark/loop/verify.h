@@ -8,8 +8,8 @@
 #include <span>
 #include <vector>
 
+#include "waymark/loop/drift.h"
 #include "waymark/loop/evidence.h"
-#include "waymark/loop/revisit.h"
 #include "waymark/map/map.h"
 #include "waymark/track/place_locator.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "waymark/loop/map_merger.h"
+#include "waymark/loop/global_mapper.h"
 
 namespace waymark {
 namespace {
