@@ -5,7 +5,6 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
-#include "waymark/place/place_vote.h"
 
 namespace waymark {
 namespace {
@@ -14,14 +13,6 @@ namespace {
 // their elder neighbours when those are less than twice as large. There are thus some log2(n / 32)
 // segments, and a descriptor is merged some 16 + log2(n / 32) times in all (O'Neil et al. 1996).
 constexpr std::size_t kFullRows = 32;
-
-bool is_earlier(const PlaceRow& row, KeyframeId keyframe) { return row.keyframe < keyframe; }
-
-const PlaceRow* find_row(const PlaceSegment& segment, KeyframeId keyframe) {
-  const std::span<const PlaceRow> rows = segment.rows();
-  const auto row = std::lower_bound(rows.begin(), rows.end(), keyframe, is_earlier);
-  return row != rows.end() && row->keyframe == keyframe ? &*row : nullptr;
-}
 
 bool is_better(const PlaceCandidate& a, const PlaceCandidate& b) {
   return a.score != b.score ? a.score > b.score : a.keyframe < b.keyframe;
@@ -85,8 +76,8 @@ std::vector<PlaceCandidate> PlaceIndex::find(std::span<const Descriptor> descrip
 
 bool PlaceIndex::contains(KeyframeId keyframe) const {
   const std::size_t segment = find_segment(keyframe);
-  return segment < segments_.size() && find_row(*segments_[segment], keyframe) != nullptr &&
-         !is_erased(keyframe);
+  return segment < segments_.size() && !is_erased(keyframe) &&
+         std::ranges::binary_search(segments_[segment]->rows(), keyframe, {}, &PlaceRow::keyframe);
 }
 
 std::size_t PlaceIndex::num_bytes() const {
@@ -107,10 +98,8 @@ SubmapId PlaceIndex::resolve(SubmapId submap) const {
 }
 
 std::size_t PlaceIndex::find_segment(KeyframeId keyframe) const {
-  const auto ends_before = [](const std::shared_ptr<const PlaceSegment>& segment, KeyframeId id) {
-    return segment->rows().back().keyframe < id;
-  };
-  const auto segment = std::lower_bound(segments_.begin(), segments_.end(), keyframe, ends_before);
+  const auto segment = std::ranges::lower_bound(
+      segments_, keyframe, {}, [](const auto& one) { return one->rows().back().keyframe; });
   return static_cast<std::size_t>(segment - segments_.begin());
 }
 

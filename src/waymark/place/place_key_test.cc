@@ -1,11 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/place/place_key.h"
-
 #include <gmock/gmock.h>
 
 #include <bit>
 
+#include "waymark/place/place_segment.h"
 #include "waymark/place/test_places.h"
 
 namespace waymark {

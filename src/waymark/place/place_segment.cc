@@ -4,8 +4,12 @@
 
 #include <algorithm>
 #include <bit>
+#include <numeric>
+#include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/base/rng.h"
+#include "waymark/image/hamming.h"
 
 namespace waymark {
 namespace {
@@ -70,7 +74,34 @@ std::vector<std::uint64_t> merge_entries(const MovingEntries& a, const MovingEnt
   return merged;
 }
 
+static_assert(kNumPlaceTables * kPlaceKeyBits <= kDescriptorBits);
+
+using BitOrder = std::array<std::uint8_t, kDescriptorBits>;
+
+/// A shuffle of the bits of a descriptor (Fisher and Yates); consecutive runs of it make the keys.
+BitOrder shuffled_bits() {
+  BitOrder order;
+  std::iota(order.begin(), order.end(), std::uint8_t{0});
+  Rng rng(1, 0);
+  for (std::uint32_t i = kDescriptorBits - 1; i > 0; --i) {
+    std::swap(order[i], order[rng.below(i + 1)]);
+  }
+  return order;
+}
+
 }  // namespace
+
+std::array<PlaceKey, kNumPlaceTables> place_keys(const Descriptor& descriptor) {
+  static const BitOrder order = shuffled_bits();
+  std::array<PlaceKey, kNumPlaceTables> keys = {};
+  const std::uint8_t* bit = order.data();
+  for (PlaceKey& key : keys) {
+    for (int i = 0; i < kPlaceKeyBits; ++i, ++bit) {
+      key = key << 1 | (descriptor[*bit / 64u] >> (*bit % 64u) & 1u);
+    }
+  }
+  return keys;
+}
 
 PlaceSegment::PlaceSegment(const PlaceRow& row, std::span<const Descriptor> descriptors)
     : rows_{row} {

@@ -6,13 +6,26 @@
 #include <cstddef>
 #include <cstdint>
 #include <functional>
+#include <memory>
 #include <span>
 #include <vector>
 
 #include "waymark/base/id.h"
-#include "waymark/place/place_key.h"
+#include "waymark/image/features.h"
 
 namespace waymark {
+
+/// Each descriptor is filed in so many tables, each by other bits of it.
+inline constexpr std::size_t kNumPlaceTables = 4;
+inline constexpr int kPlaceKeyBits = 48;
+
+/// A sample of the bits of a descriptor in a random order. Descriptors that differ little are
+/// likely to agree in a long prefix of it (Indyk and Motwani 1998; Bawa, Condie and Ganesan 2005),
+/// and the number of its bits that differ tells how near they are.
+using PlaceKey = std::uint64_t;
+
+/// One key per table; no two share a bit of the descriptor. The choice of bits is fixed.
+std::array<PlaceKey, kNumPlaceTables> place_keys(const Descriptor& descriptor);
 
 /// A keyframe as the place index knows it.
 struct PlaceRow {
@@ -82,5 +95,16 @@ class PlaceSegment {
 
 /// Every k-th descriptor where there are more than a segment takes.
 std::vector<Descriptor> thin_descriptors(std::span<const Descriptor> descriptors);
+
+/// How much of a query each row of the segments shows, 0 to 1, one value per row in order.
+///
+/// Each descriptor looks in each table at some 32 descriptors of all segments that share the
+/// longest prefixes with its key, as in the synchronous descent of Bawa, Condie and Ganesan (2005):
+/// which they are does not depend on how the rows are distributed over segments. Those whose keys
+/// differ little from its own are votes for their rows, one per descriptor and row. A vote weighs
+/// more the fewer rows share it, as in the inverse document frequency of text retrieval (Sparck
+/// Jones 1972); 1 means that every descriptor voted for this row alone.
+std::vector<double> vote_for_places(std::span<const std::shared_ptr<const PlaceSegment>> segments,
+                                    std::span<const Descriptor> descriptors);
 
 }  // namespace waymark

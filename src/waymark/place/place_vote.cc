@@ -1,11 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/place/place_vote.h"
-
 #include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
+
+#include "waymark/place/place_segment.h"
 
 namespace waymark {
 namespace {

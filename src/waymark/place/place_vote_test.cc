@@ -1,13 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/place/place_vote.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
 #include <bit>
 #include <cmath>
 
+#include "waymark/place/place_segment.h"
 #include "waymark/place/test_places.h"
 
 namespace waymark {
