@@ -20,15 +20,6 @@ constexpr BesideOptions kBeside = {.num_known_steps = 5, .distance = 0.8, .angle
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
 
-/// A map whose keyframes are indexed below an id only, so that the others look for their places.
-MapSnapshot index_below(KeyframeId end, std::shared_ptr<const Map> map) {
-  const auto places = std::make_shared<PlaceIndex>();
-  map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (id < end) places->add(id, keyframe.submap, keyframe.features->descriptors);
-  });
-  return {std::move(map), places};
-}
-
 }  // namespace
 
 GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
@@ -139,7 +130,8 @@ MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
   });
   if (of_b.empty()) return {both.freeze()};
   GlobalMapper mapper(both.keyframes().at(of_b.front()).rig, {}, {}, seed);
-  mapper.take_over(index_below(of_b.front(), both.freeze()));
+  // Only what is indexed is found: b looks for its places in a.
+  mapper.take_over(index_map(both.freeze(), of_b.front()));
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     const int num_joins_before = mapper.num_joins();
     for (const KeyframeId query : of_b) mapper.close_alike(query);

@@ -8,8 +8,7 @@
 namespace waymark {
 
 int num_valid(std::span<const LandmarkId> landmarks) {
-  return static_cast<int>(std::count_if(
-      landmarks.begin(), landmarks.end(), [](LandmarkId id) { return id.is_valid(); }));
+  return static_cast<int>(std::ranges::count_if(landmarks, &LandmarkId::is_valid));
 }
 
 std::vector<LandmarkId> primary_landmarks(const Features& features,

@@ -4,7 +4,8 @@
 
 #include <algorithm>
 #include <cstdint>
-#include <tuple>
+#include <functional>
+#include <utility>
 
 namespace waymark {
 namespace {
@@ -15,12 +16,12 @@ constexpr std::size_t kNumNearest = 40;
 constexpr double kMinDirectionCos = 0.5;
 
 std::vector<KeyframeId> nearest(const Map& map, SubmapId submap, const Eigen::Vector3d& centre) {
-  std::vector<std::tuple<double, KeyframeId>> distances;
+  std::vector<std::pair<double, KeyframeId>> distances;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     if (keyframe.submap != submap) return;
     distances.emplace_back((keyframe.rig_from_world.origin_in_source() - centre).norm(), id);
   });
-  std::sort(distances.begin(), distances.end());
+  std::ranges::sort(distances);
   if (distances.size() > kNumNearest) distances.resize(kNumNearest);
   std::vector<KeyframeId> ids;
   for (const auto& [distance, id] : distances) ids.push_back(id);
@@ -46,8 +47,7 @@ std::size_t count_visible(const Map& map,
   std::vector<Eigen::Vector2d> pixels(points_in_cam.size());
   std::vector<std::uint8_t> is_visible(points_in_cam.size());
   camera.project(points_in_cam, pixels, is_visible);
-  return static_cast<std::size_t>(
-      std::count(is_visible.begin(), is_visible.end(), std::uint8_t{1}));
+  return static_cast<std::size_t>(std::ranges::count(is_visible, std::uint8_t{1}));
 }
 
 }  // namespace
@@ -59,24 +59,16 @@ std::vector<KeyframeId> keyframes_near(const Map& map,
                                        std::size_t max_count) {
   const RigCamera& camera = rig.cameras.at(0);
   const Rigid3 cam_from_world = camera.cam_from_rig * rig_from_world;
-  struct Ranked {
-    std::size_t num_visible;
-    KeyframeId id;
-  };
-  std::vector<Ranked> ranked;
+  std::vector<std::pair<std::size_t, KeyframeId>> ranked;
   for (const KeyframeId id : nearest(map, submap, rig_from_world.origin_in_source())) {
     const std::size_t num_visible =
         count_visible(map, map.keyframes().at(id), *camera.camera, cam_from_world);
-    if (num_visible > 0) ranked.push_back({num_visible, id});
+    if (num_visible > 0) ranked.emplace_back(num_visible, id);
   }
-  std::stable_sort(ranked.begin(), ranked.end(), [](const Ranked& a, const Ranked& b) {
-    return a.num_visible > b.num_visible;
-  });
+  std::ranges::stable_sort(ranked, std::greater(), &std::pair<std::size_t, KeyframeId>::first);
+  if (ranked.size() > max_count) ranked.resize(max_count);
   std::vector<KeyframeId> ids;
-  for (const Ranked& keyframe : ranked) {
-    if (ids.size() == max_count) break;
-    ids.push_back(keyframe.id);
-  }
+  for (const auto& [num_visible, id] : ranked) ids.push_back(id);
   return ids;
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 
 #include "waymark/map/map.h"
 #include "waymark/place/place_index.h"
@@ -15,7 +16,13 @@ struct MapSnapshot {
   std::shared_ptr<const PlaceIndex> places = std::make_shared<const PlaceIndex>();
 };
 
-/// A frozen map with the index of all its keyframes.
-MapSnapshot index_map(std::shared_ptr<const Map> map);
+/// A frozen map with the index of its keyframes below `end`, else of all.
+inline MapSnapshot index_map(std::shared_ptr<const Map> map, KeyframeId end = {}) {
+  PlaceIndex places;
+  map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (id < end) places.add(id, keyframe.submap, keyframe.features->descriptors);
+  });
+  return {std::move(map), std::make_shared<const PlaceIndex>(std::move(places))};
+}
 
 }  // namespace waymark

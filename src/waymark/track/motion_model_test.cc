@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/track/motion_model.h"
-
 #include <gtest/gtest.h>
+
+#include "waymark/track/last_frame.h"
 
 namespace waymark {
 namespace {

@@ -23,8 +23,6 @@ std::vector<SeenLandmark> seen_landmarks(const Features& features,
   return seen;
 }
 
-PoseRefiner::PoseRefiner(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
-
 std::optional<Rigid3> PoseRefiner::refine(const Map& map,
                                           std::span<const SeenLandmark> seen,
                                           const Rigid3& rig_from_world) {

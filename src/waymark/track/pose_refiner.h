@@ -28,7 +28,7 @@ std::vector<SeenLandmark> seen_landmarks(const Features& features,
 /// it anew does. Keeps its buffers.
 class PoseRefiner {
  public:
-  explicit PoseRefiner(std::shared_ptr<const Rig> rig);
+  explicit PoseRefiner(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
 
   /// Pose of a frame from what it saw of landmarks that still live; nothing if too few do, or too
   /// few agree on a pose near the given one.

@@ -3,6 +3,7 @@
 #include "waymark/track/relocalizer.h"
 
 #include <algorithm>
+#include <array>
 #include <tuple>
 #include <utility>
 
@@ -13,21 +14,11 @@ constexpr std::size_t kMaxCandidates = 10;
 /// What merely looks alike does not get that far; the other candidates need not be tried.
 constexpr double kCertainConfidence = 0.5;
 
-/// How many steps of the search passed before it failed.
-int step_of(FrameReason reason) {
-  switch (reason) {
-    case FrameReason::kNone:
-      return 4;
-    case FrameReason::kNotVerified:
-      return 3;
-    case FrameReason::kTooFewInliers:
-      return 2;
-    case FrameReason::kTooFewMatches:
-      return 1;
-    default:
-      return 0;
-  }
-}
+/// How the search may end, from what is furthest; other reasons come before all of these.
+constexpr std::array kEnds = {FrameReason::kNone,
+                              FrameReason::kNotVerified,
+                              FrameReason::kTooFewInliers,
+                              FrameReason::kTooFewMatches};
 
 }  // namespace
 
@@ -39,16 +30,14 @@ Relocalizer::Relocalizer(std::shared_ptr<const Rig> rig,
 std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const Map& map,
                                                 const PlaceIndex& places) {
-  PlaceQuery query;
-  query.max_candidates = kMaxCandidates;
-  query.is_excluded = [&map](const PlaceRow& row) {
-    return !map.keyframes().contains(row.keyframe);
-  };
-  candidates_.clear();
+  const PlaceQuery query = {
+      .max_candidates = kMaxCandidates,
+      .is_excluded = [&](const PlaceRow& row) { return !map.keyframes().contains(row.keyframe); }};
+  std::vector<KeyframeId> candidates;
   for (const PlaceCandidate& candidate : places.find(frame.features->descriptors, query)) {
-    candidates_.push_back(candidate.keyframe);
+    candidates.push_back(candidate.keyframe);
   }
-  return locate_among(frame, map, candidates_);
+  return locate_among(frame, map, candidates);
 }
 
 std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
@@ -77,7 +66,7 @@ std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
 
 void Relocalizer::note(const PlaceAttempt& attempt) {
   const auto how_far = [](FrameReason reason, int num_inliers, int num_matches) {
-    return std::tuple(step_of(reason), num_inliers, num_matches);
+    return std::tuple(kEnds.end() - std::ranges::find(kEnds, reason), num_inliers, num_matches);
   };
   ++diagnosis_.num_candidates;
   if (how_far(attempt.failure, attempt.num_inliers, attempt.num_matches) <

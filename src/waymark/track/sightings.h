@@ -24,9 +24,7 @@ class SightingCounter {
 
   /// The counts since the last take(), ascending by landmark.
   std::vector<Sighting> take() {
-    std::sort(sightings_.begin(), sightings_.end(), [](const Sighting& a, const Sighting& b) {
-      return a.landmark < b.landmark;
-    });
+    std::ranges::sort(sightings_, {}, &Sighting::landmark);
     std::vector<Sighting> merged;
     for (const Sighting& sighting : sightings_) {
       if (merged.empty() || merged.back().landmark != sighting.landmark) {

@@ -5,6 +5,7 @@
 #include <array>
 #include <chrono>
 #include <cstddef>
+#include <numeric>
 
 namespace waymark {
 
@@ -35,9 +36,7 @@ struct StageTimes {
 
   /// From image in memory to pose returned, less the waiting for the mapper.
   double tracking_ms() const {
-    double sum = 0.0;
-    for (double stage_ms : ms) sum += stage_ms;
-    return sum - (*this)[Stage::kWait];
+    return std::accumulate(ms.begin(), ms.end(), 0.0) - (*this)[Stage::kWait];
   }
 };
 

@@ -33,7 +33,8 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
 void TrajectoryMemory::settle(const Map& map) {
   for (const Unsettled& unsettled : unsettled_) settle(unsettled, map);
   unsettled_.clear();
-  fill_gaps(map);
+  for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, map);
+  for (const Unposed& unposed : unposed_) fill(unposed, -1, map);
   unposed_.clear();
 }
 
@@ -50,11 +51,6 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
           : refiner_.refine(map, unsettled.seen, guess);
   if (!refined) return;
   pose = {living, *refined * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
-}
-
-void TrajectoryMemory::fill_gaps(const Map& map) {
-  for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, map);
-  for (const Unposed& unposed : unposed_) fill(unposed, -1, map);
 }
 
 void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {

@@ -63,7 +63,6 @@ class TrajectoryMemory {
 
   Entry& entry_of(FrameId frame) { return entries_.at(frame.value - first_.value); }
   void settle(const Unsettled& unsettled, const Map& map);
-  void fill_gaps(const Map& map);
   /// Looks for a frame near its neighbour, one step (1 or -1 frames) away.
   void fill(const Unposed& unposed, int step, const Map& map);
   /// index: of an entry.
