@@ -4,7 +4,7 @@
 
 #include "waymark/camera/equirectangular.h"
 #include "waymark/camera/perspective.h"
-#include "waymark/view/keyframe_layer.h"
+#include "waymark/view/scene.h"
 
 namespace waymark {
 namespace {

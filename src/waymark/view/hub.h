@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <atomic>
 #include <chrono>
 #include <cstddef>
 #include <cstdint>
@@ -13,14 +14,22 @@
 #include <string>
 #include <vector>
 
+#include "waymark/base/mailbox.h"
 #include "waymark/image/image.h"
-#include "waymark/view/channel.h"
 #include "waymark/view/message.h"
 #include "waymark/view/scene.h"
-#include "waymark/view/text_message.h"
 #include "waymark/view/update.h"
 
 namespace waymark {
+
+/// All that the session's thread and the viewer's share. Neither ever waits for the other.
+struct ViewChannel {
+  Mailbox<ViewUpdate> updates{64};
+  Mailbox<ViewRequest> requests{64};
+  Mailbox<ViewReply> replies{64};
+  /// Set by the viewer when it could take one, cleared by the session.
+  std::atomic<bool> wants_image{false};
+};
 
 /// What waits to be sent to one client. Bounded: a client that reads too slowly loses what it has
 /// not got and starts again with a snapshot.

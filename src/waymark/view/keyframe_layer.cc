@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/view/keyframe_layer.h"
-
 #include <algorithm>
+
+#include "waymark/view/scene.h"
 
 namespace waymark {
 namespace {

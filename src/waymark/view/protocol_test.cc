@@ -8,8 +8,8 @@
 #include <sstream>
 
 #include "waymark/view/hub.h"
+#include "waymark/view/message.h"
 #include "waymark/view/test_messages.h"
-#include "waymark/view/text_message.h"
 
 namespace waymark {
 namespace {

@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/view/channel.h"
+#include "waymark/view/hub.h"
 
 namespace waymark {
 namespace {

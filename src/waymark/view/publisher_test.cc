@@ -6,7 +6,7 @@
 
 #include "waymark/camera/perspective.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/view/channel.h"
+#include "waymark/view/hub.h"
 
 namespace waymark {
 namespace {

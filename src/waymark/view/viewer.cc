@@ -17,7 +17,6 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/view/channel.h"
 #include "waymark/view/http_connection.h"
 #include "waymark/view/hub.h"
 
