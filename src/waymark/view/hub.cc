@@ -130,7 +130,8 @@ bool ViewHub::take_updates() {
 
 void ViewHub::take_replies() {
   while (const std::optional<ViewReply> reply = channel_.replies.try_pop()) {
-    answer(reply->request.client, text(format_reply(*reply)));
+    answer(reply->request.client,
+           text(format_reply(reply->request.number, reply->error, reply->path)));
   }
 }
 
@@ -200,11 +201,11 @@ Message ViewHub::answer_to(std::uint64_t number, const ClientRequest& request) {
   if (const auto* error = std::get_if<std::string>(&request.content)) {
     return text(format_reply(request.number, *error));
   }
-  if (const auto* show = std::get_if<ShowKeyframe>(&request.content)) {
-    return text(format_keyframe(scene_.map(), show->id, *request.number));
+  if (const auto* id = std::get_if<KeyframeId>(&request.content)) {
+    return text(format_keyframe(scene_.map(), *id, *request.number));
   }
-  if (const auto* show = std::get_if<ShowLandmark>(&request.content)) {
-    return text(format_landmark(scene_.map(), show->id, *request.number));
+  if (const auto* id = std::get_if<LandmarkId>(&request.content)) {
+    return text(format_landmark(scene_.map(), *id, *request.number));
   }
   if (const auto* kind = std::get_if<ViewRequest::Kind>(&request.content)) {
     return pass_on(number, request, *kind);
@@ -228,9 +229,8 @@ Message ViewHub::pass_on(std::uint64_t number,
 }
 
 bool ViewHub::is_idle() const {
-  return std::all_of(clients_.begin(), clients_.end(), [](const auto& entry) {
-    return entry.second->outbox.is_empty();
-  });
+  return std::ranges::all_of(clients_,
+                             [](const auto& entry) { return entry.second->outbox.is_empty(); });
 }
 
 void ViewHub::close_clients() {
@@ -258,7 +258,7 @@ Message encode_frame(const DrawnFrame& frame, std::int64_t start_ns) {
   const std::size_t num_features = frame.features ? frame.features->num_primary : 0;
   MessageWriter writer(MessageKind::kFrame, num_features);
   writer.add(frame.frame.value);
-  writer.add(static_cast<float>(1e-9 * static_cast<double>(frame.timestamp_ns - start_ns)));
+  writer.add(seconds_between(start_ns, frame.timestamp_ns));
   writer.add(static_cast<std::uint32_t>(frame.width_px));
   writer.add(static_cast<std::uint32_t>(frame.height_px));
   writer.add(static_cast<std::uint32_t>(jpeg.size()));

@@ -1,6 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
+#include <functional>
 
 #include "waymark/view/scene.h"
 
@@ -27,24 +28,12 @@ constexpr std::size_t kMaxEdges = 10;
 constexpr std::uint32_t kMinShared = 15;
 
 std::uint32_t num_landmarks(const Keyframe& keyframe) {
-  return static_cast<std::uint32_t>(std::count_if(keyframe.landmarks.begin(),
-                                                  keyframe.landmarks.end(),
-                                                  [](LandmarkId id) { return id.is_valid(); }));
-}
-
-bool is_same_pose(const Keyframe& a, const Keyframe& b) {
-  return a.rig_from_world.translation == b.rig_from_world.translation &&
-         a.rig_from_world.rotation.coeffs() == b.rig_from_world.rotation.coeffs();
+  return static_cast<std::uint32_t>(
+      std::ranges::count_if(keyframe.landmarks, &LandmarkId::is_valid));
 }
 
 bool is_same_otherwise(const Keyframe& a, const Keyframe& b) {
   return a.submap == b.submap && a.parent == b.parent && num_landmarks(a) == num_landmarks(b);
-}
-
-bool is_same(const std::vector<CovisibilityEdge>& a, const std::vector<CovisibilityEdge>& b) {
-  return std::equal(a.begin(), a.end(), b.begin(), b.end(), [](const auto& x, const auto& y) {
-    return x.keyframe == y.keyframe && x.num_shared == y.num_shared;
-  });
 }
 
 void add_poses(const Map& map, std::span<const KeyframeId> ids, MessageWriter& writer) {
@@ -83,7 +72,7 @@ std::vector<KeyframeId> changed_covisibility(const Map& before, const Map& after
       before.covisibility(), [&](KeyframeId id, const Covisibility* old, const Covisibility* now) {
         if (!now) return;
         const auto told = old ? strongest_older(*old, id) : std::vector<CovisibilityEdge>();
-        if (!is_same(told, strongest_older(*now, id))) changed.push_back(id);
+        if (told != strongest_older(*now, id)) changed.push_back(id);
       });
   return changed;
 }
@@ -104,13 +93,9 @@ Message encode_submaps(const Map& map) {
 }
 
 bool are_same_submaps(const Map& a, const Map& b) {
-  return std::equal(a.submaps().begin(),
-                    a.submaps().end(),
-                    b.submaps().begin(),
-                    b.submaps().end(),
-                    [](const Submap& x, const Submap& y) {
-                      return x.joined_into == y.joined_into && x.is_metric == y.is_metric;
-                    });
+  return std::ranges::equal(a.submaps(), b.submaps(), [](const Submap& x, const Submap& y) {
+    return x.joined_into == y.joined_into && x.is_metric == y.is_metric;
+  });
 }
 
 }  // namespace
@@ -140,13 +125,9 @@ std::vector<CovisibilityEdge> strongest_older(const Covisibility& covisibility, 
     if (edge.keyframe < id && edge.num_shared >= kMinShared) older.push_back(edge);
   }
   if (older.size() > kMaxEdges) {
-    std::stable_sort(older.begin(), older.end(), [](const auto& a, const auto& b) {
-      return a.num_shared > b.num_shared;
-    });
+    std::ranges::stable_sort(older, std::greater(), &CovisibilityEdge::num_shared);
     older.resize(kMaxEdges);
-    std::sort(older.begin(), older.end(), [](const auto& a, const auto& b) {
-      return a.keyframe < b.keyframe;
-    });
+    std::ranges::sort(older, {}, &CovisibilityEdge::keyframe);
   }
   return older;
 }
@@ -170,15 +151,12 @@ void KeyframeLayer::differences(const Map& before,
           moved.push_back(id);
         }
       });
-  for_each_chunk<std::uint32_t>(erased, [&](auto ids) {
-    messages.push_back(encode_ids(MessageKind::kKeyframesErased, ids));
-  });
-  for_each_chunk<KeyframeId>(changed,
-                             [&](auto ids) { messages.push_back(encode(after, ids, start_ns)); });
-  for_each_chunk<KeyframeId>(moved,
-                             [&](auto ids) { messages.push_back(encode_poses(after, ids)); });
-  for_each_chunk<KeyframeId>(changed_covisibility(before, after), [&](auto ids) {
-    messages.push_back(encode_covisibility(after, ids));
+  add_chunks(
+      erased, messages, [&](auto ids) { return encode_ids(MessageKind::kKeyframesErased, ids); });
+  add_chunks(changed, messages, [&](auto ids) { return encode(after, ids, start_ns); });
+  add_chunks(moved, messages, [&](auto ids) { return encode_poses(after, ids); });
+  add_chunks(changed_covisibility(before, after), messages, [&](auto ids) {
+    return encode_covisibility(after, ids);
   });
   // They are only ever added.
   if (before.measured_loop_edges().size() != after.measured_loop_edges().size()) {
@@ -194,10 +172,8 @@ void KeyframeLayer::snapshot(const Map& map,
   messages.push_back(encode_submaps(map));
   std::vector<KeyframeId> all;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe&) { all.push_back(id); });
-  for_each_chunk<KeyframeId>(all,
-                             [&](auto ids) { messages.push_back(encode(map, ids, start_ns)); });
-  for_each_chunk<KeyframeId>(all,
-                             [&](auto ids) { messages.push_back(encode_covisibility(map, ids)); });
+  add_chunks(all, messages, [&](auto ids) { return encode(map, ids, start_ns); });
+  add_chunks(all, messages, [&](auto ids) { return encode_covisibility(map, ids); });
   messages.push_back(encode_loops(map));
 }
 
@@ -242,8 +218,7 @@ Message KeyframeLayer::encode(const Map& map,
   add_poses(map, ids, writer);
   for (const KeyframeId id : ids) writer.add(keyframes.at(id).frame.value);
   for (const KeyframeId id : ids) {
-    writer.add(
-        static_cast<float>(1e-9 * static_cast<double>(keyframes.at(id).timestamp_ns - start_ns)));
+    writer.add(seconds_between(start_ns, keyframes.at(id).timestamp_ns));
   }
   for (const KeyframeId id : ids) writer.add(keyframes.at(id).parent.value);
   for (const KeyframeId id : ids) writer.add(num_landmarks(keyframes.at(id)));

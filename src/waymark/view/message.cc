@@ -83,11 +83,11 @@ std::optional<std::uint64_t> read_number(const json& object, const char* key, st
   return number;
 }
 
-template <class Show, class AnyId>
-Content read_show(const json& object) {
+template <class AnyId>
+Content read_id(const json& object) {
   const auto id = read_number(object, "id", UINT32_MAX);
   if (!id) return std::string("id: expected a number of 32 bits");
-  return Show{AnyId{static_cast<std::uint32_t>(*id)}};
+  return AnyId{static_cast<std::uint32_t>(*id)};
 }
 
 Content read_mapping(const json& object) {
@@ -114,8 +114,8 @@ Content read_content(const json& object) {
   if (name == "save") return ViewRequest::Kind::kSave;
   if (name == "stop") return ViewRequest::Kind::kStop;
   if (name == "mapping") return read_mapping(object);
-  if (name == "keyframe") return read_show<ShowKeyframe, KeyframeId>(object);
-  if (name == "landmark") return read_show<ShowLandmark, LandmarkId>(object);
+  if (name == "keyframe") return read_id<KeyframeId>(object);
+  if (name == "landmark") return read_id<LandmarkId>(object);
   if (name == "rate") return read_rate(object);
   return std::string("do: not known");
 }
@@ -123,8 +123,7 @@ Content read_content(const json& object) {
 /// Whether brackets may nest so deeply that a parser runs out of stack; no request has many.
 bool has_many_brackets(std::string_view text) {
   constexpr std::ptrdiff_t kMany = 16;
-  return std::count_if(text.begin(), text.end(), [](char c) { return c == '[' || c == '{'; }) >
-         kMany;
+  return std::ranges::count_if(text, [](char c) { return c == '[' || c == '{'; }) > kMany;
 }
 
 }  // namespace
@@ -210,20 +209,18 @@ std::string format_status(const SessionStatus& status, const Map& map, std::size
        {"clients", num_clients}});
 }
 
-std::string format_reply(std::optional<std::uint64_t> number, std::string_view error) {
+std::string format_reply(std::optional<std::uint64_t> number,
+                         std::string_view error,
+                         std::string_view path) {
   json reply = {{"type", "reply"},
                 {"request", number ? json(*number) : json(nullptr)},
                 {"ok", error.empty()}};
-  if (!error.empty()) reply["error"] = error;
-  return dump(reply);
-}
-
-std::string format_reply(const ViewReply& reply) {
-  if (!reply.error.empty() || reply.path.empty()) {
-    return format_reply(reply.request.number, reply.error);
+  if (!error.empty()) {
+    reply["error"] = error;
+  } else if (!path.empty()) {
+    reply["path"] = path;
   }
-  return dump(
-      {{"type", "reply"}, {"request", reply.request.number}, {"ok", true}, {"path", reply.path}});
+  return dump(reply);
 }
 
 std::string format_keyframe(const Map& map, KeyframeId id, std::uint64_t number) {
@@ -273,21 +270,13 @@ std::string format_landmark(const Map& map, LandmarkId id, std::uint64_t number)
 }
 
 ClientRequest parse_request(std::string_view text) {
-  ClientRequest request;
   const json object = has_many_brackets(text)
                           ? json(json::value_t::discarded)
                           : json::parse(text.begin(), text.end(), nullptr, false);
-  if (!object.is_object()) {
-    request.content = std::string("expected a JSON object");
-    return request;
-  }
-  request.number = read_number(object, "request", kMaxNumber);
-  if (!request.number) {
-    request.content = std::string("request: expected a non-negative integer");
-    return request;
-  }
-  request.content = read_content(object);
-  return request;
+  if (!object.is_object()) return {{}, "expected a JSON object"};
+  const auto number = read_number(object, "request", kMaxNumber);
+  if (!number) return {{}, "request: expected a non-negative integer"};
+  return {number, read_content(object)};
 }
 
 }  // namespace waymark

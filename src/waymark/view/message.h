@@ -73,17 +73,22 @@ class MessageWriter {
   std::string bytes_;
 };
 
+inline float seconds_between(std::int64_t start_ns, std::int64_t end_ns) {
+  return static_cast<float>(1e-9 * static_cast<double>(end_ns - start_ns));
+}
+
 /// 65535 for everything above.
 std::uint16_t saturate16(std::size_t value);
 
 /// A message of ids alone.
 Message encode_ids(MessageKind kind, std::span<const std::uint32_t> ids);
 
-/// Calls encode(part) for consecutive parts of at most kMaxChunk elements.
+/// Appends encode(part) for consecutive parts of at most kMaxChunk elements.
 template <class T, class Encode>
-void for_each_chunk(std::span<const T> elements, Encode&& encode) {
-  for (std::size_t begin = 0; begin < elements.size(); begin += kMaxChunk) {
-    encode(elements.subspan(begin, std::min(kMaxChunk, elements.size() - begin)));
+void add_chunks(const std::vector<T>& elements, std::vector<Message>& messages, Encode&& encode) {
+  const std::span<const T> all = elements;
+  for (std::size_t begin = 0; begin < all.size(); begin += kMaxChunk) {
+    messages.push_back(encode(all.subspan(begin, std::min(kMaxChunk, all.size() - begin))));
   }
 }
 
@@ -91,19 +96,15 @@ void for_each_chunk(std::span<const T> elements, Encode&& encode) {
 
 std::string format_hello(const SessionInfo& info);
 std::string format_status(const SessionStatus& status, const Map& map, std::size_t num_clients);
-std::string format_reply(const ViewReply& reply);
-/// number: of the request; nothing where it could not be read. error: empty if all went well.
-std::string format_reply(std::optional<std::uint64_t> number, std::string_view error);
+/// number: of the request; nothing where it could not be read. error: empty if all went well. path:
+/// of what was saved, if anything was.
+std::string format_reply(std::optional<std::uint64_t> number,
+                         std::string_view error,
+                         std::string_view path = "");
 /// Data of an element, or a reply that it does not exist.
 std::string format_keyframe(const Map& map, KeyframeId id, std::uint64_t number);
 std::string format_landmark(const Map& map, LandmarkId id, std::uint64_t number);
 
-struct ShowKeyframe {
-  KeyframeId id;
-};
-struct ShowLandmark {
-  LandmarkId id;
-};
 struct SetRate {
   double hz = 0.0;
 };
@@ -111,8 +112,8 @@ struct SetRate {
 /// What a client wants.
 struct ClientRequest {
   std::optional<std::uint64_t> number;  ///< Nothing where it could not be read.
-  /// The string says what is wrong.
-  std::variant<std::string, ViewRequest::Kind, ShowKeyframe, ShowLandmark, SetRate> content;
+  /// The string says what is wrong, an id whose data are wanted.
+  std::variant<std::string, ViewRequest::Kind, KeyframeId, LandmarkId, SetRate> content;
 };
 
 /// Reads what a client sent, whatever it is.

@@ -87,7 +87,7 @@ TEST(Protocol, ReadsRequests) {
   EXPECT_EQ(kind(R"({"do": "stop", "request": 0})"), ViewRequest::Kind::kStop);
   const ClientRequest show = parse_request(R"({"request": 9, "do": "landmark", "id": 17})");
   EXPECT_EQ(show.number, 9u);
-  EXPECT_EQ(std::get<ShowLandmark>(show.content).id, LandmarkId{17});
+  EXPECT_EQ(std::get<LandmarkId>(show.content), LandmarkId{17});
   EXPECT_EQ(
       std::get<SetRate>(parse_request(R"({"request": 1, "do": "rate", "hz": 2.5})").content).hz,
       2.5);

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numeric>
 #include <utility>
 
 namespace waymark {
@@ -52,9 +53,8 @@ std::optional<Pose> pose_of(const FrameNote& note, const Map& map) {
 }
 
 bool moves_frames(const Keyframe& before, const Keyframe& after) {
-  return before.rig_from_world.translation != after.rig_from_world.translation ||
-         before.rig_from_world.rotation.coeffs() != after.rig_from_world.rotation.coeffs() ||
-         before.applied_scale != after.applied_scale || before.submap != after.submap;
+  return !is_same_pose(before, after) || before.applied_scale != after.applied_scale ||
+         before.submap != after.submap;
 }
 
 }  // namespace
@@ -82,11 +82,6 @@ void LandmarkLayer::color_landmarks(const Map& before, const Map& after) {
       });
 }
 
-void LandmarkLayer::reset() {
-  colors_of_frames_.clear();
-  colors_.clear();
-}
-
 void LandmarkLayer::differences(const Map& before,
                                 const Map& after,
                                 std::vector<Message>& messages) const {
@@ -103,19 +98,17 @@ void LandmarkLayer::differences(const Map& before,
           moved.push_back(id);
         }
       });
-  for_each_chunk<std::uint32_t>(erased, [&](auto ids) {
-    messages.push_back(encode_ids(MessageKind::kLandmarksErased, ids));
-  });
-  for_each_chunk<LandmarkId>(changed, [&](auto ids) { messages.push_back(encode(after, ids)); });
-  for_each_chunk<LandmarkId>(moved,
-                             [&](auto ids) { messages.push_back(encode_positions(after, ids)); });
+  add_chunks(
+      erased, messages, [&](auto ids) { return encode_ids(MessageKind::kLandmarksErased, ids); });
+  add_chunks(changed, messages, [&](auto ids) { return encode(after, ids); });
+  add_chunks(moved, messages, [&](auto ids) { return encode_positions(after, ids); });
 }
 
 void LandmarkLayer::snapshot(const Map& map, std::vector<Message>& messages) const {
   std::vector<LandmarkId> all;
   all.reserve(map.landmarks().size());
   map.landmarks().for_each([&](LandmarkId id, const Landmark&) { all.push_back(id); });
-  for_each_chunk<LandmarkId>(all, [&](auto ids) { messages.push_back(encode(map, ids)); });
+  add_chunks(all, messages, [&](auto ids) { return encode(map, ids); });
 }
 
 Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) const {
@@ -134,14 +127,9 @@ Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) c
   return writer.finish();
 }
 
-void TrajectoryLayer::reset() { *this = TrajectoryLayer(); }
-
 void TrajectoryLayer::take(const FrameNote& note) {
   if (notes_.empty()) start_ns_ = note.timestamp_ns;
-  const auto place = std::lower_bound(
-      notes_.begin(), notes_.end(), note, [](const FrameNote& a, const FrameNote& b) {
-        return a.frame < b.frame;
-      });
+  const auto place = std::ranges::lower_bound(notes_, note.frame, {}, &FrameNote::frame);
   const auto index = static_cast<std::uint32_t>(place - notes_.begin());
   if (place == notes_.end()) {
     notes_.push_back(note);
@@ -194,16 +182,14 @@ void TrajectoryLayer::advance(std::span<const FrameNote> notes,
   for (const std::uint32_t index : std::exchange(pending_, {})) file(index, after);
   std::sort(changed_.begin(), changed_.end());
   changed_.erase(std::unique(changed_.begin(), changed_.end()), changed_.end());
-  for_each_chunk<std::uint32_t>(changed_,
-                                [&](auto indices) { messages.push_back(encode(indices, after)); });
+  add_chunks(changed_, messages, [&](auto indices) { return encode(indices, after); });
   changed_.clear();
 }
 
 void TrajectoryLayer::snapshot(const Map& map, std::vector<Message>& messages) const {
-  std::vector<std::uint32_t> all;
-  for (std::uint32_t i = 0; i < notes_.size(); ++i) all.push_back(i);
-  for_each_chunk<std::uint32_t>(all,
-                                [&](auto indices) { messages.push_back(encode(indices, map)); });
+  std::vector<std::uint32_t> all(notes_.size());
+  std::iota(all.begin(), all.end(), 0u);
+  add_chunks(all, messages, [&](auto indices) { return encode(indices, map); });
 }
 
 Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Map& map) const {
@@ -217,8 +203,7 @@ Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Ma
   for (const Pose& pose : poses) writer.add(pose.world_from_rig.translation);
   for (const Pose& pose : poses) writer.add(pose.world_from_rig.rotation);
   for (const std::uint32_t index : indices) {
-    writer.add(
-        static_cast<float>(1e-9 * static_cast<double>(notes_[index].timestamp_ns - start_ns_)));
+    writer.add(seconds_between(start_ns_, notes_[index].timestamp_ns));
   }
   for (const std::uint32_t index : indices) writer.add(notes_[index].tracking_ms);
   for (const Pose& pose : poses) writer.add(saturate16(pose.submap.value));
@@ -233,9 +218,9 @@ Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Ma
 
 void Scene::reset() {
   map_ = std::make_shared<const Map>();
-  landmarks_.reset();
-  keyframes_.reset();
-  trajectory_.reset();
+  landmarks_ = {};
+  keyframes_ = {};
+  trajectory_ = {};
 }
 
 std::vector<Message> Scene::advance(ViewUpdate& update, bool is_watched) {

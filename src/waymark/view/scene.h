@@ -38,11 +38,14 @@ CameraShape shape_of(const RigCamera& camera);
 /// landmarks, ascending by id.
 std::vector<CovisibilityEdge> strongest_older(const Covisibility& covisibility, KeyframeId id);
 
+inline bool is_same_pose(const Keyframe& a, const Keyframe& b) {
+  return a.rig_from_world.translation == b.rig_from_world.translation &&
+         a.rig_from_world.rotation.coeffs() == b.rig_from_world.rotation.coeffs();
+}
+
 /// Tells of the keyframes of a map, their cameras, the edges between them and its sub-maps.
 class KeyframeLayer {
  public:
-  void reset() { rigs_.clear(); }
-
   /// What turns one state of a map into a later one.
   void differences(const Map& before,
                    const Map& after,
@@ -69,7 +72,6 @@ class LandmarkLayer {
   void add_colors(FeatureColors colors);
   /// Gives new landmarks their colours. Before differences() and snapshot() of `after`.
   void color_landmarks(const Map& before, const Map& after);
-  void reset();
 
   /// What turns one state of a map into a later one.
   void differences(const Map& before, const Map& after, std::vector<Message>& messages) const;
@@ -91,7 +93,6 @@ class LandmarkLayer {
 /// Tells of the frames of a session: their poses, which move with the map, and what became of them.
 class TrajectoryLayer {
  public:
-  void reset();
   std::size_t size() const { return notes_.size(); }
   /// When the first frame came, 0 before.
   std::int64_t start_ns() const { return start_ns_; }
