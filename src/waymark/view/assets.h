@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <span>
 #include <string_view>
 
@@ -10,7 +11,6 @@ namespace waymark {
 /// A file of the page in the browser, as it is in viewer/dist.
 struct Asset {
   std::string_view path;  ///< Begins with a slash.
-  std::string_view content_type;
   std::string_view bytes;
 };
 
@@ -18,9 +18,10 @@ struct Asset {
 std::span<const Asset> list_assets();
 
 /// Null if there is none.
-const Asset* find_asset(std::string_view path);
-
-/// By the suffix of a path.
-std::string_view content_type_of(std::string_view path);
+inline const Asset* find_asset(std::string_view path) {
+  const std::span<const Asset> assets = list_assets();
+  const auto found = std::ranges::find(assets, path, &Asset::path);
+  return found == assets.end() ? nullptr : &*found;
+}
 
 }  // namespace waymark

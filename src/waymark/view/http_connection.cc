@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/view/http_connection.h"
 
+#include <array>
 #include <chrono>
 #include <utility>
 
@@ -11,36 +12,65 @@ namespace waymark {
 namespace {
 
 namespace beast = boost::beast;
+namespace http = boost::beast::http;
 namespace websocket = boost::beast::websocket;
 using namespace std::chrono_literals;
 
 constexpr std::size_t kMaxIncoming = 65536;
-
-namespace http = boost::beast::http;
-
 constexpr auto kTimeout = 10s;
 constexpr std::uint32_t kMaxHeader = 8192;
 constexpr std::size_t kMaxBuffer = 16384;
 
 std::string_view as_view(beast::string_view text) { return {text.data(), text.size()}; }
 
-std::string_view path_of(std::string_view target) { return target.substr(0, target.find('?')); }
+std::string_view path_of(const HttpRequest& request) {
+  const std::string_view target = as_view(request.target());
+  return target.substr(0, target.find('?'));
+}
+
+bool may_see_session(const AccessRules& rules, const HttpRequest& request) {
+  return is_session_allowed(rules,
+                            as_view(request.target()),
+                            as_view(request[http::field::host]),
+                            as_view(request[http::field::origin]));
+}
+
+/// By the suffix of a path.
+beast::string_view content_type_of(std::string_view path) {
+  using Entry = std::pair<std::string_view, std::string_view>;
+  constexpr std::array<Entry, 12> kTypes = {{
+      {".html", "text/html; charset=utf-8"},
+      {".js", "text/javascript; charset=utf-8"},
+      {".css", "text/css; charset=utf-8"},
+      {".json", "application/json"},
+      {".map", "application/json"},
+      {".svg", "image/svg+xml"},
+      {".png", "image/png"},
+      {".ico", "image/x-icon"},
+      {".woff2", "font/woff2"},
+      {".wasm", "application/wasm"},
+      {".txt", "text/plain; charset=utf-8"},
+      {".webmanifest", "application/manifest+json"},
+  }};
+  for (const auto& [suffix, type] : kTypes) {
+    if (path.ends_with(suffix)) return {type.data(), type.size()};
+  }
+  return "application/octet-stream";
+}
 
 }  // namespace
 
 WebSocketClient::WebSocketClient(beast::tcp_stream stream,
                                  ViewHub& hub,
-                                 std::function<void()> on_end)
-    : stream_(std::move(stream)), hub_(hub), on_end_(std::move(on_end)) {
+                                 std::shared_ptr<void> count)
+    : count_(std::move(count)), stream_(std::move(stream)), hub_(hub) {
   stream_.set_option(websocket::stream_base::timeout{10s, 60s, true});
   stream_.read_message_max(kMaxIncoming);
   stream_.write_buffer_bytes(65536);
   stream_.auto_fragment(false);
 }
 
-WebSocketClient::~WebSocketClient() { on_end_(); }
-
-void WebSocketClient::accept(const Request& request) {
+void WebSocketClient::accept(const HttpRequest& request) {
   stream_.async_accept(request, [self = shared_from_this()](const beast::error_code& error) {
     if (error) return;
     self->is_open_ = true;
@@ -131,26 +161,19 @@ void HttpConnection::read() {
                    });
 }
 
-void HttpConnection::answer(const Request& request) {
-  const std::string_view target = as_view(request.target());
-  const bool is_allowed = is_session_allowed(state_.rules,
-                                             target,
-                                             as_view(request[http::field::host]),
-                                             as_view(request[http::field::origin]));
-  if (path_of(target) == "/ws" && is_allowed && beast::websocket::is_upgrade(request)) {
+void HttpConnection::answer(const HttpRequest& request) {
+  if (path_of(request) == "/ws" && may_see_session(state_.rules, request) &&
+      websocket::is_upgrade(request)) {
     stream_.expires_never();
-    std::make_shared<WebSocketClient>(
-        std::move(stream_), state_.hub, [count = std::move(count_)]() mutable { count.reset(); })
+    std::make_shared<WebSocketClient>(std::move(stream_), state_.hub, std::move(count_))
         ->accept(request);
-    return;
+  } else {
+    write(respond_to(request));
   }
-  write(respond_to(request));
 }
 
-HttpConnection::Response HttpConnection::respond_to(const Request& request) const {
-  const std::string_view target = as_view(request.target());
-  const std::string_view host = as_view(request[http::field::host]);
-  const std::string_view path = path_of(target);
+HttpConnection::Response HttpConnection::respond_to(const HttpRequest& request) const {
+  const std::string_view path = path_of(request);
   Response response{http::status::ok, request.version()};
   response.keep_alive(request.keep_alive());
   response.set(http::field::server, "waymark");
@@ -161,10 +184,8 @@ HttpConnection::Response HttpConnection::respond_to(const Request& request) cons
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
     response.result(http::status::method_not_allowed);
     response.body() = "only GET and HEAD are known\n";
-  } else if (!is_host_allowed(state_.rules, host) ||
-             (is_session &&
-              !is_session_allowed(
-                  state_.rules, target, host, as_view(request[http::field::origin])))) {
+  } else if (!is_host_allowed(state_.rules, as_view(request[http::field::host])) ||
+             (is_session && !may_see_session(state_.rules, request))) {
     response.result(http::status::forbidden);
     response.body() = "not allowed: use the URL that waymark printed\n";
   } else if (path == "/ws") {
@@ -174,8 +195,7 @@ HttpConnection::Response HttpConnection::respond_to(const Request& request) cons
     response.set(http::field::content_type, "application/json");
     response.body() = state_.hub.status();
   } else if (const Asset* asset = find_asset(path == "/" ? "/index.html" : path)) {
-    response.set(http::field::content_type,
-                 beast::string_view(asset->content_type.data(), asset->content_type.size()));
+    response.set(http::field::content_type, content_type_of(asset->path));
     response.body() = std::string(asset->bytes);
   } else {
     response.result(http::status::not_found);

@@ -15,16 +15,15 @@
 
 namespace waymark {
 
+using HttpRequest = boost::beast::http::request<boost::beast::http::empty_body>;
+
 /// A viewer's connection. Lives as long as an operation on it is under way.
 class WebSocketClient : public ViewClient, public std::enable_shared_from_this<WebSocketClient> {
  public:
-  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
+  /// count: of the connections, kept until the client is gone.
+  WebSocketClient(boost::beast::tcp_stream stream, ViewHub& hub, std::shared_ptr<void> count);
 
-  /// on_end: called once, when the client is gone.
-  WebSocketClient(boost::beast::tcp_stream stream, ViewHub& hub, std::function<void()> on_end);
-  ~WebSocketClient() override;
-
-  void accept(const Request& request);
+  void accept(const HttpRequest& request);
   void send() override;
   void close() override;
 
@@ -34,9 +33,9 @@ class WebSocketClient : public ViewClient, public std::enable_shared_from_this<W
   void finish_write(const boost::beast::error_code& error);
   void leave();
 
+  const std::shared_ptr<void> count_;
   boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
   ViewHub& hub_;
-  const std::function<void()> on_end_;
   boost::beast::flat_buffer incoming_;
   Outbox::Outgoing outgoing_;  ///< Under way.
   std::uint64_t number_ = 0;   ///< Given by the hub; 0: not there.
@@ -64,11 +63,10 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
   void refuse();
 
  private:
-  using Request = boost::beast::http::request<boost::beast::http::empty_body>;
   using Response = boost::beast::http::response<boost::beast::http::string_body>;
 
-  void answer(const Request& request);
-  Response respond_to(const Request& request) const;
+  void answer(const HttpRequest& request);
+  Response respond_to(const HttpRequest& request) const;
   void write(Response response);
   void end();
 

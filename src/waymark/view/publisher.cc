@@ -8,6 +8,7 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/base/median.h"
 #include "waymark/view/hub.h"
 
 namespace waymark {
@@ -77,20 +78,17 @@ void ViewPublisher::note_frames(const System& system,
                                 const FrameImages& input,
                                 const TrackingResult& result) {
   const FrameDetails& details = system.details();
-  FrameNote note;
-  note.frame = details.frame;
-  note.timestamp_ns = input.timestamp_ns;
-  static_cast<FrameStatus&>(note) = result;
-  note.tracking_ms = static_cast<float>(result.stages.tracking_ms());
-  if (result.world_from_rig) note.pose = details.pose;
-  update_.frames.push_back(note);
+  update_.frames.push_back({result,
+                            details.frame,
+                            input.timestamp_ns,
+                            static_cast<float>(result.stages.tracking_ms()),
+                            result.world_from_rig ? std::optional(details.pose) : std::nullopt});
   for (const FilledPose& filled : details.filled) {
-    FrameNote earlier;
-    earlier.frame = filled.frame;
-    earlier.timestamp_ns = timestamps_ns_.at(filled.frame.value - first_frame_.value);
-    earlier.state = FrameState::kFilled;
-    earlier.pose = filled.pose;
-    update_.frames.push_back(earlier);
+    update_.frames.push_back({{.state = FrameState::kFilled},
+                              filled.frame,
+                              timestamps_ns_.at(filled.frame.value - first_frame_.value),
+                              0.0f,
+                              filled.pose});
   }
   update_.status.num_tracked += details.filled.size();
 }
@@ -115,10 +113,8 @@ void ViewPublisher::measure(const TrackingResult& result) {
     recent_tracking_ms_.pop_front();
     recent_times_.pop_front();
   }
-  std::vector<float> sorted(recent_tracking_ms_.begin(), recent_tracking_ms_.end());
-  const auto middle = sorted.begin() + static_cast<std::ptrdiff_t>(sorted.size() / 2);
-  std::nth_element(sorted.begin(), middle, sorted.end());
-  status.median_tracking_ms = static_cast<double>(*middle);
+  status.median_tracking_ms = static_cast<double>(
+      median(std::vector<float>(recent_tracking_ms_.begin(), recent_tracking_ms_.end())));
   const std::chrono::duration<double> span = recent_times_.back() - recent_times_.front();
   status.frames_per_s =
       span.count() > 0.0 ? static_cast<double>(recent_times_.size() - 1) / span.count() : 0.0;
@@ -158,13 +154,12 @@ void ViewPublisher::finish(const System& system) {
   status.num_tracked = 0;
   update_.map = system.map();
   for (const TrajectoryFrame& frame : system.trajectory()) {
-    FrameNote note;
-    note.frame = FrameId{first_frame_.value + frame.frame.value};
-    note.timestamp_ns = frame.timestamp_ns;
-    note.state = frame.state;
-    note.final_pose = frame.world_from_rig;
-    note.submap = frame.submap;
-    update_.frames.push_back(note);
+    update_.frames.push_back({{.state = frame.state, .submap = frame.submap},
+                              FrameId{first_frame_.value + frame.frame.value},
+                              frame.timestamp_ns,
+                              0.0f,
+                              {},
+                              frame.world_from_rig});
     ++status.num_tracked;
   }
   push();

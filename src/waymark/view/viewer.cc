@@ -148,9 +148,8 @@ class Viewer::Impl {
       if (error) return;
       tick();
       hub_.tick(ViewHub::Clock::now());
-      if (!is_leaving_) return;
-      const bool is_late = ViewHub::Clock::now() >= leave_at_;
-      if (is_late) context_.stop();
+      if (!leave_at_) return;
+      if (ViewHub::Clock::now() >= *leave_at_) context_.stop();
       if (!hub_.is_idle()) return;
       hub_.close_clients();
       if (state_.num_connections == 0) context_.stop();
@@ -158,7 +157,6 @@ class Viewer::Impl {
   }
 
   void begin_farewell() {
-    is_leaving_ = true;
     leave_at_ = ViewHub::Clock::now() + kFarewell;
     ErrorCode ignored;
     acceptor_.close(ignored);
@@ -176,8 +174,7 @@ class Viewer::Impl {
   asio::io_context context_{1};
   Tcp::acceptor acceptor_;
   asio::steady_timer timer_;
-  bool is_leaving_ = false;
-  ViewHub::Clock::time_point leave_at_;
+  std::optional<ViewHub::Clock::time_point> leave_at_;
   std::jthread thread_;
 };
 
