@@ -6,7 +6,6 @@
 #include <memory>
 #include <optional>
 #include <span>
-#include <vector>
 
 #include "waymark/loop/drift.h"
 #include "waymark/map/map.h"

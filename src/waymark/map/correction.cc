@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/map/correction.h"
 
-#include <algorithm>
 #include <map>
 
 #include "waymark/geometry/sim3.h"
@@ -16,15 +15,6 @@ using Motions = std::map<KeyframeId, Sim3>;
 Sim3 motion_of(const MapCorrection::KeyframeMove& move, const Rigid3& old_rig_from_world) {
   const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), move.scale);
   return Sim3(move.rig_from_world.inverse()) * resized * Sim3(old_rig_from_world);
-}
-
-Motions named_motions(const Map& map, const MapCorrection& correction) {
-  Motions motions;
-  for (const MapCorrection::KeyframeMove& move : correction.keyframes) {
-    const Keyframe* keyframe = map.keyframes().find(move.keyframe);
-    if (keyframe) motions.emplace(move.keyframe, motion_of(move, keyframe->rig_from_world));
-  }
-  return motions;
 }
 
 /// The motion of the nearest ancestor that has one, given to all on the way.
@@ -89,7 +79,11 @@ void move_landmarks(Map& map, const MapCorrection& correction, const Motions& mo
 }  // namespace
 
 void apply_correction(Map& map, const MapCorrection& correction) {
-  Motions motions = named_motions(map, correction);
+  Motions motions;
+  for (const MapCorrection::KeyframeMove& move : correction.keyframes) {
+    const Keyframe* keyframe = map.keyframes().find(move.keyframe);
+    if (keyframe) motions.emplace(move.keyframe, motion_of(move, keyframe->rig_from_world));
+  }
   map.keyframes().for_each([&](KeyframeId id, const Keyframe&) { inherit(map, id, motions); });
   move_landmarks(map, correction, motions);
   move_keyframes(map, correction, motions);

@@ -42,7 +42,8 @@ bool PlaceIndex::erase(KeyframeId keyframe) {
   if (!contains(keyframe)) return false;
   erased_.insert(std::lower_bound(erased_.begin(), erased_.end(), keyframe), keyframe);
   const std::size_t segment = find_segment(keyframe);
-  if (2 * num_erased(*segments_[segment]) >= segments_[segment]->rows().size()) compact(segment);
+  if (2 * erased_in(*segments_[segment]).size() >= segments_[segment]->rows().size())
+    compact(segment);
   return true;
 }
 
@@ -103,11 +104,10 @@ std::size_t PlaceIndex::find_segment(KeyframeId keyframe) const {
   return static_cast<std::size_t>(segment - segments_.begin());
 }
 
-std::size_t PlaceIndex::num_erased(const PlaceSegment& segment) const {
+std::span<const KeyframeId> PlaceIndex::erased_in(const PlaceSegment& segment) const {
   const std::span<const PlaceRow> rows = segment.rows();
   const auto begin = std::lower_bound(erased_.begin(), erased_.end(), rows.front().keyframe);
-  const auto end = std::upper_bound(begin, erased_.end(), rows.back().keyframe);
-  return static_cast<std::size_t>(end - begin);
+  return {begin, std::upper_bound(begin, erased_.end(), rows.back().keyframe)};
 }
 
 void PlaceIndex::merge_last_two() {
@@ -131,11 +131,10 @@ void PlaceIndex::compact(std::size_t segment) {
 }
 
 void PlaceIndex::forget_erased(const PlaceSegment& segment) {
-  const std::span<const PlaceRow> rows = segment.rows();
-  const auto begin = std::lower_bound(erased_.begin(), erased_.end(), rows.front().keyframe);
-  const auto end = std::upper_bound(begin, erased_.end(), rows.back().keyframe);
-  num_rows_ -= static_cast<std::size_t>(end - begin);
-  erased_.erase(begin, end);
+  const std::span<const KeyframeId> gone = erased_in(segment);
+  num_rows_ -= gone.size();
+  const auto begin = erased_.begin() + (gone.data() - erased_.data());
+  erased_.erase(begin, begin + std::ssize(gone));
 }
 
 }  // namespace waymark

@@ -68,7 +68,8 @@ class PlaceIndex {
   bool is_erased(KeyframeId keyframe) const;
   SubmapId resolve(SubmapId submap) const;
   std::size_t find_segment(KeyframeId keyframe) const;
-  std::size_t num_erased(const PlaceSegment& segment) const;
+  /// Of the keyframes that a segment still holds.
+  std::span<const KeyframeId> erased_in(const PlaceSegment& segment) const;
   void merge_last_two();
   /// Makes the segment anew without its erased keyframes.
   void compact(std::size_t segment);

@@ -63,20 +63,16 @@ LocatedFrame FrameLocator::locate_again(const Features& features,
                                         LocatedFrame first,
                                         const LandmarkSet& set,
                                         const ProjectionOptions& options) {
-  is_taken_.assign(features.num_primary, 0);
-  found_.clear();
-  for (std::size_t i = 0; i < features.num_primary; ++i) {
-    if (!first.landmarks[i].is_valid()) continue;
-    is_taken_[i] = 1;
-    found_.push_back(first.landmarks[i]);
-  }
-  std::sort(found_.begin(), found_.end());
+  is_taken_.resize(features.num_primary);
+  for (std::size_t i = 0; i < is_taken_.size(); ++i) is_taken_[i] = first.landmarks[i].is_valid();
+  std::vector<LandmarkId> found = primary_landmarks(features, first.landmarks);
+  std::ranges::sort(found);
   const ProjectionMatches& matches =
       matcher_.match(set, features, is_taken_, first.rig_from_world, options);
   is_visible_ = matches.is_visible;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
-    if (std::binary_search(found_.begin(), found_.end(), set.ids[i])) continue;
+    if (std::ranges::binary_search(found, set.ids[i])) continue;
     first.landmarks[matches.features[i]] = set.ids[i];
   }
   return locate(features, map, first.rig_from_world, std::move(first.landmarks));

@@ -67,7 +67,6 @@ class FrameLocator {
   PoseObservations observations_;
   std::vector<std::uint32_t> feature_of_observation_;
   std::vector<std::uint8_t> is_taken_;
-  std::vector<LandmarkId> found_;  ///< Ascending.
   PoseWorkspace workspace_;
 };
 

@@ -50,15 +50,6 @@ Expected facing_landmarks(const Keyframe& keyframe,
   return expected;
 }
 
-std::vector<LandmarkId> ascending(std::span<const LandmarkId> landmarks) {
-  std::vector<LandmarkId> sorted;
-  for (const LandmarkId id : landmarks) {
-    if (id.is_valid()) sorted.push_back(id);
-  }
-  std::sort(sorted.begin(), sorted.end());
-  return sorted;
-}
-
 /// Which of parts x parts rectangles of the image a pixel lies in.
 std::size_t part_of(const Eigen::Vector2d& pixel, const Camera& camera, int parts) {
   const auto index = [parts](double at, int size) {
@@ -123,7 +114,8 @@ double place_confidence(const Rig& rig,
   std::vector<Eigen::Vector2d> pixels(expected.ids.size());
   std::vector<std::uint8_t> is_visible(expected.ids.size());
   camera.project(expected.points_in_cam, pixels, is_visible);
-  const std::vector<LandmarkId> found = ascending(landmarks);
+  std::vector<LandmarkId> found(landmarks.begin(), landmarks.end());
+  std::ranges::sort(found);
   Regions regions;
   std::vector<std::uint8_t> is_cell_expected(kCells * kCells);
   for (std::size_t i = 0; i < expected.ids.size(); ++i) {
@@ -131,7 +123,7 @@ double place_confidence(const Rig& rig,
     is_cell_expected[part_of(pixels[i], camera, kCells)] = 1;
     Region& region = regions[part_of(pixels[i], camera, kRegions)];
     ++region.num_expected;
-    region.num_found += std::binary_search(found.begin(), found.end(), expected.ids[i]);
+    region.num_found += std::ranges::binary_search(found, expected.ids[i]);
   }
   count_features(features, is_cell_expected, camera, regions);
   return judge(regions);

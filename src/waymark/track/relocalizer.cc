@@ -45,13 +45,13 @@ std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
                                                       std::span<const KeyframeId> candidates) {
   std::optional<LocatedFrame> best;
   double best_confidence = 0;
-  matched_.clear();
+  std::vector<KeyframeId> tried;
   diagnosis_ = {.reason = FrameReason::kNoCandidate};
   for (const KeyframeId candidate : candidates) {
-    if (std::find(matched_.begin(), matched_.end(), candidate) != matched_.end()) continue;
+    if (std::ranges::find(tried, candidate) != tried.end()) continue;
     auto place = locator_.locate(*frame.features, map, candidate, frame.id.value);
     const auto matched = locator_.matched_keyframes();
-    matched_.insert(matched_.end(), matched.begin(), matched.end());
+    tried.insert(tried.end(), matched.begin(), matched.end());
     const bool has_inliers = place && place->frame.num_inliers >= min_inliers_;
     PlaceAttempt attempt = locator_.attempt();
     if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;

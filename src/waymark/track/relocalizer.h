@@ -44,7 +44,6 @@ class Relocalizer {
   PlaceLocator locator_;
   const int min_inliers_;
   FrameStatus diagnosis_;
-  std::vector<KeyframeId> matched_;  ///< Those already tried for this frame.
 };
 
 }  // namespace waymark

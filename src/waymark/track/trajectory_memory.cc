@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/trajectory_memory.h"
 
-#include <utility>
-
 namespace waymark {
 namespace {
 

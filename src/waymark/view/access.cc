@@ -61,9 +61,8 @@ std::string_view query_parameter(std::string_view target, std::string_view name)
 bool is_host_allowed(const AccessRules& rules, std::string_view host) {
   if (!rules.is_loopback) return true;
   constexpr std::array<std::string_view, 3> kNames = {"127.0.0.1", "localhost", "[::1]"};
-  return std::any_of(kNames.begin(), kNames.end(), [&](std::string_view name) {
-    return is_equal_name(without_port(host), name);
-  });
+  return std::ranges::any_of(
+      kNames, [&](std::string_view name) { return is_equal_name(without_port(host), name); });
 }
 
 bool is_session_allowed(const AccessRules& rules,

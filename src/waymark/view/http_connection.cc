@@ -85,17 +85,13 @@ void WebSocketClient::read() {
       [self = shared_from_this()](const beast::error_code& error, std::size_t num_bytes) {
         if (error) {
           self->leave();
-        } else {
-          self->receive(num_bytes);
+          return;
         }
+        const auto* data = static_cast<const char*>(self->incoming_.data().data());
+        self->hub_.receive(self->number_, {data, num_bytes}, ViewHub::Clock::now());
+        self->incoming_.consume(self->incoming_.size());
+        self->read();
       });
-}
-
-void WebSocketClient::receive(std::size_t num_bytes) {
-  const auto* data = static_cast<const char*>(incoming_.data().data());
-  hub_.receive(number_, {data, num_bytes}, ViewHub::Clock::now());
-  incoming_.consume(incoming_.size());
-  read();
 }
 
 void WebSocketClient::send() {

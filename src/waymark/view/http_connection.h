@@ -8,7 +8,6 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
-#include <string>
 
 #include "waymark/view/access.h"
 #include "waymark/view/hub.h"
@@ -29,7 +28,6 @@ class WebSocketClient : public ViewClient, public std::enable_shared_from_this<W
 
  private:
   void read();
-  void receive(std::size_t num_bytes);
   void finish_write(const boost::beast::error_code& error);
   void leave();
 

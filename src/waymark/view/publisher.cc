@@ -3,9 +3,7 @@
 #include "waymark/view/publisher.h"
 
 #include <algorithm>
-#include <cmath>
 #include <cstring>
-#include <utility>
 #include <vector>
 
 #include "waymark/base/median.h"

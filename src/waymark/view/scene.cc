@@ -216,15 +216,13 @@ Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Ma
   return writer.finish();
 }
 
-void Scene::reset() {
-  map_ = std::make_shared<const Map>();
-  landmarks_ = {};
-  keyframes_ = {};
-  trajectory_ = {};
-}
-
 std::vector<Message> Scene::advance(ViewUpdate& update, bool is_watched) {
-  if (update.is_reset) reset();
+  if (update.is_reset) {
+    map_ = std::make_shared<const Map>();
+    landmarks_ = {};
+    keyframes_ = {};
+    trajectory_ = {};
+  }
   const std::shared_ptr<const Map> before = map_;
   if (update.map) map_ = update.map;
   for (FeatureColors& colors : update.colors) landmarks_.add_colors(std::move(colors));

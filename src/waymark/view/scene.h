@@ -6,7 +6,6 @@
 #include <array>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -132,8 +131,6 @@ class Scene {
   std::int64_t start_ns() const { return trajectory_.start_ns(); }
 
  private:
-  void reset();
-
   std::shared_ptr<const Map> map_ = std::make_shared<const Map>();
   LandmarkLayer landmarks_;
   KeyframeLayer keyframes_;
