@@ -29,8 +29,8 @@ bool has_measured_ranges(const Map& map, SubmapId submap) {
   bool has_any = false;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     if (keyframe.submap != submap || has_any) return;
-    const std::vector<float>& ranges = keyframe.features->range_m;
-    has_any = std::any_of(ranges.begin(), ranges.end(), [](float range) { return range > 0.0f; });
+    has_any =
+        std::ranges::any_of(keyframe.features->range_m, [](float range) { return range > 0.0f; });
   });
   return has_any;
 }
@@ -81,8 +81,7 @@ std::optional<TrajectoryFit> fit_trajectory(const Map& map,
     if (keyframe.submap != submap) return;
     mapped.push_back({keyframe.timestamp_ns, camera_position(keyframe)});
   });
-  std::stable_sort(
-      mapped.begin(), mapped.end(), [](const auto& a, const auto& b) { return a.first < b.first; });
+  std::ranges::stable_sort(mapped, {}, &std::pair<std::int64_t, Eigen::Vector3d>::first);
   std::vector<std::int64_t> times;
   for (const auto& [time, position] : mapped) times.push_back(time);
   std::vector<Eigen::Vector3d> in_map;

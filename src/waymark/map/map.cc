@@ -136,12 +136,8 @@ KeyframeId Map::add_keyframe(Keyframe keyframe) {
 LandmarkId Map::add_landmark(SubmapId submap,
                              const Eigen::Vector3d& position_in_world,
                              KeyframeId reference) {
-  Landmark landmark;
-  landmark.submap = submap;
-  landmark.position_in_world = position_in_world;
-  landmark.reference = reference;
   landmark_forwarding_.insert({});
-  return landmarks_.insert(std::move(landmark));
+  return landmarks_.insert({submap, position_in_world, reference, {}, {}});
 }
 
 void Map::observe(KeyframeId keyframe, std::uint32_t feature, LandmarkId landmark) {
