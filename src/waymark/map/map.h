@@ -72,7 +72,8 @@ struct Observation {
 
 /// What a landmark looks like and from where; a pure function of its observations.
 struct Appearance {
-  Descriptor descriptor{};  ///< The medoid of those of its newest observers.
+  /// Of its newest observers' the one with the least median distance to the others.
+  Descriptor descriptor{};
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Mean unit vector towards its observers.
   /// Extent in metres of one pixel of the level it was seen at: distance times size_rad.
   double size_m = 0.0;

@@ -2,31 +2,33 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/appearance.h"
 
-#include <algorithm>
-#include <cstdint>
+#include <array>
 #include <span>
 
+#include "waymark/base/median.h"
 #include "waymark/image/hamming.h"
 
 namespace waymark {
 namespace {
 
-/// More descriptors than this hardly change the medoid; the newest are taken.
+/// More descriptors than this do not change the middle one by much; the newest are taken.
 constexpr std::size_t kMaxDescriptors = 10;
 
-/// The medoid: that with the least sum of distances to the others (Kaufman and Rousseeuw 1990).
-Descriptor medoid(std::span<const Descriptor* const> descriptors) {
-  const Descriptor* best = nullptr;
-  int least_sum = INT32_MAX;
-  for (const Descriptor* candidate : descriptors) {
-    int sum = 0;
-    for (const Descriptor* other : descriptors) sum += hamming_distance(*candidate, *other);
-    if (sum < least_sum) {
-      least_sum = sum;
-      best = candidate;
+Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) {
+  std::size_t best = 0;
+  int best_median = INT32_MAX;
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    std::array<int, kMaxDescriptors> distances{};
+    for (std::size_t k = 0; k < descriptors.size(); ++k) {
+      distances[k] = hamming_distance(*descriptors[i], *descriptors[k]);
+    }
+    const int middle = median(std::span(distances).first(descriptors.size()));
+    if (middle < best_median) {
+      best_median = middle;
+      best = i;
     }
   }
-  return *best;
+  return *descriptors[best];
 }
 
 }  // namespace
@@ -50,9 +52,12 @@ Appearance describe_landmark(const Map& map, LandmarkId id) {
     }
   }
   if (descriptors.empty()) return landmark.appearance;
+  if (descriptors.size() > kMaxDescriptors) {
+    descriptors.erase(descriptors.begin(),
+                      descriptors.end() - static_cast<std::ptrdiff_t>(kMaxDescriptors));
+  }
   appearance.direction.normalize();
-  const std::size_t num_used = std::min(descriptors.size(), kMaxDescriptors);
-  appearance.descriptor = medoid(std::span(descriptors).last(num_used));
+  appearance.descriptor = middle_descriptor(descriptors);
   return appearance;
 }
 

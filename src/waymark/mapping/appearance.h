@@ -6,8 +6,9 @@
 
 namespace waymark {
 
-/// What a landmark looks like, from its observations: the medoid of the newest descriptors, the mean
-/// direction towards its observers, and the metric size of a pixel at its reference.
+/// What a landmark looks like, from its observations: the descriptor with the least median
+/// distance to the others, the mean direction towards its observers, and the metric size of a
+/// pixel at its reference.
 Appearance describe_landmark(const Map& map, LandmarkId id);
 
 }  // namespace waymark
