@@ -7,7 +7,6 @@
 
 #include "waymark/base/median.h"
 #include "waymark/optimize/levenberg_marquardt.h"
-#include "waymark/optimize/pose_arrays.h"
 #include "waymark/optimize/pose_kernel.h"
 
 namespace waymark {

@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/optimize/pose_arrays.h"
-
 #include <cmath>
 
 #include "waymark/base/check.h"
+#include "waymark/optimize/pose_kernel.h"
 
 namespace waymark {
 

@@ -7,7 +7,6 @@
 
 #include "waymark/geometry/so3.h"
 #include "waymark/optimize/residual.h"
-#include "waymark/optimize/robust_loss.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {

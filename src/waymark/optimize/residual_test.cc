@@ -6,7 +6,6 @@
 
 #include <limits>
 
-#include "waymark/optimize/robust_loss.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {

@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/optimize/schur_plan.h"
-
 #include <algorithm>
 #include <tuple>
 #include <utility>
+
+#include "waymark/optimize/schur_solver.h"
 
 namespace waymark {
 

@@ -7,11 +7,8 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/optimize/block_cholesky.h"
 #include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
-#include "waymark/optimize/robust_loss.h"
-#include "waymark/optimize/schur_plan.h"
 
 namespace waymark {
 

@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
+#include "waymark/optimize/block_cholesky.h"
 #include "waymark/optimize/bundle.h"
 
 namespace waymark {
@@ -24,5 +27,23 @@ struct BundleRound {
 BundleRound minimize_with_schur(BundleProblem& problem,
                                 std::span<const std::uint8_t> is_used,
                                 const BundleOptions& options);
+
+inline constexpr std::uint32_t kNoSlot = UINT32_MAX;
+
+/// Which observations meet where. A link is a point together with a free pose that sees it, by
+/// one camera or more; links run by point, then by pose.
+struct SchurPlan {
+  std::vector<std::uint32_t> slot_of_pose;  // Position in the reduced system, or kNoSlot.
+  std::size_t num_slots = 0;
+  BlockPattern pattern;  // Slots that see a point in common. In an order of little fill-in.
+  std::vector<std::uint32_t> observations;         // The used ones.
+  std::vector<std::uint32_t> link_of_observation;  // Parallel to it; kNoSlot if none.
+  std::vector<std::uint32_t> points;               // Those with observations.
+  std::vector<std::uint32_t> first_observation;    // Per entry of points, and one past the end.
+  std::vector<std::uint32_t> first_link;           // Likewise.
+  std::vector<std::uint32_t> slot_of_link;
+};
+
+SchurPlan make_schur_plan(const BundleProblem& problem, std::span<const std::uint8_t> is_used);
 
 }  // namespace waymark

@@ -13,7 +13,6 @@
 #include "waymark/geometry/so3.h"
 #include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
-#include "waymark/optimize/robust_loss.h"
 
 namespace waymark {
 namespace {
