@@ -1,10 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/named_worlds.h"
+#include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <array>
 #include <utility>
 
+#include "waymark/base/check.h"
 #include "waymark/simulate/world_builder.h"
 
 namespace waymark {
@@ -210,8 +212,6 @@ void add_street_furniture(WorldBuilder& builder, const Side& side, Rng& rng) {
   }
 }
 
-}  // namespace
-
 World make_room(std::uint64_t seed) { return make_one_room(seed, Style::kWall, "room"); }
 
 World make_bare_room(std::uint64_t seed) { return make_one_room(seed, Style::kBare, "bare"); }
@@ -309,6 +309,34 @@ World make_street(std::uint64_t seed) {
     add_street_furniture(builder, side, rng);
   }
   return builder.build("street");
+}
+
+struct NamedWorld {
+  std::string_view name;
+  World (*make)(std::uint64_t seed);
+};
+
+constexpr std::array<NamedWorld, 6> kWorlds = {{{"room", make_room},
+                                                {"apartment", make_apartment},
+                                                {"hall", make_hall},
+                                                {"street", make_street},
+                                                {"twins", make_twins},
+                                                {"bare", make_bare_room}}};
+
+}  // namespace
+
+std::vector<std::string> world_names() {
+  std::vector<std::string> names;
+  for (const NamedWorld& world : kWorlds) names.emplace_back(world.name);
+  return names;
+}
+
+std::shared_ptr<const World> make_world(std::string_view name, std::uint64_t seed) {
+  for (const NamedWorld& world : kWorlds) {
+    if (world.name == name) return std::make_shared<const World>(world.make(seed));
+  }
+  throw InputError(fmt::format("world '{}'", name),
+                   fmt::format("unknown, expected one of {}", fmt::join(world_names(), ", ")));
 }
 
 }  // namespace waymark

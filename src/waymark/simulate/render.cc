@@ -66,13 +66,9 @@ float sky_grey(const Vector3f& direction) {
   return 215.0f + 25.0f * d.z() + 6.0f * clouds;
 }
 
-bool is_round(const TraceSurface& s) {
-  return s.kind == SurfaceKind::kCylinder || s.kind == SurfaceKind::kSphere;
-}
-
 /// Brings u within half a turn of reference.
 float unwrap(float u, float reference, const TraceSurface& s) {
-  if (!is_round(s)) return u;
+  if (!is_round(s.kind)) return u;
   return u - s.size.x() * std::round((u - reference) / s.size.x());
 }
 
@@ -114,8 +110,9 @@ class TileShader {
              const Vector2f& a,
              const Vector2f& b) const {
     const Surface& surface = world_.surfaces[s.index];
-    const Vector3f normal =
-        is_round(s) ? Vector3f(surface_normal(surface, uv.cast<double>()).cast<float>()) : s.normal;
+    const Vector3f normal = is_round(s.kind)
+                                ? Vector3f(surface_normal(surface, uv.cast<double>()).cast<float>())
+                                : s.normal;
     return light_on(normal) * world_.textures[surface.texture].sample(uv, a, b);
   }
 

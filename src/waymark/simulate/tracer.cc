@@ -105,6 +105,10 @@ void trace_all(const TraceSurface& surface_in, std::int32_t id, RayTile& tile) {
   }
 }
 
+/// By SurfaceKind.
+constexpr std::array kTraceAll = {
+    trace_all<hit_rectangle>, trace_all<hit_disc>, trace_all<hit_cylinder>, trace_all<hit_sphere>};
+
 /// The cone around the rays of a tile.
 struct Cone {
   Vector3f axis = Vector3f::Zero();
@@ -139,11 +143,6 @@ struct Cone {
   }
 };
 
-bool faces_eye(const TraceSurface& s) {
-  const bool is_plane = s.kind == SurfaceKind::kRectangle || s.kind == SurfaceKind::kDisc;
-  return !is_plane || s.eye.z() > 0.0f;
-}
-
 TraceSurface relative_to(const Surface& surface, std::uint32_t index, const Vector3d& eye) {
   const Vector3d normal = surface.normal();
   const Vector3d offset = eye - surface.origin;
@@ -160,7 +159,7 @@ TraceSurface relative_to(const Surface& surface, std::uint32_t index, const Vect
 
   Vector3d middle(0.5 * surface.size.x(), 0.5 * surface.size.y(), 0.0);
   Vector3d half = middle;
-  if (surface.kind == SurfaceKind::kCylinder || surface.kind == SurfaceKind::kSphere) {
+  if (is_round(surface.kind)) {
     const bool is_sphere = surface.kind == SurfaceKind::kSphere;
     half = Vector3d(surface.radius, is_sphere ? surface.radius : middle.y(), surface.radius);
     middle = Vector3d(0.0, is_sphere ? 0.0 : middle.y(), 0.0);
@@ -197,7 +196,7 @@ Vector2f TraceSurface::uv(const Vector3f& direction, float distance) const {
   const Vector3f point =
       eye +
       distance * Vector3f(u_axis.dot(direction), v_axis.dot(direction), normal.dot(direction));
-  if (kind == SurfaceKind::kRectangle || kind == SurfaceKind::kDisc) return point.head<2>();
+  if (!is_round(kind)) return point.head<2>();
   float angle = std::atan2(-point.z(), point.x());
   if (angle < 0.0f) angle += 2.0f * std::numbers::pi_v<float>;
   if (kind == SurfaceKind::kCylinder) return {radius * angle, point.y()};
@@ -205,18 +204,15 @@ Vector2f TraceSurface::uv(const Vector3f& direction, float distance) const {
 }
 
 float TraceSurface::distance_along(const Vector3f& direction) const {
-  TraceSurface unbounded = *this;
-  if (kind == SurfaceKind::kRectangle || kind == SurfaceKind::kDisc) {
-    const float across = normal.dot(direction);
-    return across < 0.0f ? -eye.z() / across : kInfinity;
-  }
-  return hit_any(unbounded, direction);
+  if (is_round(kind)) return hit_any(*this, direction);
+  const float across = normal.dot(direction);
+  return across < 0.0f ? -eye.z() / across : kInfinity;
 }
 
 Tracer::Tracer(const World& world, const Vector3d& eye) {
   for (std::uint32_t i = 0; i < world.surfaces.size(); ++i) {
     const TraceSurface surface = relative_to(world.surfaces[i], i, eye);
-    if (faces_eye(surface)) surfaces_.push_back(surface);
+    if (is_round(surface.kind) || surface.eye.z() > 0.0f) surfaces_.push_back(surface);
   }
   std::stable_sort(surfaces_.begin(), surfaces_.end(), [](const auto& a, const auto& b) {
     return a.nearest < b.nearest;
@@ -231,21 +227,7 @@ void Tracer::trace(RayTile& tile) const {
   for (std::size_t k = 0; k < surfaces_.size() && surfaces_[k].nearest <= farthest; ++k) {
     const TraceSurface& surface = surfaces_[k];
     if (!cone.may_touch(surface)) continue;
-    const std::int32_t id = static_cast<std::int32_t>(k);
-    switch (surface.kind) {
-      case SurfaceKind::kRectangle:
-        trace_all<hit_rectangle>(surface, id, tile);
-        break;
-      case SurfaceKind::kDisc:
-        trace_all<hit_disc>(surface, id, tile);
-        break;
-      case SurfaceKind::kCylinder:
-        trace_all<hit_cylinder>(surface, id, tile);
-        break;
-      case SurfaceKind::kSphere:
-        trace_all<hit_sphere>(surface, id, tile);
-        break;
-    }
+    kTraceAll[static_cast<std::size_t>(surface.kind)](surface, static_cast<std::int32_t>(k), tile);
     const auto end = tile.distance.begin() + tile.count;
     farthest = longest * *std::max_element(tile.distance.begin(), end);
   }

@@ -3,13 +3,11 @@
 #include "waymark/simulate/world.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/simulate/named_worlds.h"
 
 namespace waymark {
 namespace {
@@ -69,9 +67,13 @@ std::optional<SurfaceHit> intersect_plane(const Surface& surface, const LocalRay
   return SurfaceHit{distance, uv, surface.normal()};
 }
 
-std::optional<SurfaceHit> intersect_cylinder(const Surface& surface, const LocalRay& ray) {
-  const Vector2d across(ray.direction.x(), ray.direction.z());
-  const Vector2d offset(ray.origin.x(), ray.origin.z());
+/// A cylinder or sphere.
+std::optional<SurfaceHit> intersect_round(const Surface& surface, const LocalRay& ray) {
+  const bool is_sphere = surface.kind == SurfaceKind::kSphere;
+  // What lies along the axis of a cylinder does not count.
+  const Vector3d counts(1.0, is_sphere ? 1.0 : 0.0, 1.0);
+  const Vector3d across = counts.cwiseProduct(ray.direction);
+  const Vector3d offset = counts.cwiseProduct(ray.origin);
   const double square = across.squaredNorm();
   if (square <= 0.0) return std::nullopt;
   const double closest = -offset.dot(across) / square;
@@ -81,37 +83,14 @@ std::optional<SurfaceHit> intersect_cylinder(const Surface& surface, const Local
   const double distance = closest - std::sqrt(root);
   if (distance <= 0.0) return std::nullopt;
   const Vector3d point = ray.origin + distance * ray.direction;
-  if (point.y() < -kSeamM || point.y() > surface.size.y() + kSeamM) return std::nullopt;
-  const Vector2d uv(surface.radius * angle_of(point.x(), -point.z()), point.y());
+  Vector2d uv(surface.radius * angle_of(point.x(), -point.z()), point.y());
+  if (is_sphere) {
+    uv.y() = surface.radius * std::atan2(std::hypot(point.x(), point.z()), -point.y());
+  } else if (uv.y() < -kSeamM || uv.y() > surface.size.y() + kSeamM) {
+    return std::nullopt;
+  }
   return SurfaceHit{distance, uv, surface_normal(surface, uv)};
 }
-
-std::optional<SurfaceHit> intersect_sphere(const Surface& surface, const LocalRay& ray) {
-  const double square = ray.direction.squaredNorm();
-  const double closest = -ray.origin.dot(ray.direction) / square;
-  const double root =
-      (surface.radius * surface.radius - (ray.origin + closest * ray.direction).squaredNorm()) /
-      square;
-  if (root < 0.0) return std::nullopt;
-  const double distance = closest - std::sqrt(root);
-  if (distance <= 0.0) return std::nullopt;
-  const Vector3d point = ray.origin + distance * ray.direction;
-  const double polar = std::atan2(std::hypot(point.x(), point.z()), -point.y());
-  const Vector2d uv(surface.radius * angle_of(point.x(), -point.z()), surface.radius * polar);
-  return SurfaceHit{distance, uv, surface_normal(surface, uv)};
-}
-
-struct NamedWorld {
-  std::string_view name;
-  World (*make)(std::uint64_t seed);
-};
-
-constexpr std::array<NamedWorld, 6> kWorlds = {{{"room", make_room},
-                                                {"apartment", make_apartment},
-                                                {"hall", make_hall},
-                                                {"street", make_street},
-                                                {"twins", make_twins},
-                                                {"bare", make_bare_room}}};
 
 }  // namespace
 
@@ -228,22 +207,11 @@ std::optional<SurfaceHit> intersect(const Surface& surface,
                                     const Vector3d& origin,
                                     const Vector3d& direction) {
   const LocalRay ray = to_local(surface, origin, direction);
-  switch (surface.kind) {
-    case SurfaceKind::kRectangle:
-    case SurfaceKind::kDisc:
-      return intersect_plane(surface, ray);
-    case SurfaceKind::kCylinder:
-      return intersect_cylinder(surface, ray);
-    case SurfaceKind::kSphere:
-      return intersect_sphere(surface, ray);
-  }
-  return std::nullopt;
+  return is_round(surface.kind) ? intersect_round(surface, ray) : intersect_plane(surface, ray);
 }
 
 Vector3d surface_normal(const Surface& surface, const Vector2d& uv) {
-  if (surface.kind == SurfaceKind::kRectangle || surface.kind == SurfaceKind::kDisc) {
-    return surface.normal();
-  }
+  if (!is_round(surface.kind)) return surface.normal();
   const double angle = uv.x() / surface.radius;
   const Vector3d around = std::cos(angle) * surface.u_axis - std::sin(angle) * surface.normal();
   if (surface.kind == SurfaceKind::kCylinder) return around;
@@ -252,17 +220,12 @@ Vector3d surface_normal(const Surface& surface, const Vector2d& uv) {
 }
 
 Vector3d surface_point(const Surface& surface, const Vector2d& uv) {
-  switch (surface.kind) {
-    case SurfaceKind::kRectangle:
-    case SurfaceKind::kDisc:
-      return surface.origin + uv.x() * surface.u_axis + uv.y() * surface.v_axis;
-    case SurfaceKind::kCylinder:
-      return surface.origin + surface.radius * surface_normal(surface, uv) +
-             uv.y() * surface.v_axis;
-    case SurfaceKind::kSphere:
-      return surface.origin + surface.radius * surface_normal(surface, uv);
+  if (!is_round(surface.kind)) {
+    return surface.origin + uv.x() * surface.u_axis + uv.y() * surface.v_axis;
   }
-  return surface.origin;
+  const Vector3d point = surface.origin + surface.radius * surface_normal(surface, uv);
+  if (surface.kind == SurfaceKind::kSphere) return point;
+  return point + uv.y() * surface.v_axis;
 }
 
 std::optional<WorldHit> World::intersect(const Eigen::Vector3d& origin,
@@ -273,21 +236,6 @@ std::optional<WorldHit> World::intersect(const Eigen::Vector3d& origin,
     if (hit && (!nearest || hit->distance < nearest->hit.distance)) nearest = WorldHit{i, *hit};
   }
   return nearest;
-}
-
-std::vector<std::string> world_names() {
-  std::vector<std::string> names;
-  for (const NamedWorld& world : kWorlds) names.emplace_back(world.name);
-  return names;
-}
-
-std::shared_ptr<const World> make_world(std::string_view name, std::uint64_t seed) {
-  std::string known;
-  for (const NamedWorld& world : kWorlds) {
-    if (world.name == name) return std::make_shared<const World>(world.make(seed));
-    known += (known.empty() ? "" : ", ") + std::string(world.name);
-  }
-  throw InputError("world '" + std::string(name) + "'", "unknown, expected one of " + known);
 }
 
 }  // namespace waymark

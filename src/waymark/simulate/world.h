@@ -31,10 +31,6 @@ class Texture {
 
   /// Width of a texel of level 0.
   double texel_m() const { return texel_m_; }
-  /// Of the whole image.
-  double width_m() const { return texel_m_ * levels_.front().width_px; }
-  /// Of the whole image.
-  double height_m() const { return texel_m_ * levels_.front().height_px; }
 
  private:
   /// Places along a line, in texels of level 0.
@@ -55,6 +51,11 @@ class Texture {
 
 /// The shapes there are.
 enum class SurfaceKind : std::uint8_t { kRectangle, kDisc, kCylinder, kSphere };
+
+/// Whether it is that of a cylinder or a sphere.
+constexpr bool is_round(SurfaceKind kind) {
+  return kind == SurfaceKind::kCylinder || kind == SurfaceKind::kSphere;
+}
 
 /// A textured analytic surface, seen from its outer side only. Surface coordinates (u, v) are in
 /// metres; seen from outside, u runs to the right and v down, hence normal = v_axis x u_axis.

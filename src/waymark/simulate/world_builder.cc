@@ -20,13 +20,12 @@ const Vector3d kDown(0.0, 0.0, -1.0);
 
 void WorldBuilder::add(Surface surface, Style style) {
   Rng rng(seed_, num_painted_++);
-  const bool is_round =
-      surface.kind == SurfaceKind::kCylinder || surface.kind == SurfaceKind::kSphere;
   // The columns of a round texture must meet where it closes.
   const double texel =
-      is_round ? surface.size.x() / std::ceil(surface.size.x() / texel_m_) : texel_m_;
+      is_round(surface.kind) ? surface.size.x() / std::ceil(surface.size.x() / texel_m_) : texel_m_;
   surface.texture = static_cast<std::uint32_t>(world_.textures.size());
-  world_.textures.emplace_back(paint(style, surface.size, texel, rng), texel, is_round);
+  world_.textures.emplace_back(
+      paint(style, surface.size, texel, rng), texel, is_round(surface.kind));
   world_.surfaces.push_back(surface);
 }
 
