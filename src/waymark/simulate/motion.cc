@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/simulate/motion.h"
 
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
 #include <Eigen/Geometry>
 #include <algorithm>
 #include <array>
@@ -15,10 +18,12 @@
 namespace waymark {
 namespace {
 
+using Eigen::Vector2d;
 using Eigen::Vector3d;
 
 constexpr double kTwoPi = 2.0 * std::numbers::pi;
 constexpr double kRadPerDeg = std::numbers::pi / 180.0;
+constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 constexpr int kNumWaves = 4;
 
 void add_scaled(const MotionKey& key, double weight, MotionKey& sum) {
@@ -33,10 +38,6 @@ Vector3d random_signs(Rng& rng, double amplitude) {
   const double y = rng.uniform(-amplitude, amplitude);
   return {x, y, rng.uniform(-amplitude, amplitude)};
 }
-
-using Eigen::Vector2d;
-
-constexpr double kDegPerRad = 180.0 / std::numbers::pi;
 
 /// Where one can go in a world. Paths run along the closed polygon; keys are spacing apart, and the
 /// spline rounds the corners by about as much.
@@ -56,21 +57,13 @@ struct Course {
 std::vector<Vector2d> rounds_of_both_rooms() {
   constexpr double kDoor = 2.25;
   constexpr double kApart = 5.2;
-  const auto at = [](double x, double y) { return Vector2d(x, y); };
-  std::vector<Vector2d> path = {
-      at(1.3, 2.8), at(3.2, 2.8), at(3.2, 1.3), at(kDoor, 0.8), at(kDoor, -1.3)};
-  for (const Vector2d& point : {at(kDoor, -1.3),
-                                at(kDoor, 0.8),
-                                at(1.3, 1.3),
-                                at(1.3, 2.8),
-                                at(3.2, 2.8),
-                                at(3.2, 1.3),
-                                at(kDoor, 0.8),
-                                at(kDoor, -1.3)}) {
-    path.emplace_back(point.x() + kApart, point.y());
-  }
-  for (const Vector2d& point : {at(kDoor, -1.3), at(kDoor, 0.8), at(1.3, 1.3)})
-    path.push_back(point);
+  const Vector2d in_door(kDoor, 0.8);
+  const Vector2d in_corridor(kDoor, -1.3);
+  std::vector<Vector2d> path = {{1.3, 2.8}, {3.2, 2.8}, {3.2, 1.3}, in_door, in_corridor};
+  const std::vector<Vector2d> round = {
+      in_corridor, in_door, {1.3, 1.3}, {1.3, 2.8}, {3.2, 2.8}, {3.2, 1.3}, in_door, in_corridor};
+  for (const Vector2d& point : round) path.emplace_back(point.x() + kApart, point.y());
+  path.insert(path.end(), round.begin(), round.begin() + 3);
   return path;
 }
 
@@ -174,58 +167,34 @@ MotionKey inspect_offset(double phase) {
           5.0 * std::sin(4.0 * a)};
 }
 
-Motion walk_around(const Course& course, int num_rounds, double duration_s) {
-  const auto look_around = [&](int i) { return course.look_around_deg * std::sin(0.55 * i); };
-  return Motion(along_path(course, num_rounds, look_around), duration_s, course.sway);
+std::vector<MotionKey> walk_around(const Course& course, int num_rounds) {
+  return along_path(
+      course, num_rounds, [&](int i) { return course.look_around_deg * std::sin(0.55 * i); });
 }
 
-Motion loop(const Course& course, double duration_s) { return walk_around(course, 1, duration_s); }
-
-Motion rounds(const Course& course, double duration_s) {
-  return walk_around(course, 3, duration_s);
-}
-
-Motion fast_turn(const Course& course, double duration_s) {
-  const auto turn_head = [](int i) {
+std::vector<MotionKey> turn_fast(const Course& course) {
+  return along_path(course, 1, [](int i) {
     constexpr std::array<double, 8> kTurnDeg = {0.0, 0.0, 0.0, 75.0, 75.0, 0.0, 0.0, -75.0};
     return kTurnDeg[static_cast<std::size_t>(i) % kTurnDeg.size()];
-  };
-  return Motion(along_path(course, 1, turn_head), duration_s, course.sway);
-}
-
-Motion inspect(const Course& course, double duration_s) {
-  return Motion(about_start(course, inspect_offset), duration_s, course.sway);
-}
-
-Motion slide(const Course& course, double duration_s) {
-  return Motion(about_start(course, slide_offset), duration_s);
-}
-
-Motion forward(const Course& course, double duration_s) {
-  return Motion(about_start(course, forward_offset), duration_s);
-}
-
-Motion rotate(const Course& course, double duration_s) {
-  return Motion(about_start(course, rotate_offset), duration_s);
-}
-
-Motion still(const Course& course, double duration_s) {
-  return Motion(std::vector<MotionKey>(4, course.start), duration_s);
+  });
 }
 
 struct NamedMotion {
   std::string_view name;
-  Motion (*make)(const Course& course, double duration_s);
+  std::vector<MotionKey> (*keys)(const Course& course);
+  bool sways;
 };
 
-constexpr std::array<NamedMotion, 8> kMotions = {{{"loop", loop},
-                                                  {"rounds", rounds},
-                                                  {"fast_turn", fast_turn},
-                                                  {"inspect", inspect},
-                                                  {"slide", slide},
-                                                  {"forward", forward},
-                                                  {"rotate", rotate},
-                                                  {"still", still}}};
+constexpr std::array<NamedMotion, 8> kMotions = {{
+    {"loop", [](const Course& course) { return walk_around(course, 1); }, true},
+    {"rounds", [](const Course& course) { return walk_around(course, 3); }, true},
+    {"fast_turn", turn_fast, true},
+    {"inspect", [](const Course& course) { return about_start(course, inspect_offset); }, true},
+    {"slide", [](const Course& course) { return about_start(course, slide_offset); }, false},
+    {"forward", [](const Course& course) { return about_start(course, forward_offset); }, false},
+    {"rotate", [](const Course& course) { return about_start(course, rotate_offset); }, false},
+    {"still", [](const Course& course) { return std::vector(4, course.start); }, false},
+}};
 
 }  // namespace
 
@@ -297,12 +266,12 @@ Motion make_motion(std::string_view world, std::string_view name, double duratio
     throw InputError("world '" + std::string(world) + "'",
                      "has no motions, expected a known world");
   }
-  std::string known;
   for (const NamedMotion& motion : kMotions) {
-    if (motion.name == name) return motion.make(*course, duration_s);
-    known += (known.empty() ? "" : ", ") + std::string(motion.name);
+    if (motion.name != name) continue;
+    return Motion(motion.keys(*course), duration_s, motion.sways ? course->sway : Sway());
   }
-  throw InputError("motion '" + std::string(name) + "'", "unknown, expected one of " + known);
+  throw InputError(fmt::format("motion '{}'", name),
+                   fmt::format("unknown, expected one of {}", fmt::join(motion_names(), ", ")));
 }
 
 }  // namespace waymark
