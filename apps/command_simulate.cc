@@ -19,7 +19,6 @@
 #include "waymark/simulate/dataset.h"
 #include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/sequence.h"
-#include "waymark/simulate/suite.h"
 
 namespace waymark {
 namespace {

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <string>
+#include <vector>
 
 #include "waymark/simulate/sequence.h"
 
@@ -23,5 +24,15 @@ void write_dataset(SimulatedSequence& sequence,
 
 /// The chain as a camchain.yaml file.
 std::string format_camchain(const CameraChain& chain);
+
+/// A sequence for evaluation, and what it exercises.
+struct SuiteEntry {
+  SequenceSpec spec;
+  std::string setup;  ///< "mono", "stereo" or "rgbd".
+  std::string about;  ///< One line for reports.
+};
+
+/// Ten fixed sequences. They are a yardstick: they never change for the sake of a result.
+std::vector<SuiteEntry> simulated_suite();
 
 }  // namespace waymark

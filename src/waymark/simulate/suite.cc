@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/suite.h"
-
 #include <numbers>
 
 #include "waymark/geometry/so3.h"
+#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {
@@ -39,35 +38,6 @@ Rigid3 beside(double baseline_m, const Eigen::Vector3d& turn_deg) {
   return {cam1_from_cam0, -(cam1_from_cam0 * Eigen::Vector3d(baseline_m, 0.0, 0.0))};
 }
 
-ImageEffects usual() {
-  ImageEffects effects;
-  effects.noise_sigma = 2.0;
-  effects.exposure_s = 0.004;
-  return effects;
-}
-
-ImageEffects usual_depth() {
-  ImageEffects effects = usual();
-  effects.inverse_depth_sigma = 0.0015;
-  return effects;
-}
-
-SequenceSpec sequence(const char* name, const char* world, const char* motion, std::uint64_t seed) {
-  SequenceSpec spec;
-  spec.name = name;
-  spec.world = world;
-  spec.motion = motion;
-  spec.seed = seed;
-  spec.num_frames = 300;
-  spec.effects = usual();
-  return spec;
-}
-
-SequenceSpec with(SequenceSpec spec, CameraChain chain) {
-  spec.chain = std::move(chain);
-  return spec;
-}
-
 CameraChain plain_mono() { return mono_chain(pinhole(640, 480, 420.0)); }
 
 CameraChain parallel_stereo(double baseline_m) {
@@ -81,16 +51,29 @@ CameraChain verged_stereo(double baseline_m) {
 
 CameraChain plain_rgbd() { return rgbd_chain(pinhole(640, 480, 500.0), kDepthFactor); }
 
-SequenceSpec with_depth(SequenceSpec spec) {
-  spec.effects = usual_depth();
-  return with(std::move(spec), plain_rgbd());
+SequenceSpec sequence(const char* name,
+                      const char* world,
+                      const char* motion,
+                      std::uint64_t seed,
+                      CameraChain chain) {
+  SequenceSpec spec;
+  spec.name = name;
+  spec.world = world;
+  spec.motion = motion;
+  spec.seed = seed;
+  spec.num_frames = 300;
+  spec.effects.noise_sigma = 2.0;
+  spec.effects.exposure_s = 0.004;
+  if (chain.depth_factor) spec.effects.inverse_depth_sigma = 0.0015;
+  spec.chain = std::move(chain);
+  return spec;
 }
 
 /// The exposure jumps to a sixth, recovers, jumps to three times; then two seconds of dark, noisy
 /// images.
 SequenceSpec with_changing_light(SequenceSpec spec) {
   const auto add = [&](int first, int end, double gain, double noise_sigma) {
-    ImageEffects effects = usual();
+    ImageEffects effects = spec.effects;
     effects.gain = gain;
     effects.noise_sigma = noise_sigma;
     spec.spans.push_back({first, end, effects});
@@ -107,32 +90,32 @@ SequenceSpec with_changing_light(SequenceSpec spec) {
 
 std::vector<SuiteEntry> simulated_suite() {
   return {
-      {with(sequence("mono_room", "room", "loop", 101), plain_mono()),
+      {sequence("mono_room", "room", "loop", 101, plain_mono()),
        "mono",
        "once around a table, looking about"},
-      {with(sequence("mono_street", "street", "loop", 102), plain_mono()),
+      {sequence("mono_street", "street", "loop", 102, plain_mono()),
        "mono",
        "a car once around a block"},
-      {with(sequence("stereo_apartment", "apartment", "loop", 103), parallel_stereo(0.12)),
+      {sequence("stereo_apartment", "apartment", "loop", 103, parallel_stereo(0.12)),
        "stereo",
        "through four rooms and back"},
-      {with(sequence("stereo_street", "street", "loop", 104), parallel_stereo(0.5)),
+      {sequence("stereo_street", "street", "loop", 104, parallel_stereo(0.5)),
        "stereo",
        "a car once around a block"},
-      {with(sequence("verged_room", "room", "inspect", 105), verged_stereo(0.1)),
+      {sequence("verged_room", "room", "inspect", 105, verged_stereo(0.1)),
        "stereo",
        "hand-held, unrectified, distorted, verged by 5 degrees"},
-      {with(sequence("verged_hall", "hall", "loop", 106), verged_stereo(0.25)),
+      {sequence("verged_hall", "hall", "loop", 106, verged_stereo(0.25)),
        "stereo",
        "around a hall; unrectified, distorted, verged by 5 degrees"},
-      {with_depth(sequence("rgbd_room", "room", "inspect", 107)), "rgbd", "hand-held"},
-      {with_depth(sequence("rgbd_apartment", "apartment", "loop", 108)),
+      {sequence("rgbd_room", "room", "inspect", 107, plain_rgbd()), "rgbd", "hand-held"},
+      {sequence("rgbd_apartment", "apartment", "loop", 108, plain_rgbd()),
        "rgbd",
        "through four rooms and back"},
-      {with(sequence("hard_turns", "hall", "fast_turn", 109), plain_mono()),
+      {sequence("hard_turns", "hall", "fast_turn", 109, plain_mono()),
        "mono",
        "quick turns of the head by 75 degrees"},
-      {with(with_changing_light(sequence("hard_light", "apartment", "inspect", 110)), plain_mono()),
+      {with_changing_light(sequence("hard_light", "apartment", "inspect", 110, plain_mono())),
        "mono",
        "exposure jumps by 1/6 and 3, two seconds dark and noisy"},
   };

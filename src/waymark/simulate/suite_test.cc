@@ -1,12 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/suite.h"
-
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <set>
 #include <string>
+
+#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {
