@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/canvas.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -10,9 +8,12 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/simulate/paint.h"
 
 namespace waymark {
 namespace {
+
+using Eigen::Vector2d;
 
 /// Fractional bits of OpenCV's drawing coordinates.
 constexpr int kShift = 4;
@@ -23,13 +24,11 @@ cv::Mat wrap(Image& image) {
   return cv::Mat(image.height_px, image.width_px, CV_8UC1, image.values.data());
 }
 
-cv::Point fixed_point(const Eigen::Vector2d& point_m, double texel_m) {
+cv::Point fixed_point(const Vector2d& point_m, double texel_m) {
   const Eigen::Vector2d texel = point_m / texel_m - Eigen::Vector2d::Constant(0.5);
   return {static_cast<int>(std::lround(texel.x() * (1 << kShift))),
           static_cast<int>(std::lround(texel.y() * (1 << kShift)))};
 }
-
-using Eigen::Vector2d;
 
 /// Marks below this many texels are drawn as plain rectangles.
 constexpr double kSmallTexels = 4.0;
@@ -69,9 +68,8 @@ bool overlap(const Area& a, const Area& b, double gap) {
 
 /// A sign of 3 x 5 cells, its strokes between random neighbours.
 void draw_letter(Canvas& canvas, const Vector2d& corner, double height_m, int grey, Rng& rng) {
-  const Vector2d cell(height_m * 0.25, height_m * 0.25);
   const auto node = [&](std::uint32_t i) {
-    return Vector2d(corner + cell.cwiseProduct(Vector2d(i % 3, static_cast<double>(i / 3) + 0.0)));
+    return Vector2d(corner + height_m * 0.25 * Vector2d(i % 3, i / 3));
   };
   std::uint32_t at = rng.below(15);
   const int num_strokes = 3 + static_cast<int>(rng.below(3));
@@ -87,7 +85,7 @@ void draw_letter(Canvas& canvas, const Vector2d& corner, double height_m, int gr
 
 }  // namespace
 
-Canvas::Canvas(const Eigen::Vector2d& size_m, double texel_m, int grey)
+Canvas::Canvas(const Vector2d& size_m, double texel_m, int grey)
     : image_(std::max(1, static_cast<int>(std::ceil(size_m.x() / texel_m - 1e-9))),
              std::max(1, static_cast<int>(std::ceil(size_m.y() / texel_m - 1e-9)))),
       size_m_(size_m),
@@ -95,7 +93,7 @@ Canvas::Canvas(const Eigen::Vector2d& size_m, double texel_m, int grey)
   std::fill(image_.values.begin(), image_.values.end(), to_grey(grey));
 }
 
-void Canvas::fill_polygon(std::span<const Eigen::Vector2d> corners_m, int grey) {
+void Canvas::fill_polygon(std::span<const Vector2d> corners_m, int grey) {
   constexpr std::size_t kMaxCorners = 16;
   WAYMARK_CHECK(corners_m.size() >= 3 && corners_m.size() <= kMaxCorners);
   std::array<cv::Point, kMaxCorners> points;
@@ -107,7 +105,7 @@ void Canvas::fill_polygon(std::span<const Eigen::Vector2d> corners_m, int grey) 
   cv::fillPoly(mat, &begin, &count, 1, cv::Scalar(to_grey(grey)), cv::LINE_AA, kShift);
 }
 
-void Canvas::fill_circle(const Eigen::Vector2d& centre_m, double radius_m, int grey) {
+void Canvas::fill_circle(const Vector2d& centre_m, double radius_m, int grey) {
   cv::Mat mat = wrap(image_);
   const int radius = static_cast<int>(std::lround(radius_m / texel_m_ * (1 << kShift)));
   cv::circle(mat,
@@ -119,10 +117,7 @@ void Canvas::fill_circle(const Eigen::Vector2d& centre_m, double radius_m, int g
              kShift);
 }
 
-void Canvas::draw_line(const Eigen::Vector2d& from_m,
-                       const Eigen::Vector2d& to_m,
-                       double width_m,
-                       int grey) {
+void Canvas::draw_line(const Vector2d& from_m, const Vector2d& to_m, double width_m, int grey) {
   cv::Mat mat = wrap(image_);
   const int thickness = std::max(1, static_cast<int>(std::lround(width_m / texel_m_)));
   cv::line(mat,
@@ -148,7 +143,7 @@ void Canvas::fill_area(const Area& area_m, int grey) {
   }
 }
 
-int Canvas::grey_at(const Eigen::Vector2d& point_m) const {
+int Canvas::grey_at(const Vector2d& point_m) const {
   const int x = static_cast<int>(std::floor(point_m.x() / texel_m_));
   const int y = static_cast<int>(std::floor(point_m.y() / texel_m_));
   return image_.row(std::clamp(y, 0, image_.height_px - 1))[std::clamp(x, 0, image_.width_px - 1)];
@@ -252,8 +247,7 @@ void draw_clouds(Canvas& canvas, double size_m, double contrast, Rng& rng) {
       const float upper = top[c] + right * (top[c + 1] - top[c]);
       const float lower = top[columns + c] + right * (top[columns + c + 1] - top[columns + c]);
       const float value = upper + (row - static_cast<float>(r)) * (lower - upper);
-      const int grey = image.row(y)[x] + static_cast<int>(std::lround(value));
-      image.row(y)[x] = static_cast<std::uint8_t>(std::clamp(grey, 0, 255));
+      image.row(y)[x] = to_grey(image.row(y)[x] + static_cast<int>(std::lround(value)));
     }
   }
 }

@@ -7,8 +7,6 @@
 #include <cmath>
 #include <utility>
 
-#include "waymark/simulate/canvas.h"
-
 namespace waymark {
 namespace {
 
@@ -41,8 +39,7 @@ void lay_pieces(Canvas& canvas, const Area& area, const Pieces& pieces, Rng& rng
   }
 }
 
-void paint_wall(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_wall(Canvas& canvas, const Area& area, Rng& rng) {
   const Vector2d size = area.size();
   canvas.fill_area(area, between(140, 190, rng));
   draw_octaves(canvas, area, 0.2, 0.06, 40, rng);
@@ -53,15 +50,14 @@ void paint_wall(Canvas& canvas, Rng& rng) {
   draw_clouds(canvas, 1.0, 14.0, rng);
 }
 
-void paint_bare(Canvas& canvas, Rng& rng) {
-  canvas.fill_area(canvas.area(), between(120, 190, rng));
-  draw_polygons(canvas, canvas.area(), 0.05, 0.004, 60, rng);
-  draw_polygons(canvas, canvas.area(), 0.02, 0.002, 70, rng);
+void paint_bare(Canvas& canvas, const Area& area, Rng& rng) {
+  canvas.fill_area(area, between(120, 190, rng));
+  draw_polygons(canvas, area, 0.05, 0.004, 60, rng);
+  draw_polygons(canvas, area, 0.02, 0.002, 70, rng);
   draw_clouds(canvas, 1.0, 14.0, rng);
 }
 
-void paint_floor(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_floor(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 45);
   lay_pieces(canvas, area, {{1.1, 0.14}, 0.006, 95, 150, true}, rng);
   draw_octaves(canvas, area, 0.12, 0.05, 40, rng);
@@ -69,16 +65,14 @@ void paint_floor(Canvas& canvas, Rng& rng) {
   draw_clouds(canvas, 0.8, 12.0, rng);
 }
 
-void paint_tiles(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_tiles(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 60);
   lay_pieces(canvas, area, {{0.4, 0.4}, 0.015, 90, 170, false}, rng);
   draw_octaves(canvas, area, 0.3, 0.08, 50, rng);
   draw_clouds(canvas, 1.5, 12.0, rng);
 }
 
-void paint_ceiling(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_ceiling(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 120);
   lay_pieces(canvas, area, {{0.62, 0.62}, 0.02, 175, 205, false}, rng);
   draw_octaves(canvas, area, 0.08, 0.035, 45, rng);
@@ -89,8 +83,7 @@ void paint_ceiling(Canvas& canvas, Rng& rng) {
   }
 }
 
-void paint_books(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_books(Canvas& canvas, const Area& area, Rng& rng) {
   constexpr double kShelf = 0.34;
   canvas.fill_area(area, 35);
   for (double y = 0.0; y < area.max.y(); y += kShelf) {
@@ -113,8 +106,7 @@ void paint_books(Canvas& canvas, Rng& rng) {
   }
 }
 
-void paint_crate(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_crate(Canvas& canvas, const Area& area, Rng& rng) {
   const double side = area.size().minCoeff();
   canvas.fill_area(area, 50);
   lay_pieces(canvas, area, {{area.size().x(), 0.16}, 0.008, 105, 175, false}, rng);
@@ -123,10 +115,7 @@ void paint_crate(Canvas& canvas, Rng& rng) {
       canvas, area, 1 + static_cast<int>(3.0 * area.size().prod()), 0.3 * side, 0.6 * side, rng);
 }
 
-void paint_picture(Canvas& canvas, Rng& rng) { draw_poster(canvas, canvas.area(), rng); }
-
-void paint_metal(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_metal(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, between(60, 190, rng));
   draw_octaves(canvas, area, 0.4 * area.size().minCoeff(), 0.09, 60, rng);
   const double height = std::min(0.08, 0.15 * area.size().y());
@@ -146,8 +135,7 @@ void paint_window(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area({{middle - 0.04, area.min.y()}, {middle + 0.04, area.max.y()}}, 215);
 }
 
-void paint_facade(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_facade(Canvas& canvas, const Area& area, Rng& rng) {
   const int shade = between(95, 170, rng);
   canvas.fill_area(area, shade - 35);
   lay_pieces(canvas, area, {{0.55, 0.22}, 0.03, shade - 18, shade + 22, true}, rng);
@@ -163,8 +151,7 @@ void paint_facade(Canvas& canvas, Rng& rng) {
   draw_posters(canvas, shop, static_cast<int>(area.size().x()), 0.9, 2.2, rng);
 }
 
-void paint_road(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_road(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 95);
   draw_polygons(canvas, area, 1.2, 0.15, 26, rng);
   draw_octaves(canvas, area, 0.6, 0.05, 55, rng);
@@ -182,24 +169,23 @@ void paint_road(Canvas& canvas, Rng& rng) {
   draw_clouds(canvas, 3.0, 12.0, rng);
 }
 
-void paint_pavement(Canvas& canvas, Rng& rng) {
-  const Area area = canvas.area();
+void paint_pavement(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 85);
   lay_pieces(canvas, area, {{0.6, 0.6}, 0.035, 115, 175, true}, rng);
   draw_octaves(canvas, area, 0.4, 0.05, 55, rng);
 }
 
-void paint_foliage(Canvas& canvas, Rng& rng) {
-  canvas.fill_area(canvas.area(), 80);
+void paint_foliage(Canvas& canvas, const Area& area, Rng& rng) {
+  canvas.fill_area(area, 80);
   for (double size = 0.5; size > 3.0 * canvas.texel_m(); size *= 0.6) {
-    draw_polygons(canvas, canvas.area(), size, 0.35, 55, rng);
+    draw_polygons(canvas, area, size, 0.35, 55, rng);
   }
 }
 
 }  // namespace
 
 Image paint(Style style, const Vector2d& size_m, double texel_m, Rng& rng) {
-  using Painter = void (*)(Canvas&, Rng&);
+  using Painter = void (*)(Canvas&, const Area&, Rng&);
   constexpr std::array<Painter, 13> kPainters = {paint_wall,
                                                  paint_bare,
                                                  paint_floor,
@@ -207,14 +193,14 @@ Image paint(Style style, const Vector2d& size_m, double texel_m, Rng& rng) {
                                                  paint_ceiling,
                                                  paint_books,
                                                  paint_crate,
-                                                 paint_picture,
+                                                 draw_poster,
                                                  paint_facade,
                                                  paint_road,
                                                  paint_pavement,
                                                  paint_foliage,
                                                  paint_metal};
   Canvas canvas(size_m, texel_m, 128);
-  kPainters.at(static_cast<std::size_t>(style))(canvas, rng);
+  kPainters.at(static_cast<std::size_t>(style))(canvas, canvas.area(), rng);
   return std::move(canvas.image());
 }
 

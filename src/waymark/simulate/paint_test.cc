@@ -12,7 +12,6 @@
 #include <map>
 
 #include "waymark/base/check.h"
-#include "waymark/simulate/canvas.h"
 #include "waymark/simulate/render.h"
 
 namespace waymark {
