@@ -24,21 +24,34 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
+#include <memory>
 #include <numbers>
+#include <optional>
 #include <span>
 #include <string>
 #include <utility>
 #include <vector>
 
-#include "recorded_places.h"
+#include "waymark/base/config.h"
 #include "waymark/base/rng.h"
+#include "waymark/evaluate/association.h"
+#include "waymark/exchange/trajectory.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/image/features.h"
+#include "waymark/image/frame_builder.h"
+#include "waymark/input/input.h"
 #include "waymark/place/place_index.h"
 
 namespace {
 
-using waymark::Descriptor;
-using waymark::PlaceIndex;
-using waymark::RecordedPlace;
+using namespace waymark;
+
+/// What a keyframe looked like, and where its camera truly was.
+struct RecordedPlace {
+  std::vector<Descriptor> descriptors;
+  Rigid3 world_from_camera;
+};
+
 using Places = std::vector<RecordedPlace>;
 
 constexpr std::size_t kNumCandidates = 10;
@@ -56,6 +69,35 @@ const std::array<Sequence, 5> kLooped = {{{"sim_bookstore_mono"},
                                           {"sim_atrium_360"},
                                           {"sim_warehouse_fisheye_stereo"}}};
 const char* const kQueries = "sim_bookstore_query_mono";
+
+/// Every n-th frame of a sequence that has a true pose (camera 0, 1000 features). The folder holds
+/// an input, camchain.yaml and groundtruth.txt. Throws InputError.
+Places read_places(const std::filesystem::path& folder, std::size_t every) {
+  InputOptions options;
+  options.setup = Setup::kMono;
+  options.every = every;
+  options.calibration =
+      read_camchain(parse_config(ConfigSource::from_file(folder / "camchain.yaml")));
+  const std::vector<StampedPose> truth = read_trajectory(folder / "groundtruth.txt");
+  const std::unique_ptr<Input> input = open_input(folder, options);
+  Rig rig = make_rig(input->info().calibration.value());
+  rig.cameras.resize(1);
+  FrameBuilder builder(rig, FrameSettings{});
+
+  Places places;
+  while (const std::optional<InputFrame> frame = input->next()) {
+    if (frame->fault != FrameFault::kNone) continue;
+    const std::array<StampedPose, 1> stamp = {StampedPose{frame->timestamp_ns, Rigid3()}};
+    const std::vector<TimeMatch> match = match_by_time(stamp, truth, 20'000'000);
+    if (match.empty()) continue;
+    FrameImages images;
+    images.image0 = frame->images.at(0).view();
+    if (frame->mask) images.mask = frame->mask->view();
+    places.push_back(
+        {builder.build(images)->descriptors, truth[match.front().groundtruth].world_from_camera});
+  }
+  return places;
+}
 
 double thread_time_ms() {
   timespec time;
@@ -96,7 +138,7 @@ struct Held {
 
 /// Keyframes are numbered in the order they are added.
 void add(PlaceIndex& index, std::span<const Descriptor> descriptors) {
-  index.add({static_cast<std::uint32_t>(index.size())}, waymark::SubmapId{0}, descriptors);
+  index.add({static_cast<std::uint32_t>(index.size())}, SubmapId{0}, descriptors);
 }
 
 void add_all(PlaceIndex& index, const Places& places) {
@@ -117,11 +159,11 @@ void ask(const PlaceIndex& index,
   }
   if (!has_answer) return;
   ++recall.num_queries;
-  const auto is_hidden = [&](const waymark::PlaceRow& row) {
+  const auto is_hidden = [&](const PlaceRow& row) {
     return row.keyframe.value >= hidden_begin && row.keyframe.value < hidden_end;
   };
   const double start = thread_time_ms();
-  const std::vector<waymark::PlaceCandidate> found =
+  const std::vector<PlaceCandidate> found =
       index.find(query.descriptors, {.max_candidates = kNumCandidates, .is_excluded = is_hidden});
   recall.times_ms.push_back(thread_time_ms() - start);
   for (std::size_t i = 0; i < found.size(); ++i) {
@@ -178,7 +220,7 @@ void measure_recall(const std::vector<Places>& sequences, const Places& queries)
   }
 }
 
-void flip_bits(std::vector<Descriptor>& descriptors, waymark::Rng& rng) {
+void flip_bits(std::vector<Descriptor>& descriptors, Rng& rng) {
   for (Descriptor& descriptor : descriptors) {
     for (std::uint64_t& word : descriptor) {
       word ^= rng.next() & rng.next() & rng.next() & rng.next();
@@ -197,7 +239,7 @@ void reorder_bits(std::vector<Descriptor>& descriptors, const std::array<std::si
   }
 }
 
-std::array<std::size_t, 256> random_order(waymark::Rng& rng) {
+std::array<std::size_t, 256> random_order(Rng& rng) {
   std::array<std::size_t, 256> order;
   for (std::size_t i = 0; i < order.size(); ++i) order[i] = i;
   for (std::uint32_t i = 255; i > 0; --i) std::swap(order[i], order[rng.below(i + 1)]);
@@ -233,7 +275,7 @@ std::vector<std::vector<Descriptor>> grow(const std::vector<Places>& sequences,
                                           bool is_elsewhere) {
   std::vector<std::vector<Descriptor>> keyframes;
   for (std::uint64_t round = 0; keyframes.size() < count; ++round) {
-    waymark::Rng rng(round, 0);
+    Rng rng(round, 0);
     const std::array<std::size_t, 256> order = random_order(rng);
     for (const Places& places : sequences) {
       for (const RecordedPlace& place : places) {
@@ -266,7 +308,7 @@ Places repeat(const std::vector<Places>& sequences, std::size_t count) {
 /// What is left of queries in bad light: 400 features, of which 1/16 of the bits are wrong.
 Places impoverish(const Places& queries) {
   Places poor = queries;
-  waymark::Rng rng(1, 1);
+  Rng rng(1, 1);
   for (RecordedPlace& query : poor) {
     for (std::uint32_t i = 0; i < 400 && i < query.descriptors.size(); ++i) {
       const auto rest = static_cast<std::uint32_t>(query.descriptors.size()) - i;
@@ -309,9 +351,9 @@ int main(int argc, char** argv) {
     const std::filesystem::path data = argv[1];
     std::vector<Places> sequences;
     for (const Sequence& sequence : kLooped) {
-      sequences.push_back(waymark::read_places(data / sequence.name, sequence.every));
+      sequences.push_back(read_places(data / sequence.name, sequence.every));
     }
-    const Places queries = waymark::read_places(data / kQueries, 1);
+    const Places queries = read_places(data / kQueries, 1);
     (task == "recall" ? measure_recall : measure_growth)(sequences, queries);
   } catch (const std::exception& error) {
     std::fprintf(stderr, "waymark_place_benchmark: %s\n", error.what());
