@@ -31,7 +31,11 @@ const Views& views() {
   return made;
 }
 
-void note_matches(benchmark::State& state, std::size_t num_matches) {
+/// Times match(), which gives the number of matches.
+template <class Match>
+void measure(benchmark::State& state, const Match& match) {
+  std::size_t num_matches = 0;
+  for (auto _ : state) num_matches = match();
   state.counters["features"] = static_cast<double>(views().b.features->num_primary);
   state.counters["matches"] = static_cast<double>(num_matches);
 }
@@ -41,17 +45,15 @@ void match_by_projection(benchmark::State& state) {
   const LandmarkSet landmarks = true_landmarks(views().cloud, views().world_from_a.translation);
   ProjectionMatcher matcher(views().rig);
   const Rigid3 rig_from_world = views().world_from_b.inverse();
-  std::size_t num_matches = 0;
-  for (auto _ : state) {
-    num_matches = matcher
-                      .match(landmarks,
-                             *views().b.features,
-                             {},
-                             rig_from_world,
-                             {.radius_px = static_cast<double>(state.range(0))})
-                      .num_matches;
-  }
-  note_matches(state, num_matches);
+  measure(state, [&] {
+    return matcher
+        .match(landmarks,
+               *views().b.features,
+               {},
+               rig_from_world,
+               {.radius_px = static_cast<double>(state.range(0))})
+        .num_matches;
+  });
 }
 BENCHMARK(match_by_projection)->Arg(5)->Arg(15)->Arg(40)->Unit(benchmark::kMicrosecond);
 
@@ -59,13 +61,10 @@ void match_by_appearance(benchmark::State& state) {
   std::vector<std::uint32_t> indices(views().a.features->num_primary);
   std::iota(indices.begin(), indices.end(), 0u);
   AppearanceMatcher matcher;
-  std::size_t num_matches = 0;
-  for (auto _ : state) {
-    num_matches =
-        matcher.match_all(*views().a.features, indices, *views().b.features, AppearanceOptions{})
-            .size();
-  }
-  note_matches(state, num_matches);
+  measure(state, [&] {
+    return matcher.match_all(*views().a.features, indices, *views().b.features, AppearanceOptions{})
+        .size();
+  });
 }
 BENCHMARK(match_by_appearance)->Unit(benchmark::kMicrosecond);
 
@@ -77,17 +76,15 @@ void match_in_window(benchmark::State& state) {
   }
   pixels.resize(views().a.features->num_primary);
   AppearanceMatcher matcher;
-  std::size_t num_matches = 0;
-  for (auto _ : state) {
-    num_matches = matcher
-                      .match_near(*views().a.features,
-                                  pixels,
-                                  static_cast<double>(state.range(0)),
-                                  *views().b.features,
-                                  AppearanceOptions{})
-                      .size();
-  }
-  note_matches(state, num_matches);
+  measure(state, [&] {
+    return matcher
+        .match_near(*views().a.features,
+                    pixels,
+                    static_cast<double>(state.range(0)),
+                    *views().b.features,
+                    AppearanceOptions{})
+        .size();
+  });
 }
 BENCHMARK(match_in_window)->Arg(60)->Unit(benchmark::kMicrosecond);
 
@@ -96,13 +93,10 @@ void match_along_epipolar_curves(benchmark::State& state) {
   const std::vector<std::uint8_t> none_b(views().b.features->num_primary);
   const Rigid3 b_from_a = views().world_from_b.inverse() * views().world_from_a;
   EpipolarMatcher matcher;
-  std::size_t num_matches = 0;
-  for (auto _ : state) {
-    num_matches =
-        matcher.match(*views().a.features, none_a, *views().b.features, none_b, b_from_a, {})
-            .size();
-  }
-  note_matches(state, num_matches);
+  measure(state, [&] {
+    return matcher.match(*views().a.features, none_a, *views().b.features, none_b, b_from_a, {})
+        .size();
+  });
 }
 BENCHMARK(match_along_epipolar_curves)->Unit(benchmark::kMicrosecond);
 
