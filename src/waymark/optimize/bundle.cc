@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <optional>
 
 #include "waymark/base/check.h"
@@ -83,23 +84,22 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   check(problem);
   const std::size_t num_observations = problem.observations.size();
   std::vector<std::uint8_t> is_used(num_observations);
-  for (std::size_t i = 0; i < num_observations; ++i) {
-    const BundleObservation& observation = problem.observations[i];
-    is_used[i] =
-        std::isfinite(squared_residual(problem, observation)) && has_usable_range(observation);
-  }
+  const auto judge = [&](double max_squared_residual) {
+    for (std::size_t i = 0; i < num_observations; ++i) {
+      const BundleObservation& observation = problem.observations[i];
+      is_used[i] = squared_residual(problem, observation) <= max_squared_residual &&
+                   has_usable_range(observation);
+    }
+  };
+  judge(std::numeric_limits<double>::max());
   BundleResult result;
-  const double gate = options.gate_px * options.gate_px;
   for (int round = 0; round < options.num_rounds; ++round) {
     const BundleOptions round_options = narrowed(options, problem, is_used);
     const BundleRound done = minimize_with_schur(problem, is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;
-    for (std::size_t i = 0; i < num_observations; ++i) {
-      const BundleObservation& observation = problem.observations[i];
-      is_used[i] = squared_residual(problem, observation) <= gate && has_usable_range(observation);
-    }
+    judge(options.gate_px * options.gate_px);
   }
   result.is_outlier.resize(num_observations);
   for (std::size_t i = 0; i < num_observations; ++i) result.is_outlier[i] = !is_used[i];
