@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <opencv2/core.hpp>
 #include <opencv2/imgcodecs.hpp>
 #include <vector>
@@ -27,11 +28,9 @@ bool is_perspective(const CameraDescription& camera) {
 
 Layout layout_of(const CameraChain& chain) {
   if (chain.depth_factor) return Layout::kTumRgbd;
-  bool are_perspective = true;
-  for (const ChainCamera& camera : chain.cameras) {
-    are_perspective = are_perspective && is_perspective(camera.description);
+  if (std::ranges::all_of(chain.cameras, is_perspective, &ChainCamera::description)) {
+    return Layout::kEuroc;
   }
-  if (are_perspective) return Layout::kEuroc;
   return chain.cameras.size() > 1 ? Layout::kTumVi : Layout::kImageFolder;
 }
 
@@ -43,19 +42,14 @@ std::string size_of(const CameraDescription& camera) {
   return fmt::format("[{}, {}]", camera.width_px, camera.height_px);
 }
 
-std::string matrix_row(const Eigen::Matrix4d& matrix, int row) {
-  return numbers({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});
-}
-
 std::string format_sensor(const ChainCamera& camera, double rate_hz) {
   const CameraDescription& description = camera.description;
   const Eigen::Matrix4d body_from_sensor = camera.cam_from_rig.inverse().matrix();
-  std::vector<double> entries;
-  for (int i = 0; i < 16; ++i) entries.push_back(body_from_sensor(i / 4, i % 4));
   std::vector<double> coefficients = description.distortion_coeffs;
   if (coefficients.empty()) coefficients.assign(4, 0.0);
   std::string text = "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n";
-  text += fmt::format("  data: {}\n", numbers(entries));
+  text +=
+      fmt::format("  data: [{}]\n", fmt::join(body_from_sensor.reshaped<Eigen::RowMajor>(), ", "));
   text += fmt::format("rate_hz: {}\nresolution: {}\n", rate_hz, size_of(description));
   text += fmt::format("camera_model: pinhole\nintrinsics: {}\n", numbers(description.intrinsics));
   text += "distortion_model: radial-tangential\n";
@@ -177,7 +171,7 @@ std::string format_camchain(const CameraChain& chain) {
         (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
     text += "  T_cn_cnm1:\n";
     for (int row = 0; row < 4; ++row) {
-      text += fmt::format("  - {}\n", matrix_row(from_previous, row));
+      text += fmt::format("  - [{}]\n", fmt::join(from_previous.row(row), ", "));
     }
   }
   if (chain.depth_factor) text += fmt::format("depth: {{factor: {}}}\n", *chain.depth_factor);

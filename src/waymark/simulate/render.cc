@@ -264,11 +264,7 @@ void Renderer::shade_tile(const View& view, const Tile& tile, Image& result) con
       const std::size_t at =
           static_cast<std::size_t>(y) * static_cast<std::size_t>(camera_->width_px() + 1) +
           static_cast<std::size_t>(x);
-      if (corner_bearings_[at].isZero()) {
-        rays.add_no_ray();
-      } else {
-        rays.add(world_from_cam * corner_bearings_[at]);
-      }
+      rays.add(world_from_cam * corner_bearings_[at]);
     }
   }
   view.tracer.trace(rays);
@@ -292,12 +288,7 @@ void Renderer::measure_tile(const View& view, const Tile& tile, DepthImage& resu
   RayTile rays;
   for (int y = tile.y0; y < tile.y1; ++y) {
     for (int x = tile.x0; x < tile.x1; ++x) {
-      const Vector3d& bearing = bearing_at(x, y);
-      if (bearing.isZero()) {
-        rays.add_no_ray();
-      } else {
-        rays.add((world_from_cam * bearing).cast<float>());
-      }
+      rays.add((world_from_cam * bearing_at(x, y)).cast<float>());
     }
   }
   view.tracer.trace(rays);

@@ -54,11 +54,6 @@ class Renderer {
   /// Angle between neighbouring pixels in the middle of the image.
   double pixel_rad() const;
 
-  /// What is rendered.
-  const World& world() const { return *world_; }
-  /// What it is rendered for.
-  const Camera& camera() const { return *camera_; }
-
  private:
   struct View;
   struct Tile;

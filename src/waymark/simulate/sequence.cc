@@ -30,30 +30,25 @@ constexpr std::uint64_t kDepthStream = kStreamsPerFrame - 1;
 /// Sequences start some time after zero, as stamps of real ones do.
 constexpr std::int64_t kFirstTimestampNs = 1'000'000'000;
 
-CameraChain chain_of(std::vector<ChainCamera> cameras) {
-  CameraChain chain;
-  chain.cameras = std::move(cameras);
-  return chain;
-}
-
 std::uint64_t stream_of(int frame, std::uint64_t stream) {
   return static_cast<std::uint64_t>(frame) * kStreamsPerFrame + stream;
 }
 
 }  // namespace
 
-CameraChain mono_chain(const CameraDescription& camera) { return chain_of({{camera, Rigid3()}}); }
+CameraChain mono_chain(const CameraDescription& camera) {
+  return {.cameras = {{camera, Rigid3()}}, .depth_factor = {}, .notes = {}};
+}
 
 CameraChain stereo_chain(const CameraDescription& camera0,
                          const CameraDescription& camera1,
                          const Rigid3& cam1_from_cam0) {
-  return chain_of({{camera0, Rigid3()}, {camera1, cam1_from_cam0}});
+  return {
+      .cameras = {{camera0, Rigid3()}, {camera1, cam1_from_cam0}}, .depth_factor = {}, .notes = {}};
 }
 
 CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor) {
-  CameraChain chain = mono_chain(camera);
-  chain.depth_factor = depth_factor;
-  return chain;
+  return {.cameras = {{camera, Rigid3()}}, .depth_factor = depth_factor, .notes = {}};
 }
 
 SimulatedSequence::SimulatedSequence(SequenceSpec spec,

@@ -179,17 +179,12 @@ TraceSurface relative_to(const Surface& surface, std::uint32_t index, const Vect
 
 void RayTile::add(const Vector3f& direction) {
   const std::size_t k = static_cast<std::size_t>(count++);
+  const bool is_ray = !direction.isZero();
   x[k] = direction.x();
   y[k] = direction.y();
-  z[k] = direction.z();
-  distance[k] = kInfinity;
-  hit[k] = kSky;
-}
-
-void RayTile::add_no_ray() {
-  add(Vector3f::UnitZ());
-  distance[static_cast<std::size_t>(count - 1)] = -1.0f;
-  hit[static_cast<std::size_t>(count - 1)] = kNoRay;
+  z[k] = is_ray ? direction.z() : 1.0f;
+  distance[k] = is_ray ? kInfinity : -1.0f;
+  hit[k] = is_ray ? kSky : kNoRay;
 }
 
 Vector2f TraceSurface::uv(const Vector3f& direction, float distance) const {

@@ -26,8 +26,8 @@ struct RayTile {
       64) std::array<std::int32_t, kCapacity> hit;  ///< Index for Tracer::surface, kSky, kNoRay.
 
   void clear() { count = 0; }
+  /// Zero for no ray.
   void add(const Eigen::Vector3f& direction);
-  void add_no_ray();
   Eigen::Vector3f direction(int i) const {
     const std::size_t k = static_cast<std::size_t>(i);
     return {x[k], y[k], z[k]};
