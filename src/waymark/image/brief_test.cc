@@ -12,10 +12,8 @@
 
 #include "waymark/image/brief_pattern.h"
 #include "waymark/image/corners.h"
-#include "waymark/image/gaussian.h"
 #include "waymark/image/hamming.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/orientation.h"
 #include "waymark/image/test_references.h"
 
 namespace waymark {

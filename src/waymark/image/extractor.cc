@@ -12,8 +12,6 @@
 #include "waymark/image/brief.h"
 #include "waymark/image/corners.h"
 #include "waymark/image/fast.h"
-#include "waymark/image/gaussian.h"
-#include "waymark/image/orientation.h"
 #include "waymark/image/spread.h"
 
 namespace waymark {

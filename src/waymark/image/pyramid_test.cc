@@ -7,7 +7,7 @@
 #include <cmath>
 #include <opencv2/imgproc.hpp>
 
-#include "waymark/image/gaussian.h"
+#include "waymark/image/brief.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/image/test_references.h"
