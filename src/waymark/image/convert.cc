@@ -2,9 +2,48 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/image/convert.h"
 
+#include <algorithm>
+#include <cmath>
 #include <limits>
+#include <vector>
 
 namespace waymark {
+namespace {
+
+/// The pixels in a row that a smaller one covers, and how much of each.
+struct Cover {
+  int first = 0;
+  std::vector<float> weights;  ///< They add up to 1.
+};
+
+std::vector<Cover> covers(int size, double factor) {
+  std::vector<Cover> result(static_cast<std::size_t>(factor * size));
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    const double begin = static_cast<double>(i) / factor;
+    const double end = std::min(static_cast<double>(i + 1) / factor, static_cast<double>(size));
+    result[i].first = static_cast<int>(begin);
+    for (int j = result[i].first; j < end; ++j) {
+      const double overlap = std::min(end, j + 1.0) - std::max(begin, static_cast<double>(j));
+      result[i].weights.push_back(static_cast<float>(overlap / (end - begin)));
+    }
+  }
+  return result;
+}
+
+template <class T>
+BasicImage<T> pick(const BasicImageView<T>& image, double factor) {
+  BasicImage<T> result(static_cast<int>(factor * image.width_px),
+                       static_cast<int>(factor * image.height_px));
+  for (int y = 0; y < result.height_px; ++y) {
+    const T* from = image.row(static_cast<int>((y + 0.5) / factor));
+    for (int x = 0; x < result.width_px; ++x) {
+      result.row(y)[x] = from[static_cast<int>((x + 0.5) / factor)];
+    }
+  }
+  return result;
+}
+
+}  // namespace
 
 Image to_grey(const ColorView& image) {
   // Weights of 15 bits, whose sum is 1.
@@ -38,5 +77,33 @@ DepthImage depth_in_units(const BasicImageView<float>& depth_m, const DepthSetti
   }
   return result;
 }
+
+Image reduce(ImageView image, double factor) {
+  const std::vector<Cover> columns = covers(image.width_px, factor);
+  const std::vector<Cover> rows = covers(image.height_px, factor);
+  Image result(static_cast<int>(columns.size()), static_cast<int>(rows.size()));
+  std::vector<float> sums(static_cast<std::size_t>(image.width_px));
+  for (int y = 0; y < result.height_px; ++y) {
+    const Cover& row = rows[static_cast<std::size_t>(y)];
+    std::fill(sums.begin(), sums.end(), 0.0f);
+    for (std::size_t k = 0; k < row.weights.size(); ++k) {
+      const std::uint8_t* from = image.row(row.first + static_cast<int>(k));
+      for (std::size_t x = 0; x < sums.size(); ++x) sums[x] += row.weights[k] * from[x];
+    }
+    for (int x = 0; x < result.width_px; ++x) {
+      const Cover& column = columns[static_cast<std::size_t>(x)];
+      float sum = 0.0f;
+      for (std::size_t k = 0; k < column.weights.size(); ++k) {
+        sum += column.weights[k] * sums[static_cast<std::size_t>(column.first) + k];
+      }
+      result.row(y)[x] = static_cast<std::uint8_t>(std::lround(sum));
+    }
+  }
+  return result;
+}
+
+Image pick_reduced(ImageView image, double factor) { return pick(image, factor); }
+
+DepthImage pick_reduced(DepthView image, double factor) { return pick(image, factor); }
 
 }  // namespace waymark

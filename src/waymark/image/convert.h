@@ -22,4 +22,12 @@ Image to_grey(const ColorView& image);
 /// positive and finite or more than the units can say (65535 of them).
 DepthImage depth_in_units(const BasicImageView<float>& depth_m, const DepthSettings& settings);
 
+/// An image made smaller by a factor below 1: each pixel is the mean of the area that it covers.
+/// The size is rounded down, the corner stays where it is.
+Image reduce(ImageView image, double factor);
+
+/// The same where values must not be mixed: the pixel in the middle of the area.
+Image pick_reduced(ImageView image, double factor);
+DepthImage pick_reduced(DepthView image, double factor);
+
 }  // namespace waymark

@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/image/reduce.h"
-
 #include <gtest/gtest.h>
 
 #include <opencv2/imgproc.hpp>
 
 #include "waymark/base/rng.h"
+#include "waymark/image/convert.h"
 
 namespace waymark {
 namespace {
