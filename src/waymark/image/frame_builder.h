@@ -12,7 +12,6 @@
 #include "waymark/image/depth.h"
 #include "waymark/image/extractor.h"
 #include "waymark/image/features.h"
-#include "waymark/image/frame_images.h"
 #include "waymark/image/image.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/image/seam.h"

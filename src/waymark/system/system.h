@@ -9,7 +9,7 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/camera/rig.h"
-#include "waymark/image/frame_images.h"
+#include "waymark/image/image.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/settings.h"
