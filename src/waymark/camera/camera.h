@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <memory>
 #include <span>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -64,6 +65,34 @@ class Camera {
  private:
   int width_px_;
   int height_px_;
+};
+
+/// A camera in words and numbers, as settings and map files hold it.
+struct CameraDescription {
+  std::string camera_model;        ///< "pinhole" or the name of another registered model.
+  std::vector<double> intrinsics;  ///< For pinhole fu fv pu pv, in pixels.
+  /// "none", or the distortion of the model: "radtan", "equidistant".
+  std::string distortion_model = "none";
+  std::vector<double> distortion_coeffs;  ///< For radtan k1 k2 p1 p2, for equidistant k1 k2 k3 k4.
+  int width_px = 0;                       ///< Of the images.
+  int height_px = 0;                      ///< Of the images.
+  std::string where;                      ///< Begins error messages, for example "camchain.yaml:3".
+
+  /// The same camera, wherever it was written.
+  bool is_same(const CameraDescription& other) const;
+
+  /// InputError at `where`, for factories.
+  [[noreturn]] void fail(const std::string& what) const;
+};
+
+/// What one feature measures of the point that it shows.
+struct Measurement {
+  std::uint8_t camera = 0;                             ///< Index in the rig.
+  Eigen::Vector3f bearing = Eigen::Vector3f::UnitZ();  ///< Unit, in the camera.
+  /// Derivative of the pixel of the feature's level by the bearing, there (W of Features).
+  Matrix23f level_pixel_from_bearing = Matrix23f::Zero();
+  float inverse_range = 0.0f;        ///< 1/m, measured; see inverse_range_sigma.
+  float inverse_range_sigma = 0.0f;  ///< 1/m; 0 where there is no measurement.
 };
 
 }  // namespace waymark

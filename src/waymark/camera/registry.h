@@ -9,7 +9,6 @@
 #include <string_view>
 
 #include "waymark/camera/camera.h"
-#include "waymark/camera/description.h"
 
 namespace waymark {
 

@@ -9,7 +9,7 @@
 #include "waymark/base/check.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
-#include "waymark/camera/same_rig.h"
+#include "waymark/camera/rig.h"
 #include "waymark/camera/testing/camera_test.h"
 
 namespace waymark {

@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <memory>
 #include <optional>
 #include <vector>
 
 #include "waymark/camera/camera.h"
-#include "waymark/camera/description.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {
@@ -26,5 +26,17 @@ struct RigCamera {
 struct Rig {
   std::vector<RigCamera> cameras;  ///< At least one.
 };
+
+/// Whether two rigs have the same cameras at the same places, by their descriptions; a camera
+/// without one is the same as itself alone.
+inline bool is_same_rig(const Rig& a, const Rig& b) {
+  const auto is_same_camera = [](const RigCamera& one, const RigCamera& other) {
+    if (one.cam_from_rig.rotation.coeffs() != other.cam_from_rig.rotation.coeffs()) return false;
+    if (one.cam_from_rig.translation != other.cam_from_rig.translation) return false;
+    if (!one.description || !other.description) return one.camera == other.camera;
+    return one.description->is_same(*other.description);
+  };
+  return &a == &b || std::ranges::equal(a.cameras, b.cameras, is_same_camera);
+}
 
 }  // namespace waymark

@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "waymark/camera/description.h"
+#include "waymark/camera/camera.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/map/map.h"
 #include "waymark/mapfile/map_file.h"

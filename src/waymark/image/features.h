@@ -8,7 +8,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "waymark/camera/measurement.h"
+#include "waymark/camera/camera.h"
 #include "waymark/image/feature_grid.h"
 
 namespace waymark {

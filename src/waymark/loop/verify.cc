@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "waymark/base/median.h"
-#include "waymark/camera/same_rig.h"
+#include "waymark/camera/rig.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/camera/same_rig.h"
+#include "waymark/camera/rig.h"
 
 namespace waymark {
 namespace {

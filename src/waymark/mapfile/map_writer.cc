@@ -5,7 +5,7 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
-#include "waymark/camera/same_rig.h"
+#include "waymark/camera/rig.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_record_writer.h"

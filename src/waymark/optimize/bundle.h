@@ -6,7 +6,7 @@
 #include <cstdint>
 #include <vector>
 
-#include "waymark/camera/measurement.h"
+#include "waymark/camera/camera.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 

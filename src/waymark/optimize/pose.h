@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/camera/measurement.h"
+#include "waymark/camera/camera.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 
