@@ -14,7 +14,6 @@
 #include "waymark/geometry/homography.h"
 #include "waymark/geometry/relative_pose.h"
 #include "waymark/geometry/triangulation.h"
-#include "waymark/geometry/two_view_models.h"
 
 namespace waymark {
 namespace {
@@ -214,22 +213,6 @@ bool has_support(std::size_t num_inliers, std::size_t num_matches, const TwoView
 }
 
 }  // namespace
-
-std::string_view to_string(TwoViewStatus status) {
-  switch (status) {
-    case TwoViewStatus::kOk:
-      return "ok";
-    case TwoViewStatus::kTooFewMatches:
-      return "too few matches";
-    case TwoViewStatus::kTooFewInliers:
-      return "too few inliers";
-    case TwoViewStatus::kTooLittleParallax:
-      return "too little parallax";
-    case TwoViewStatus::kAmbiguous:
-      return "ambiguous";
-  }
-  return "unknown";
-}
 
 TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOptions& options) {
   const std::size_t num_matches = matches.size();

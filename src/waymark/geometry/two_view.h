@@ -5,12 +5,11 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <optional>
-#include <string_view>
 #include <vector>
 
 #include "waymark/geometry/bearing.h"
+#include "waymark/geometry/ransac.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/geometry/two_view_models.h"
 
 namespace waymark {
 
@@ -22,6 +21,13 @@ struct TwoViewOptions {
   double min_parallax_rad = 0.0175;  ///< About 1 degree.
 };
 
+/// What the matches of two views have in common.
+enum class TwoViewModel {
+  kScene,     ///< An essential matrix: points anywhere.
+  kPlane,     ///< A homography: points on one plane.
+  kRotation,  ///< Nothing but a rotation: no parallax.
+};
+
 enum class TwoViewStatus {
   kOk,
   kTooFewMatches,  ///< Fewer than min_num_points.
@@ -31,7 +37,6 @@ enum class TwoViewStatus {
   kTooLittleParallax,
   kAmbiguous,  ///< Two motions explain the matches, for example past a plane.
 };
-std::string_view to_string(TwoViewStatus status);
 
 /// Relative pose of two views and the points they see. Arrays run in parallel to the matches.
 struct TwoViewGeometry {
@@ -59,5 +64,21 @@ struct TwoViewResult {
 /// refined on all matches and compared by the epipolar errors and by the points that lie in front.
 /// The best is the result, if it beats each different candidate significantly (Vuong 1989).
 TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOptions& options);
+
+/// Squared epipolar error, in squared standard deviations, from which a match is an outlier: the
+/// 95 % quantile of chi-squared of 1 degree of freedom.
+inline constexpr double kMaxSquaredEpipolarError = 3.84;
+
+using TwoViewFit = RansacResult<Eigen::Matrix3d>;
+
+struct TwoViewModels {
+  std::optional<TwoViewFit> essential, homography, rotation;
+  TwoViewModel best = TwoViewModel::kScene;
+  std::size_t num_inliers = 0;  ///< Of the best.
+};
+
+/// The first step of it: fits the three models by ransac() and chooses between them by GRIC (Torr
+/// 1998).
+TwoViewModels fit_two_view_models(const BearingMatches& matches, RansacOptions options);
 
 }  // namespace waymark

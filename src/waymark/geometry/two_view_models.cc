@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/geometry/two_view_models.h"
-
 #include <algorithm>
 #include <array>
 #include <cmath>
@@ -11,10 +9,10 @@
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/geometry/bearing.h"
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/homography.h"
 #include "waymark/geometry/relative_pose.h"
+#include "waymark/geometry/two_view.h"
 
 namespace waymark {
 namespace {
