@@ -11,7 +11,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/evaluate/association.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

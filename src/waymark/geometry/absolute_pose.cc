@@ -10,7 +10,7 @@
 
 #include "waymark/geometry/bearing.h"
 #include "waymark/geometry/polynomial.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

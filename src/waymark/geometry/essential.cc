@@ -7,7 +7,7 @@
 #include <numbers>
 
 #include "waymark/geometry/polynomial.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

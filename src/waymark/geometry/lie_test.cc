@@ -9,7 +9,6 @@
 #include "waymark/base/rng.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/sim3.h"
-#include "waymark/geometry/so3.h"
 #include "waymark/geometry/test_scenes.h"
 
 namespace waymark {

@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "waymark/geometry/essential.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

@@ -13,6 +13,17 @@ static_assert(alignof(Eigen::Quaterniond) == WAYMARK_ALIGNMENT,
               "installed Waymark was built for, or build Waymark with the same flags (-march=...)");
 #endif
 
+/// Skew-symmetric matrix: skew(a) * b = a x b.
+Eigen::Matrix3d skew(const Eigen::Vector3d& a);
+
+/// Exponential and logarithm of SO(3); the rotation vector is in radians (Sola et al. 2018, 3.3).
+Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector);
+Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
+
+/// Left Jacobian of SO(3) and its inverse: exp((a + J_l^-1(a) d)) ~ exp(d) exp(a).
+Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& rotation_vector);
+Eigen::Matrix3d so3_left_jacobian_inverse(const Eigen::Vector3d& rotation_vector);
+
 /// Tangent vector (rho, phi) of Rigid3, in metres and radians.
 using Vector6d = Eigen::Matrix<double, 6, 1>;
 /// Linear map, or covariance, of such tangent vectors.

@@ -6,7 +6,7 @@
 #include <array>
 #include <cmath>
 
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

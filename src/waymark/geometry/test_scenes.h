@@ -14,7 +14,6 @@
 #include "waymark/base/rng.h"
 #include "waymark/geometry/bearing.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/geometry/so3.h"
 
 namespace waymark::testing {
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/camera/perspective.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {

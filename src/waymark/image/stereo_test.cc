@@ -11,7 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/image/testing/plane_scene.h"
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 #include <hwy/highway.h>
 
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/test_scene.h"
 

@@ -10,7 +10,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/residual.h"
 

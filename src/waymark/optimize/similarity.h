@@ -8,7 +8,7 @@
 #include <optional>
 #include <vector>
 
-#include "waymark/camera/measurement.h"
+#include "waymark/camera/camera.h"
 #include "waymark/geometry/ransac.h"
 #include "waymark/geometry/sim3.h"
 

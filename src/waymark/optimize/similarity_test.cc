@@ -10,7 +10,7 @@
 #include <cmath>
 #include <limits>
 
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/optimize/test_scene.h"
 
 namespace waymark {

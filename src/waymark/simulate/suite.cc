@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <numbers>
 
-#include "waymark/geometry/so3.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/simulate/dataset.h"
 
 namespace waymark {
