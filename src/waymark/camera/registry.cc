@@ -108,7 +108,13 @@ ImagePlane plane_of(const CameraDescription& description) {
   return {{values[first], values[first + 1]}, {values[first + 2], values[first + 3]}};
 }
 
-void expect_radial_tangential(const CameraDescription& description) {
+/// `models`: all that distortion_model may be, for the message.
+void expect_radtan_or_none(const CameraDescription& description, std::string_view models) {
+  if (description.distortion_model == "none") return expect_no_distortion(description);
+  if (description.distortion_model != "radtan") {
+    description.fail(
+        fmt::format("distortion_model is {}, expected {}", description.distortion_model, models));
+  }
   const std::size_t count = description.distortion_coeffs.size();
   expect_num_coeffs(description,
                     count == 4 || count == 5 || count == 8,
@@ -125,14 +131,7 @@ CameraPointer make_fisheye(const CameraDescription& description) {
 CameraPointer make_pinhole(const CameraDescription& description) {
   expect_intrinsics(description, "fu fv pu pv");
   if (description.distortion_model == "equidistant") return make_fisheye(description);
-  if (description.distortion_model == "radtan") {
-    expect_radial_tangential(description);
-  } else if (description.distortion_model == "none") {
-    expect_no_distortion(description);
-  } else {
-    description.fail(fmt::format("distortion_model is {}, expected radtan, equidistant or none",
-                                 description.distortion_model));
-  }
+  expect_radtan_or_none(description, "radtan, equidistant or none");
   const ImagePlane plane = plane_of(description);
   const PerspectiveModel model(plane.focal_px, plane.center_px, description.distortion_coeffs);
   return make_unfolded(description, model, "distortion_coeffs");
@@ -142,14 +141,7 @@ CameraPointer make_omni(const CameraDescription& description) {
   expect_intrinsics(description, "xi fu fv pu pv");
   const double xi = description.intrinsics[0];
   expect_range(description, 0, xi >= 0.0, "xi of at least 0");
-  if (description.distortion_model == "radtan") {
-    expect_radial_tangential(description);
-  } else if (description.distortion_model == "none") {
-    expect_no_distortion(description);
-  } else {
-    description.fail(fmt::format("distortion_model is {}, expected radtan or none",
-                                 description.distortion_model));
-  }
+  expect_radtan_or_none(description, "radtan or none");
   const UnifiedModel model(xi, plane_of(description), description.distortion_coeffs);
   return make_unfolded(description, model, "xi and distortion_coeffs");
 }
@@ -292,12 +284,9 @@ void expect_no_distortion(const CameraDescription& description) {
                                  description.distortion_model,
                                  description.camera_model));
   }
-  if (!description.distortion_coeffs.empty()) {
-    description.fail(
-        fmt::format("distortion_coeffs has {} numbers, expected none of them without a "
-                    "distortion_model",
-                    description.distortion_coeffs.size()));
-  }
+  expect_num_coeffs(description,
+                    description.distortion_coeffs.empty(),
+                    "none of them without a distortion_model");
 }
 
 }  // namespace waymark
