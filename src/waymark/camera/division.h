@@ -81,6 +81,4 @@ class DivisionModel {
   double max_radius_squared_ = std::numeric_limits<double>::infinity();
 };
 
-using DivisionCamera = ModelCamera<DivisionModel>;
-
 }  // namespace waymark

@@ -7,6 +7,8 @@
 #include <span>
 #include <string_view>
 
+#include "waymark/base/check.h"
+#include "waymark/camera/image_plane.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/radial_tangential.h"
 
@@ -27,11 +29,13 @@ class PerspectiveModel {
   /// coefficients.
   PerspectiveModel(const Eigen::Vector2d& focal_px,
                    const Eigen::Vector2d& center_px,
-                   std::span<const double> distortion_coeffs = {});
+                   std::span<const double> distortion_coeffs = {})
+      : plane_{focal_px, center_px}, distortion_(distortion_coeffs) {
+    WAYMARK_CHECK(focal_px.x() > 0.0 && focal_px.y() > 0.0);
+  }
 
-  const Eigen::Vector2d& focal_px() const { return focal_px_; }
-  const Eigen::Vector2d& center_px() const { return center_px_; }
-  bool is_distorted() const { return distortion_.is_distorted(); }
+  const Eigen::Vector2d& focal_px() const { return plane_.focal_px; }
+  const Eigen::Vector2d& center_px() const { return plane_.center_px; }
   /// Angle off the axis at which the field of view ends, of that without tangential distortion.
   double max_angle_rad() const { return std::atan(std::sqrt(max_radius_squared())); }
   /// Square of the radius (X^2 + Y^2) / Z^2 at which the field of view ends; may be infinite.
@@ -43,13 +47,13 @@ class PerspectiveModel {
   std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& point_in_cam) const {
     if (!(point_in_cam.z() > 0.0)) return std::nullopt;
     const Eigen::Vector2d ideal = point_in_cam.head<2>() / point_in_cam.z();
-    if (!distortion_.is_distorted()) return to_pixel(ideal);
+    if (!distortion_.is_distorted()) return plane_.to_pixel(ideal);
     if (!(ideal.squaredNorm() <= distortion_.max_radius_squared())) return std::nullopt;
-    return to_pixel(distortion_.distort(ideal));
+    return plane_.to_pixel(distortion_.distort(ideal));
   }
 
   std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const {
-    const Eigen::Vector2d distorted = (pixel - center_px_).cwiseQuotient(focal_px_);
+    const Eigen::Vector2d distorted = plane_.from_pixel(pixel);
     if (!std::isfinite(distorted.squaredNorm())) return std::nullopt;
     if (!distortion_.is_distorted()) return to_bearing(distorted);
     const std::optional<Eigen::Vector2d> ideal = distortion_.undistort(distorted);
@@ -57,19 +61,24 @@ class PerspectiveModel {
     return to_bearing(*ideal);
   }
 
-  Matrix23d jacobian(const Eigen::Vector3d& point_in_cam) const;
+  Matrix23d jacobian(const Eigen::Vector3d& point_in_cam) const {
+    const double inverse_depth = 1.0 / point_in_cam.z();
+    const Eigen::Vector2d ideal = point_in_cam.head<2>() * inverse_depth;
+    Matrix23d ideal_from_point;
+    ideal_from_point << inverse_depth, 0.0, -ideal.x() * inverse_depth,  //
+        0.0, inverse_depth, -ideal.y() * inverse_depth;
+    if (!distortion_.is_distorted()) return plane_.focal_px.asDiagonal() * ideal_from_point;
+    return plane_.focal_px.asDiagonal() * distortion_.distort_with_jacobian(ideal).jacobian *
+           ideal_from_point;
+  }
 
  private:
-  Eigen::Vector2d to_pixel(const Eigen::Vector2d& normalized) const {
-    return focal_px_.cwiseProduct(normalized) + center_px_;
-  }
   static Eigen::Vector3d to_bearing(const Eigen::Vector2d& ideal) {
     const double scale = 1.0 / std::sqrt(1.0 + ideal.squaredNorm());
     return {scale * ideal.x(), scale * ideal.y(), scale};
   }
 
-  Eigen::Vector2d focal_px_;
-  Eigen::Vector2d center_px_;
+  ImagePlane plane_;
   RadialTangential distortion_;
 };
 

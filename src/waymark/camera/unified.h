@@ -86,8 +86,6 @@ class UnifiedModel : public SphereProjection {
   RadialTangential distortion_;
 };
 
-using UnifiedCamera = ModelCamera<UnifiedModel>;
-
 /// Extended unified camera (Khomutenko, Garcia and Martinet 2016, An enhanced unified camera model;
 /// in the form of Usenko, Demmel and Cremers 2018, The double sphere camera model, section II D).
 ///
@@ -131,8 +129,6 @@ class ExtendedUnifiedModel : public SphereProjection {
   double beta_;
 };
 
-using ExtendedUnifiedCamera = ModelCamera<ExtendedUnifiedModel>;
-
 /// Double sphere camera (Usenko, Demmel and Cremers 2018, The double sphere camera model, eq. 40 to
 /// 46). Kalibr's "ds".
 ///
@@ -175,7 +171,5 @@ class DoubleSphereModel : public SphereProjection {
   double xi_;
   double alpha_;
 };
-
-using DoubleSphereCamera = ModelCamera<DoubleSphereModel>;
 
 }  // namespace waymark
