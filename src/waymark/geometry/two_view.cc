@@ -9,7 +9,6 @@
 #include <numeric>
 
 #include "waymark/base/check.h"
-#include "waymark/base/median.h"
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/homography.h"
 #include "waymark/geometry/relative_pose.h"
@@ -180,21 +179,18 @@ TwoViewGeometry make_geometry(const Candidate& candidate,
   geometry.points_in_a.resize(num_matches, Eigen::Vector3d::Zero());
   geometry.parallaxes_rad.resize(num_matches, 0.0);
   const Rigid3 a_from_b = candidate.b_from_a.inverse();
-  std::vector<double> inlier_parallaxes;
   for (std::size_t i = 0; i < num_matches; ++i) {
     if (!(candidate.match_costs[i] < kOutlierCost)) continue;
     const Eigen::Vector3d& a = matches.bearings_a[i];
     const Eigen::Vector3d& b = matches.bearings_b[i];
     geometry.is_inlier[i] = 1;
     geometry.parallaxes_rad[i] = parallax_angle(a, b, a_from_b);
-    inlier_parallaxes.push_back(geometry.parallaxes_rad[i]);
     if (!is_triangle_certain(matches, i, a_from_b)) continue;
     const auto point = triangulate(a, b, a_from_b, 0.0);
     if (!point) continue;
     geometry.has_point[i] = 1;
     geometry.points_in_a[i] = *point;
   }
-  if (!inlier_parallaxes.empty()) geometry.median_parallax_rad = median(inlier_parallaxes);
   return geometry;
 }
 

@@ -48,7 +48,6 @@ struct TwoViewGeometry {
   std::vector<std::uint8_t> has_point;
   std::vector<Eigen::Vector3d> points_in_a;  ///< In units of the translation; zero if none.
   std::vector<double> parallaxes_rad;        ///< Zero where the match is no inlier.
-  double median_parallax_rad = 0.0;          ///< Of the inliers.
 };
 
 struct TwoViewResult {
