@@ -33,16 +33,10 @@ int seam_margin_px(const Camera& camera) {
   return std::min(static_cast<int>(std::ceil(patch_px)), camera.width_px());
 }
 
-class Stopwatch {
- public:
-  double elapsed_ms() const {
-    return std::chrono::duration<double, std::milli>(Clock::now() - start_).count();
-  }
-
- private:
-  using Clock = std::chrono::steady_clock;
-  Clock::time_point start_ = Clock::now();
-};
+double ms_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start)
+      .count();
+}
 
 /// An image of all directions is given half as many features again: as many that tell of the
 /// motion as other cameras see, and those ahead and behind, which tell little.
@@ -52,7 +46,41 @@ FeatureSettings settings_for(const Rig& rig, FeatureSettings settings) {
   return settings;
 }
 
+void resize(Image& image, int width_px, int height_px) {
+  if (image.width_px != width_px || image.height_px != height_px) image = {width_px, height_px};
+}
+
 }  // namespace
+
+ImageView SeamPadding::widen(ImageView image) {
+  WAYMARK_CHECK(margin_px_ >= 0 && margin_px_ <= image.width_px);
+  resize(image_, image.width_px + 2 * margin_px_, image.height_px);
+  for (int y = 0; y < image.height_px; ++y) {
+    const std::uint8_t* const row = image.row(y);
+    std::uint8_t* next =
+        std::copy(row + image.width_px - margin_px_, row + image.width_px, image_.row(y));
+    next = std::copy(row, row + image.width_px, next);
+    std::copy(row, row + margin_px_, next);
+  }
+  return image_.view();
+}
+
+ImageView SeamPadding::widen_mask(ImageView mask,
+                                  int width_px,
+                                  int height_px,
+                                  std::uint8_t otherwise) {
+  resize(mask_, width_px + 2 * margin_px_, height_px);
+  std::fill(mask_.values.begin(), mask_.values.end(), std::uint8_t{0});
+  for (int y = 0; y < height_px; ++y) {
+    std::uint8_t* const row = mask_.row(y) + margin_px_;
+    if (mask.is_empty()) {
+      std::fill(row, row + width_px, otherwise);
+    } else {
+      std::copy(mask.row(y), mask.row(y) + width_px, row);
+    }
+  }
+  return mask_.view();
+}
 
 FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
     : rig_(std::move(rig)), settings_(settings), extractor_(settings_for(rig_, settings.features)) {
@@ -77,10 +105,10 @@ void check_sizes(const FrameImages& images, const Rig& rig) {
 std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
   check_sizes(images, rig_);
   auto features = std::make_shared<Features>();
-  const Stopwatch features_time;
+  const auto features_start = std::chrono::steady_clock::now();
   extract_primary(images, *features);
-  times_.features_ms = features_time.elapsed_ms();
-  const Stopwatch depth_time;
+  times_.features_ms = ms_since(features_start);
+  const auto depth_start = std::chrono::steady_clock::now();
   if (!images.image1.is_empty()) {
     add_stereo(images, *features);
   } else if (!images.depth.is_empty()) {
@@ -92,7 +120,7 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
                  features->range_m,
                  features->inverse_range_sigma);
   }
-  times_.depth_ms = depth_time.elapsed_ms();
+  times_.depth_ms = ms_since(depth_start);
   return features;
 }
 

@@ -14,7 +14,6 @@
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
 #include "waymark/image/pyramid.h"
-#include "waymark/image/seam.h"
 #include "waymark/image/stereo.h"
 #include "waymark/image/view_mask.h"
 
@@ -34,6 +33,28 @@ void check_sizes(const FrameImages& images, const Rig& rig);
 struct FrameTimes {
   double features_ms = 0.0;  ///< Extraction and bearings of camera 0.
   double depth_ms = 0.0;     ///< Stereo search with the pyramid of camera 1, or the depth image.
+};
+
+/// Takes the seam out of 360 degree images: repeats columns at both sides, so that what lies across
+/// the seam is found and described like everything else. Keeps its buffers.
+class SeamPadding {
+ public:
+  /// margin_px: columns at either side, at most the width.
+  explicit SeamPadding(int margin_px) : margin_px_(margin_px) {}
+
+  int margin_px() const { return margin_px_; }
+
+  /// The image, margin_px wider at both sides. Stays valid until the next call.
+  ImageView widen(ImageView image);
+
+  /// The mask of the widened image: 0 in the margins, where everything is seen a second time. An
+  /// empty mask is one of `otherwise` all over an image of this size.
+  ImageView widen_mask(ImageView mask, int width_px, int height_px, std::uint8_t otherwise);
+
+ private:
+  int margin_px_;
+  Image image_;
+  Image mask_;
 };
 
 /// Turns images into the immutable data of a frame: extraction, tangents, stereo or depth. Keeps

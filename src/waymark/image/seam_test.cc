@@ -1,6 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/image/seam.h"
 
 #include <gtest/gtest.h>
 
