@@ -1,6 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
