@@ -16,7 +16,7 @@ constexpr std::size_t kMaxTargets = 20;
 
 /// At this distance pairs that show the same are still several times as frequent as those that do
 /// not (docs/decisions.md). Of the features in reach the most alike is tested, whatever the second.
-constexpr AppearanceOptions kAppearance{.max_distance = 64, .max_ratio = 1.0};
+constexpr AppearanceOptions kAppearance{.max_distance = 50, .max_ratio = 1.0};
 
 /// In pixels of the landmark's expected level (docs/decisions.md).
 constexpr double kRadiusPx = 3.0;

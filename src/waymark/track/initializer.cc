@@ -301,8 +301,8 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
 std::optional<Rigid3> Initializer::locate(const Frame& frame,
                                           const Rigid3& guess,
                                           const LandmarkSet& landmarks) {
-  const ProjectionMatches& matches =
-      projection_.match(landmarks, *frame.features, {}, guess, {.radius_px = search_radius_px_ / 2});
+  const ProjectionMatches& matches = projection_.match(
+      landmarks, *frame.features, {}, guess, {.radius_px = search_radius_px_ / 2});
   PoseObservations observations;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
