@@ -2,46 +2,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/fuse.h"
 
-#include <Eigen/LU>
 #include <algorithm>
-
-#include "waymark/optimize/residual.h"
 
 namespace waymark {
 namespace {
 
-/// Covisible keyframes in which a keyframe's landmarks are looked for: those that share most, which
-/// give three quarters or more of what twice as many would (docs/decisions.md).
-constexpr std::size_t kMaxTargets = 20;
+constexpr std::size_t kMaxNeighbours = 12;
+constexpr std::size_t kMaxSecondNeighbours = 4;
 
-/// At this distance pairs that show the same are still several times as frequent as those that do
-/// not (docs/decisions.md). Of the features in reach the most alike is tested, whatever the second.
-constexpr AppearanceOptions kAppearance{.max_distance = 50, .max_ratio = 1.0};
-
-/// In pixels of the landmark's expected level (docs/decisions.md).
-constexpr double kRadiusPx = 3.0;
-
-/// What its observations tell of the position of a landmark, as the inverse of a covariance (1/m^2,
-/// world axes), the keyframes taken as known.
-Eigen::Matrix3d position_information(const Map& map, LandmarkId id) {
-  const Landmark& landmark = map.landmarks().at(id);
-  Eigen::Matrix3d information = Eigen::Matrix3d::Zero();
-  for (const Observation& observation : landmark.observations) {
-    const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
-    const Measurement measured = keyframe.features->measurement(observation.feature);
-    const Rigid3 cam_from_world =
-        keyframe.rig->cameras[measured.camera].cam_from_rig * keyframe.rig_from_world;
-    const Eigen::Matrix3d rotation = cam_from_world.rotation_matrix();
-    const InverseRangePoint seen = in_inverse_range(cam_from_world * landmark.position_in_world);
-    const Matrix23d across =
-        bearing_residual_by_point(seen, measured.level_pixel_from_bearing) * rotation;
-    information += across.transpose() * across;
-    if (measured.inverse_range_sigma <= 0.0) continue;
-    const Eigen::RowVector3d along =
-        range_residual_by_point(seen, measured.inverse_range_sigma) * rotation;
-    information += along.transpose() * along;
+/// Neighbours of a keyframe and the strongest of theirs, without itself, ascending.
+std::vector<KeyframeId> surroundings(const Map& map, KeyframeId id) {
+  std::vector<KeyframeId> ids = strongest_neighbours(map, id, kMaxNeighbours);
+  const std::vector<KeyframeId> first = ids;
+  for (KeyframeId neighbour : first) {
+    const auto second = strongest_neighbours(map, neighbour, kMaxSecondNeighbours);
+    ids.insert(ids.end(), second.begin(), second.end());
   }
-  return information;
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  std::erase(ids, id);
+  return ids;
 }
 
 /// Landmarks that source sees and target does not.
@@ -67,8 +47,7 @@ LandmarkSet seen_only_by(const Map& map, std::span<const KeyframeId> sources, Ke
 }  // namespace
 
 void merge(Map& map, LandmarkId a, LandmarkId b, DirtyLandmarks& dirty) {
-  const bool keeps_a =
-      position_information(map, a).determinant() >= position_information(map, b).determinant();
+  const bool keeps_a = num_observers(map.landmarks().at(a)) >= num_observers(map.landmarks().at(b));
   const LandmarkId survivor = keeps_a ? a : b;
   const LandmarkId absorbed = keeps_a ? b : a;
   map.merge_landmarks(survivor, absorbed);
@@ -84,12 +63,11 @@ void fuse_into(Map& map,
   const LandmarkSet landmarks = seen_only_by(map, sources, target);
   const std::shared_ptr<const Features> features = map.keyframes().at(target).features;
   matcher.look_with(map.keyframes().at(target).rig);
-  const ProjectionMatches& matches =
-      matcher.match(landmarks,
-                    *features,
-                    {},
-                    map.keyframes().at(target).rig_from_world,
-                    {.radius_px = kRadiusPx, .appearance = kAppearance});
+  const ProjectionMatches& matches = matcher.match(landmarks,
+                                                   *features,
+                                                   {},
+                                                   map.keyframes().at(target).rig_from_world,
+                                                   {.radius_px = 3.0, .appearance = {50, 1.0}});
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     const std::uint32_t feature = matches.features[i];
     const LandmarkId id = landmarks.ids[i];
@@ -111,7 +89,7 @@ void fuse_with_neighbours(Map& map,
                           KeyframeId keyframe,
                           ProjectionMatcher& matcher,
                           DirtyLandmarks& dirty) {
-  const std::vector<KeyframeId> targets = strongest_neighbours(map, keyframe, kMaxTargets);
+  const std::vector<KeyframeId> targets = surroundings(map, keyframe);
   for (KeyframeId target : targets) {
     fuse_into(map, std::span(&keyframe, 1), target, matcher, dirty);
   }

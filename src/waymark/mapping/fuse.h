@@ -17,8 +17,7 @@ void fuse_into(Map& map,
                ProjectionMatcher& matcher,
                DirtyLandmarks& dirty);
 
-/// Makes one landmark of two; that of which the observations tell more survives: three views from
-/// one place say less than two from afar.
+/// Makes one landmark of two; the one with more observers survives.
 void merge(Map& map, LandmarkId a, LandmarkId b, DirtyLandmarks& dirty);
 
 /// Finds landmarks that are one and the same, between a keyframe and its surroundings, by

@@ -96,7 +96,7 @@ TEST_F(FuseTest, MergesLandmarksThatAreOneAndTheSame) {
   std::size_t num_merged = 0;
   for (const auto& [original, twin] : twins) {
     num_merged += scene_.map.resolve(twin) == original;
-    EXPECT_TRUE(scene_.map.landmarks().contains(original)) << "more is known of it";
+    EXPECT_TRUE(scene_.map.landmarks().contains(original)) << "it had more observers";
     if (!scene_.map.landmarks().contains(twin)) {
       EXPECT_EQ(dirty_.count(twin), 0u);
     }
@@ -116,39 +116,6 @@ TEST_F(FuseTest, KeepsWhatOnlyLooksAlikeApart) {
   fuse();
   EXPECT_TRUE(scene_.map.landmarks().contains(id));
   EXPECT_TRUE(scene_.map.landmarks().contains(landmark));
-}
-
-TEST(Fuse, OfTwoThatAreOneTheBetterKnownSurvives) {
-  TestMap scene(1, cloud_ahead(), {.seed = 4, .miss_probability = 0.0}, false);
-  for (const double x : {0.0, 0.01, 0.02, -1.0, 1.0}) scene.add_bare_keyframe(pose_at(x));
-  const auto feature_of = [&](std::uint32_t point, std::uint32_t keyframe) {
-    const auto& shown = scene.seen[keyframe].landmark_of_feature;
-    return static_cast<std::uint32_t>(std::find(shown.begin(), shown.end(), point) - shown.begin());
-  };
-  const auto is_seen_by_all = [&](std::uint32_t point) {
-    for (std::uint32_t k = 0; k < 5; ++k) {
-      if (feature_of(point, k) == scene.seen[k].landmark_of_feature.size()) return false;
-    }
-    return true;
-  };
-  std::uint32_t point = 0;
-  while (!is_seen_by_all(point)) ++point;
-  const auto add = [&](std::initializer_list<std::uint32_t> keyframes) {
-    const LandmarkId id = scene.landmark_at(point, KeyframeId{0});
-    scene.landmark_of_point.clear();
-    for (const std::uint32_t k : keyframes) {
-      scene.map.observe(KeyframeId{k}, feature_of(point, k), id);
-    }
-    return id;
-  };
-  // Three views close together say less of a place than two far apart.
-  const LandmarkId often_seen = add({0, 1, 2});
-  const LandmarkId well_seen = add({3, 4});
-  DirtyLandmarks dirty{often_seen};
-  merge(scene.map, often_seen, well_seen, dirty);
-  EXPECT_EQ(scene.map.resolve(often_seen), well_seen);
-  EXPECT_EQ(num_observers(scene.map.landmarks().at(well_seen)), 5u);
-  EXPECT_EQ(dirty, DirtyLandmarks{well_seen});
 }
 
 }  // namespace

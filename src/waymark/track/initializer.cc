@@ -23,9 +23,9 @@ constexpr std::uint32_t kReferenceInterval = 3;
 /// Least parallax of a pair, in pixels of the full image: with about one pixel of noise, single
 /// points are then known to a tenth of their depth and the pair to much better.
 constexpr double kMinParallaxPx = 12.0;
-/// Part of the side of the image by which a feature may move between frames: four times what the
-/// tracker's prediction errs by, as here nothing is predicted (docs/decisions.md).
-constexpr double kSearchPart = 0.1;
+/// Four times what the tracker's prediction errs by, as here nothing is predicted.
+constexpr double kSearchRadiusPx = 60.0;
+constexpr double kSearchPart = 1.0 / 16.0;
 /// What noise moves a feature by at most; a camera at rest shows no more.
 constexpr double kRestPx = kMinParallaxPx / 4;
 
@@ -158,7 +158,7 @@ Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::ui
       has_range_(has_range),
       seed_(seed),
       pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
-      search_radius_px_(search_radius_px(*rig->cameras.at(0).camera, kSearchPart)),
+      search_radius_px_(search_radius_px(*rig->cameras.at(0).camera, kSearchRadiusPx, kSearchPart)),
       projection_(rig) {}
 
 std::optional<Initialization> Initializer::add(const Frame& frame) {

@@ -2,16 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 
 #include "waymark/camera/camera.h"
 
 namespace waymark {
 
-/// Around where it is predicted a landmark is looked for within a part of the image, so that the
-/// radius follows the resolution: a part of the side in pixels of a square as large as the image.
-inline double search_radius_px(const Camera& camera, double part_of_side) {
-  return part_of_side * std::sqrt(static_cast<double>(camera.width_px()) * camera.height_px());
+/// How far around where it is predicted a landmark is looked for: at least a number of pixels, and
+/// in images of more than a megapixel a part of their side (of a square as large), so that it
+/// follows the resolution. See docs/decisions.md.
+inline double search_radius_px(const Camera& camera, double least_px, double part_of_side) {
+  const double side_px = std::sqrt(static_cast<double>(camera.width_px()) * camera.height_px());
+  return std::max(least_px, part_of_side * side_px);
 }
 
 }  // namespace waymark

@@ -10,11 +10,12 @@
 namespace waymark {
 namespace {
 
-/// Parts of the side of the image within which landmarks are looked for around a predicted pose.
-/// For a camera turned by hand the prediction is off by 2.2 % in one frame of 20 and by 3.9 % in
-/// one of 100 (docs/decisions.md).
-constexpr double kPredictedPart = 0.025;
-constexpr double kWidePart = 0.067;
+/// For a camera turned by hand the prediction is off by 12 px of 640 x 480 in one frame of 20 and
+/// by 22 px in one of 100 (docs/decisions.md).
+constexpr double kPredictedRadiusPx = 15.0;
+constexpr double kPredictedPart = 1.0 / 64.0;
+constexpr double kWideRadiusPx = 40.0;
+constexpr double kWidePart = 1.0 / 24.0;
 /// Around a pose that rests on what it sees; of the landmark's level (docs/decisions.md).
 constexpr double kLocatedRadiusPx = 5.0;
 constexpr int kMaxLocalMapAge = 5;
@@ -36,8 +37,9 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       locator_(rig),
       relocalizer_(rig, settings, seed),
       keyframe_assessor_(rig, has_range),
-      search_radii_px_{search_radius_px(*rig->cameras.at(0).camera, kPredictedPart),
-                       search_radius_px(*rig->cameras.at(0).camera, kWidePart)} {}
+      search_radii_px_{
+          search_radius_px(*rig->cameras.at(0).camera, kPredictedRadiusPx, kPredictedPart),
+          search_radius_px(*rig->cameras.at(0).camera, kWideRadiusPx, kWidePart)} {}
 
 void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
   purpose_ = purpose;
