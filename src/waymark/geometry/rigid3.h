@@ -16,12 +16,14 @@ static_assert(alignof(Eigen::Quaterniond) == WAYMARK_ALIGNMENT,
 /// Skew-symmetric matrix: skew(a) * b = a x b.
 Eigen::Matrix3d skew(const Eigen::Vector3d& a);
 
-/// Exponential and logarithm of SO(3); the rotation vector is in radians (Sola et al. 2018, 3.3).
+/// Exponential of SO(3); the rotation vector is in radians (Sola et al. 2018, 3.3).
 Eigen::Quaterniond so3_exp(const Eigen::Vector3d& rotation_vector);
+/// Its logarithm.
 Eigen::Vector3d so3_log(const Eigen::Quaterniond& rotation);
 
-/// Left Jacobian of SO(3) and its inverse: exp((a + J_l^-1(a) d)) ~ exp(d) exp(a).
+/// Left Jacobian J_l of SO(3): exp((a + J_l^-1(a) d)) ~ exp(d) exp(a).
 Eigen::Matrix3d so3_left_jacobian(const Eigen::Vector3d& rotation_vector);
+/// Its inverse.
 Eigen::Matrix3d so3_left_jacobian_inverse(const Eigen::Vector3d& rotation_vector);
 
 /// Tangent vector (rho, phi) of Rigid3, in metres and radians.

@@ -28,6 +28,7 @@ Image reduce(ImageView image, double factor);
 
 /// The same where values must not be mixed: the pixel in the middle of the area.
 Image pick_reduced(ImageView image, double factor);
-DepthImage pick_reduced(DepthView image, double factor);
+/// The same of depth.
+DepthImage pick_reduced(BasicImageView<std::uint16_t> image, double factor);
 
 }  // namespace waymark
