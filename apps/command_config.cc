@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
@@ -18,7 +19,7 @@ namespace waymark {
 namespace {
 
 int print_settings(bool is_markdown) {
-  fmt::print("{}", is_markdown ? settings_as_markdown<Settings>() : settings_as_yaml(Settings()));
+  print_result("{}", is_markdown ? settings_as_markdown<Settings>() : settings_as_yaml(Settings()));
   return kDone;
 }
 
@@ -31,9 +32,9 @@ int check_settings(const std::vector<std::filesystem::path>& files) {
   std::size_t num_cameras = 0;
   if (const std::optional<CameraChain> chain = read_camchain(config)) {
     num_cameras = make_rig(*chain).cameras.size();
-    for (const std::string& note : chain->notes) fmt::print("note: {}\n", note);
+    for (const std::string& note : chain->notes) print_result("note: {}\n", note);
   }
-  fmt::print("valid: {} cameras\n", num_cameras);
+  print_result("valid: {} cameras\n", num_cameras);
   return kDone;
 }
 
@@ -45,8 +46,8 @@ int print_camchain(CalibrationReader read, const std::vector<std::filesystem::pa
                      fmt::format("--from has {} files, expected one calibration", files.size()));
   }
   const CameraChain chain = read(ConfigSource::from_file(files[0]));
-  for (const std::string& note : chain.notes) fmt::print(stderr, "note: {}\n", note);
-  fmt::print("{}", format_camchain(chain));
+  for (const std::string& note : chain.notes) print_message("note: {}\n", note);
+  print_result("{}", format_camchain(chain));
   return kDone;
 }
 

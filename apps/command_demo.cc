@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/input/input.h"
 
 namespace waymark {
@@ -71,7 +72,7 @@ int demo(const DemoOptions& options, const Program& program) {
   const bool stays = !options.is_once && isatty(STDOUT_FILENO) != 0;
   for (const Arguments& command : commands_of(options, stays)) {
     if (is_interrupted()) break;
-    fmt::print("\nwaymark {}\n", fmt::join(command, " "));
+    print_result("\nwaymark {}\n", fmt::join(command, " "));
     std::fflush(stdout);
     if (const int status = program(command); status != kDone) return status;
   }

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/evaluate/evaluation.h"
 #include "waymark/evaluate/report.h"
@@ -36,7 +37,7 @@ int evaluate_trajectory(const EvalOptions& options) {
   }
   const std::string report =
       options.is_json ? format_evaluation_json(evaluation) : format_evaluation(evaluation);
-  fmt::print("{}", report);
+  print_result("{}", report);
   return kDone;
 }
 

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/export_scene.h"
@@ -100,14 +101,14 @@ int export_map(const ExportOptions& options) {
     throw InputError(options.map.string(), "has no keyframes, expected some to export");
   }
   for (std::size_t i = 0; i < submaps.size(); ++i) export_submap(options, stored, submaps[i], i);
-  fmt::print("{} sub-map{} of {} to {}\n",
-             submaps.size(),
-             submaps.size() == 1 ? "" : "s",
-             options.map.string(),
-             options.out.string());
+  print_result("{} sub-map{} of {} to {}\n",
+               submaps.size(),
+               submaps.size() == 1 ? "" : "s",
+               options.map.string(),
+               options.out.string());
   if (stored.images.empty() && options.format != ExportFormat::kTum &&
       options.format != ExportFormat::kKitti) {
-    fmt::print(stderr, "note: the map holds no images (run --keep-images); points are grey\n");
+    print_message("note: the map holds no images (run --keep-images); points are grey\n");
   }
   return kDone;
 }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
@@ -32,7 +33,7 @@ struct ImportOptions {
 };
 
 void print_notes(const std::vector<std::string>& notes) {
-  for (const std::string& note : notes) fmt::print(stderr, "note: {}\n", note);
+  for (const std::string& note : notes) print_message("note: {}\n", note);
 }
 
 /// Settings given where a map is expected would be called a damaged map.
@@ -64,7 +65,7 @@ bool has_camera(const Map& map, const CameraDescription& camera) {
 int import_settings(const ImportOptions& options) {
   const std::string camchain = format_camchain(*read_chain(options));
   if (options.out.empty()) {
-    fmt::print("{}", camchain);
+    print_result("{}", camchain);
   } else {
     write_file_atomically(options.out, camchain);
   }
@@ -85,17 +86,16 @@ int import_map(const ImportOptions& options) {
   ImportedMap imported = import_openvslam_map(bytes, options.map.string());
   print_notes(imported.notes);
   if (chain && !has_camera(imported.map, chain->cameras[0].description)) {
-    fmt::print(stderr,
-               "note: {}: its camera is none of the map's, which are used\n",
-               options.settings.string());
+    print_message("note: {}: its camera is none of the map's, which are used\n",
+                  options.settings.string());
   }
   StoredMap stored;
   stored.map = imported.map.freeze();
   save_map(options.out, stored);
-  fmt::print("{} keyframes, {} landmarks in {}\n",
-             stored.map->keyframes().size(),
-             stored.map->landmarks().size(),
-             options.out.string());
+  print_result("{} keyframes, {} landmarks in {}\n",
+               stored.map->keyframes().size(),
+               stored.map->landmarks().size(),
+               options.out.string());
   return kDone;
 }
 

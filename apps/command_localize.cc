@@ -7,7 +7,6 @@
 
 #include "commands.h"
 #include "input_command.h"
-#include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/session.h"
 
@@ -45,10 +44,9 @@ int localize(const LocalizeOptions& options, Reporter& reporter) {
   if (has_range && !is_metric(*stored.map)) {
     reporter.info("the map has no scale in metres: only camera 0 is used, without depth");
   }
-  make_output_folder(options.report.out);
+  prepare_results(options.report.out);
 
   Localizer localizer(prepared.rig, prepared.settings, stored.map);
-  catch_interrupts();
   SessionResults results =
       localize_input(*prepared.input,
                      localizer,
@@ -63,6 +61,7 @@ int localize(const LocalizeOptions& options, Reporter& reporter) {
   results.summary.version = WAYMARK_VERSION;
   write_results(options.report.out, results);
   report_results(reporter, results, options);
+  check_finished(results);
   return *results.summary.localized == 0 ? kNoPose : kDone;
 }
 

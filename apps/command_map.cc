@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/merging.h"
@@ -36,13 +37,13 @@ void print_submaps(const Map& map) {
   for (std::size_t i = 0; i < sizes.size(); ++i) {
     const Submap& submap = map.submaps()[i];
     if (submap.joined_into.is_valid()) {
-      fmt::print("sub-map {}: joined into sub-map {}\n", i, submap.joined_into.value);
+      print_result("sub-map {}: joined into sub-map {}\n", i, submap.joined_into.value);
     } else {
-      fmt::print("sub-map {}: {} keyframes, {} landmarks, {}\n",
-                 i,
-                 sizes[i].num_keyframes,
-                 sizes[i].num_landmarks,
-                 submap.is_metric ? "in metres" : "scale free");
+      print_result("sub-map {}: {} keyframes, {} landmarks, {}\n",
+                   i,
+                   sizes[i].num_keyframes,
+                   sizes[i].num_landmarks,
+                   submap.is_metric ? "in metres" : "scale free");
     }
   }
 }
@@ -56,13 +57,13 @@ void print_rigs(const Map& map) {
   for (std::size_t i = 0; i < rigs.size(); ++i) {
     for (std::size_t j = 0; j < rigs[i]->cameras.size(); ++j) {
       const CameraDescription& camera = rigs[i]->cameras[j].description.value();
-      fmt::print("rig {}, camera {}: {}, distortion {}, {}x{} px\n",
-                 i,
-                 j,
-                 camera.camera_model,
-                 camera.distortion_model,
-                 camera.width_px,
-                 camera.height_px);
+      print_result("rig {}, camera {}: {}, distortion {}, {}x{} px\n",
+                   i,
+                   j,
+                   camera.camera_model,
+                   camera.distortion_model,
+                   camera.width_px,
+                   camera.height_px);
     }
   }
 }
@@ -71,24 +72,24 @@ int print_info(const std::filesystem::path& path) {
   const StoredMap stored = load_map(path);
   const Map& map = *stored.map;
   const auto num_bytes = static_cast<double>(std::filesystem::file_size(path));
-  fmt::print("{}: written by {}, {:.1f} MB\n", path.string(), stored.producer, 1e-6 * num_bytes);
+  print_result("{}: written by {}, {:.1f} MB\n", path.string(), stored.producer, 1e-6 * num_bytes);
   print_rigs(map);
   print_submaps(map);
-  fmt::print("{} keyframes, {} landmarks, {} loop edges, {} images\n",
-             map.keyframes().size(),
-             map.landmarks().size(),
-             map.measured_loop_edges().size(),
-             stored.images.size());
+  print_result("{} keyframes, {} landmarks, {} loop edges, {} images\n",
+               map.keyframes().size(),
+               map.landmarks().size(),
+               map.measured_loop_edges().size(),
+               stored.images.size());
   return kDone;
 }
 
 int check_map(const std::filesystem::path& path) {
   const std::vector<std::string> faults = find_map_faults(path);
-  for (const std::string& fault : faults) fmt::print("{}\n", fault);
+  for (const std::string& fault : faults) print_result("{}\n", fault);
   if (!faults.empty()) {
     throw InputError(path.string(), fmt::format("has {} faults, expected none", faults.size()));
   }
-  fmt::print("{}: sound\n", path.string());
+  print_result("{}: sound\n", path.string());
   return kDone;
 }
 
@@ -112,25 +113,25 @@ struct MergeOptions {
 
 void report(const MergeOptions& options, const MergedStored& merged) {
   if (merged.num_joins == 0) {
-    fmt::print("{} and {}: no overlap found, kept as {} separate sub-maps\n",
-               options.a.string(),
-               options.b.string(),
-               merged.num_parts);
+    print_result("{} and {}: no overlap found, kept as {} separate sub-maps\n",
+                 options.a.string(),
+                 options.b.string(),
+                 merged.num_parts);
     if (merged.is_incomparable) {
-      fmt::print("one is in metres, the scale of the other is free: map align makes it metres\n");
+      print_result("one is in metres, the scale of the other is free: map align makes it metres\n");
     }
   } else {
-    fmt::print("joined: {} sub-maps are {} now, {} further places were seen in both\n",
-               merged.num_parts_before,
-               merged.num_parts,
-               merged.num_loops);
+    print_result("joined: {} sub-maps are {} now, {} further places were seen in both\n",
+                 merged.num_parts_before,
+                 merged.num_parts,
+                 merged.num_loops);
   }
-  fmt::print("{}: {} keyframes, {} landmarks, {} sub-map{}\n",
-             options.out.string(),
-             merged.stored.map->keyframes().size(),
-             merged.stored.map->landmarks().size(),
-             merged.num_parts,
-             merged.num_parts == 1 ? "" : "s");
+  print_result("{}: {} keyframes, {} landmarks, {} sub-map{}\n",
+               options.out.string(),
+               merged.stored.map->keyframes().size(),
+               merged.stored.map->landmarks().size(),
+               merged.num_parts,
+               merged.num_parts == 1 ? "" : "s");
 }
 
 int merge_files(const MergeOptions& options) {

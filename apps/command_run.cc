@@ -96,10 +96,7 @@ SessionResults map_input(
     };
     hooks.on_input_end = [live] { live->finishing(); };
   }
-  catch_interrupts();
-  SessionResults results = run_session(input, *session.system, hooks);
-  if (live) live->finish();
-  return results;
+  return run_session(input, *session.system, hooks);
 }
 
 void save_final_map(const System& system,
@@ -138,7 +135,7 @@ int run(RunOptions options, Reporter& reporter) {
   options.session.timing = options.timing.value_or(suitable);
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
-  make_output_folder(options.report.out);
+  prepare_results(options.report.out);
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) {
     AtomicFile{options.map_out};  // Fails now rather than in the end.
@@ -168,9 +165,13 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
-  if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
-  write_results(options.report.out, results);
+  save_each({[&] { write_results(options.report.out, results); },
+             [&] {
+               if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
+             }});
+  if (live) live->finish();
   report_results(reporter, results, options);
+  check_finished(results);
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
 }
 

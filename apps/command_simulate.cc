@@ -12,6 +12,7 @@
 
 #include "commands.h"
 #include "reporter.h"
+#include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
@@ -122,11 +123,11 @@ SequenceSpec spec_of(const SimulateOptions& options) {
 }
 
 int list_choices() {
-  for (const std::string& world : world_names()) fmt::print("world {}\n", world);
-  for (const std::string& motion : motion_names()) fmt::print("motion {}\n", motion);
-  for (const std::string& camera : camera_names()) fmt::print("camera {}\n", camera);
+  for (const std::string& world : world_names()) print_result("world {}\n", world);
+  for (const std::string& motion : motion_names()) print_result("motion {}\n", motion);
+  for (const std::string& camera : camera_names()) print_result("camera {}\n", camera);
   for (const SuiteEntry& entry : simulated_suite()) {
-    fmt::print("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
+    print_result("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
   }
   return kDone;
 }

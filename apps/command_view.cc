@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/session_options.h"
@@ -87,8 +88,8 @@ int view(const ViewOptions& options) {
   ViewUpdate update = show(stored);
   viewer.try_push(update);
   catch_interrupts();
-  fmt::print("{}\n", describe(*stored.map, options.map));
-  fmt::print("open {} in a browser; Ctrl-C ends\n", viewer.url());
+  print_result("{}\n", describe(*stored.map, options.map));
+  print_result("open {} in a browser; Ctrl-C ends\n", viewer.url());
   std::fflush(stdout);
   while (!is_interrupted()) std::this_thread::sleep_for(50ms);
   return kDone;

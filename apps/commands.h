@@ -52,8 +52,8 @@ void add_choice(CLI::App& command,
       ->type_name("NAME");
 }
 
-/// From now on the first Ctrl-C or SIGTERM is remembered, and the second one ends the program at
-/// once with status 130.
+/// From now on the first Ctrl-C, SIGTERM or SIGHUP is remembered, and a further Ctrl-C or SIGTERM
+/// ends the program at once with status 130. A terminal that is lost hangs up more than once.
 void catch_interrupts();
 
 /// Whether the user asked to end early.

@@ -111,12 +111,19 @@ void report_reasons(Reporter& reporter, const FrameTable& table) {
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work) {
   silence_image_library();
   Reporter reporter(options.verbosity(), options.log);
+  catch_interrupts();
   try {
-    return work(reporter);
-  } catch (const std::exception& error) {
-    reporter.failure(error.what());
+    const int status = work(reporter);
+    reporter.check_log();
+    return status;
+  } catch (const std::exception&) {
+    reporter.failure(describe_failure(std::current_exception()));
     throw;
   }
+}
+
+void check_finished(const SessionResults& results) {
+  if (results.failure) throw OutputError(describe_failure(results.failure));
 }
 
 }  // namespace waymark

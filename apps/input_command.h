@@ -8,6 +8,7 @@
 #include "reporter.h"
 #include "waymark/exchange/results.h"
 #include "waymark/session/frame_feed.h"
+#include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
 
 namespace CLI {
@@ -42,7 +43,11 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
 /// Why frames have no pose, the commonest reason first; nothing if all have one.
 void report_reasons(Reporter& reporter, const FrameTable& table);
 
-/// Calls work with a reporter; what it throws also goes to the log.
+/// Calls work with a reporter and from then on catches interrupts; what it throws also goes to the
+/// log.
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work);
+
+/// Throws OutputError if something ended the session before its input did.
+void check_finished(const SessionResults& results);
 
 }  // namespace waymark

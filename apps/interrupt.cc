@@ -13,8 +13,8 @@ constexpr int kInterruptedStatus = 130;
 // The only global of the program: a signal handler can reach nothing else.
 volatile sig_atomic_t interrupted = 0;
 
-extern "C" void handle_interrupt(int) {
-  if (interrupted) _exit(kInterruptedStatus);
+extern "C" void handle_interrupt(int which) {
+  if (interrupted && which != SIGHUP) _exit(kInterruptedStatus);
   interrupted = 1;
 }
 
@@ -26,6 +26,9 @@ void catch_interrupts() {
   action.sa_flags = SA_RESTART;
   sigaction(SIGINT, &action, nullptr);
   sigaction(SIGTERM, &action, nullptr);
+  struct sigaction before = {};
+  sigaction(SIGHUP, nullptr, &before);
+  if (before.sa_handler != SIG_IGN) sigaction(SIGHUP, &action, nullptr);  // Not under nohup.
 }
 
 bool is_interrupted() { return interrupted != 0; }

@@ -14,15 +14,17 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/check.h"
 
 namespace waymark {
+
 namespace {
 
 /// One line, whatever the message holds.
 int fail(int status, std::string message) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  fmt::print(stderr, "error: {}\n", message);
+  print_message("error: {}\n", message);
   return status;
 }
 
@@ -73,18 +75,19 @@ int run_program(const std::vector<std::string>& arguments) {
 }  // namespace waymark
 
 int main(int argc, char** argv) {
-  // A file size limit would end the program; without the signal the write fails and is reported.
+  waymark::keep_standard_streams();
+  // A reader who leaves or a file size limit would end the program: without the signals the write
+  // fails, and what was computed is saved.
+  signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);
   try {
-    return waymark::run_program({argv + 1, argv + argc});
+    const int status = waymark::run_program({argv + 1, argv + argc});
+    if (status == waymark::kDone || status == waymark::kNoPose) waymark::check_standard_output();
+    return status;
   } catch (const waymark::InputError& error) {
     return waymark::fail(waymark::kBadInput, error.what());
-  } catch (const waymark::OutputError& error) {
-    return waymark::fail(waymark::kCouldNotFinish, error.what());
-  } catch (const std::bad_alloc&) {
-    return waymark::fail(waymark::kCouldNotFinish, "waymark: out of memory");
-  } catch (const std::exception& error) {
+  } catch (const std::exception&) {
     return waymark::fail(waymark::kCouldNotFinish,
-                         fmt::format("waymark: internal failure: {}", error.what()));
+                         waymark::describe_failure(std::current_exception()));
   }
 }

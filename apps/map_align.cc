@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
@@ -66,7 +67,7 @@ Map scale(Map map, const AlignOptions& options) {
   const std::optional<double> factor = scale_by_distances(map, known);
   if (!factor)
     throw InputError("--distance", "is between keyframes at the same place, expected two");
-  fmt::print("sub-map {}: scaled by {:.6g}, now in metres\n", submap->value, *factor);
+  print_result("sub-map {}: scaled by {:.6g}, now in metres\n", submap->value, *factor);
   return put_into_metres(
       std::move(map), *submap, {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor});
 }
@@ -99,7 +100,7 @@ Map fit(Map map, const AlignOptions& options) {
                      "has no poses at the times of keyframes, expected three or more, not all on a "
                      "line, within 0.02 s");
   }
-  fmt::print("{}", report);
+  print_result("{}", report);
   return map;
 }
 
@@ -110,9 +111,9 @@ Map level(Map map, const AlignOptions& options) {
   }
   const std::vector<SubmapId> submaps = submaps_by_size(map);
   if (submaps.empty()) throw InputError(options.map.string(), "has no keyframes, expected some");
-  fmt::print("sub-map {}: {} {} {} is +z now\n", submaps[0].value, up.x(), up.y(), up.z());
+  print_result("sub-map {}: {} {} {} is +z now\n", submaps[0].value, up.x(), up.y(), up.z());
   for (std::size_t i = 1; i < submaps.size(); ++i) {
-    fmt::print("sub-map {}: stays as it is, having a frame of its own\n", submaps[i].value);
+    print_result("sub-map {}: stays as it is, having a frame of its own\n", submaps[i].value);
   }
   transform_submap(map, submaps[0], {turn_upright(up), Eigen::Vector3d::Zero(), 1.0});
   return map;

@@ -8,6 +8,7 @@
 #include <algorithm>
 #include <cstdio>
 
+#include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 
@@ -35,7 +36,7 @@ std::string format_duration(double seconds) {
 }
 
 Reporter::Reporter(Verbosity verbosity, const std::filesystem::path& log)
-    : verbosity_(verbosity), is_terminal_(isatty(STDERR_FILENO) != 0) {
+    : verbosity_(verbosity), is_terminal_(isatty(STDERR_FILENO) != 0), log_path_(log) {
   if (log.empty()) return;
   if (log.has_parent_path()) make_output_folder(log.parent_path());
   log_.open(log);
@@ -80,7 +81,7 @@ void Reporter::progress(std::size_t num_done,
   }
   text += fmt::format(", {:.1f} frames/s, {}", frames_per_s, state);
   if (is_terminal_) {
-    fmt::print(stderr, "\r\x1b[K{}", text);
+    print_message("\r\x1b[K{}", text);
     std::fflush(stderr);
     is_bar_shown_ = true;
   } else {
@@ -90,16 +91,21 @@ void Reporter::progress(std::size_t num_done,
 
 void Reporter::finish_progress() {
   if (!is_bar_shown_) return;
-  fmt::print(stderr, "\r\x1b[K");
+  print_message("\r\x1b[K");
   std::fflush(stderr);
   is_bar_shown_ = false;
+}
+
+void Reporter::check_log() const {
+  if (!log_.is_open() || log_) return;
+  throw OutputError(log_path_.string(), "messages got lost, expected enough space for --log");
 }
 
 void Reporter::write(std::string_view line, bool to_terminal) {
   if (log_.is_open()) log_ << line << '\n' << std::flush;
   if (!to_terminal) return;
   finish_progress();
-  fmt::print(stderr, "{}\n", line);
+  print_message("{}\n", line);
 }
 
 }  // namespace waymark

@@ -16,6 +16,7 @@ enum class Verbosity { kQuiet, kNormal, kVerbose };
 
 /// Tells the user on standard error what is going on: lines, and the progress of a long run as a
 /// bar on a terminal or else as a line every few seconds. Everything also goes to the log, if any.
+/// What cannot be written is no reason to stop: check_log() tells in the end.
 class Reporter {
  public:
   /// Makes the folder of the log, too. Throws OutputError when the log cannot be made.
@@ -36,6 +37,9 @@ class Reporter {
   /// Removes the bar.
   void finish_progress();
 
+  /// Throws OutputError when a message could not be written to the log.
+  void check_log() const;
+
  private:
   using Clock = std::chrono::steady_clock;
 
@@ -44,6 +48,7 @@ class Reporter {
   Verbosity verbosity_;
   bool is_terminal_;
   bool is_bar_shown_ = false;
+  const std::filesystem::path log_path_;
   std::ofstream log_;
   std::optional<Clock::time_point> start_;
   Clock::time_point last_shown_;

@@ -398,15 +398,23 @@ class BadOutput(CliTest):
 
     def test_full_disk(self):
         done = self.run_on(self.sequence("stereo"), preexec_fn=self.no_room)
-        self.assert_fails(done, 1, self.out)
+        self.assertEqual(done.returncode, 1, done.stderr)
+        for name in ("trajectory.txt", "summary.json", "frames.csv"):
+            self.assertIn(f"{self.out / name}: cannot be written", done.stderr)
+        # What has room is there, and nothing else.
+        self.assertEqual([path.name for path in self.out.iterdir()], ["keyframes.txt"])
+        self.assertTrue((self.out / "keyframes.txt").read_text().endswith("\n"))
 
-    def test_full_disk_leaves_earlier_results_as_they_were(self):
+    def test_full_disk_leaves_earlier_results_that_it_cannot_replace(self):
         source = self.sequence("stereo")
         self.assertEqual(self.run_on(source, "--frames", 5).returncode, 0)
         before = {path.name: path.read_bytes() for path in self.out.iterdir()}
         done = self.run_on(source, preexec_fn=self.no_room)
         self.assertEqual(done.returncode, 1, done.stderr)
-        self.assertEqual({path.name: path.read_bytes() for path in self.out.iterdir()}, before)
+        after = {path.name: path.read_bytes() for path in self.out.iterdir()}
+        self.assertEqual(after.keys(), before.keys())
+        for name in ("trajectory.txt", "summary.json", "frames.csv"):
+            self.assertEqual(after[name], before[name])
 
     def test_full_disk_for_a_simulation_or_a_plot(self):
         done = waymark("simulate", "room", "--frames", 2, "-o", self.out, preexec_fn=self.no_room)

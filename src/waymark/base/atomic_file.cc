@@ -10,6 +10,7 @@
 #include <cerrno>
 #include <charconv>
 #include <ctime>
+#include <exception>
 #include <optional>
 #include <system_error>
 #include <vector>
@@ -19,7 +20,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kBufferBytes = std::size_t{1} << 20;
+constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
 constexpr int kMaxNames = 1000;
 
 /// Writing beyond the file size limit (ulimit -f) sends SIGXFSZ, which by default kills the
@@ -166,6 +167,22 @@ void write_file_atomically(const std::filesystem::path& path, std::string_view c
   AtomicFile file(path);
   file.write(content);
   file.commit();
+}
+
+void save_each(std::initializer_list<std::function<void()>> saves) {
+  std::exception_ptr first;
+  std::string messages;
+  int num_failures = 0;
+  for (const auto& save : saves) {
+    try {
+      save();
+    } catch (const std::exception&) {
+      if (num_failures++ == 0) first = std::current_exception();
+      messages += (messages.empty() ? "" : "; ") + describe_failure(std::current_exception());
+    }
+  }
+  if (num_failures == 1) std::rethrow_exception(first);
+  if (num_failures > 1) throw OutputError(messages);
 }
 
 void remove_abandoned_parts(const std::filesystem::path& path) {

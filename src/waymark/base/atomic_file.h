@@ -4,6 +4,8 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
+#include <initializer_list>
 #include <string>
 #include <string_view>
 
@@ -37,6 +39,10 @@ class AtomicFile {
 
 /// Writes the whole content; throws OutputError like AtomicFile.
 void write_file_atomically(const std::filesystem::path& path, std::string_view content);
+
+/// Calls all of them, whatever became of those before, so that what can be saved is. Then throws
+/// what failed: the exception itself or, of several, an OutputError with all of the messages.
+void save_each(std::initializer_list<std::function<void()>> saves);
 
 /// Removes what programs that were killed while they wrote this file left beside it. What a living
 /// program writes stays.

@@ -52,6 +52,28 @@ TEST(AtomicFile, ReplacesButKeepsTheOldOneUntilThen) {
   EXPECT_EQ(read_text_file(folder / "a.txt", "text"), "new");
 }
 
+TEST(SaveEach, GoesOnAfterAFailureAndTellsAll) {
+  int num_calls = 0;
+  const auto good = [&] { ++num_calls; };
+  const auto bad = [&] {
+    ++num_calls;
+    throw OutputError("disk", "is full");
+  };
+  const auto short_of_memory = [&] {
+    ++num_calls;
+    throw std::bad_alloc();
+  };
+  save_each({good, good});
+  EXPECT_THROW(save_each({short_of_memory, good}), std::bad_alloc);
+  EXPECT_THAT(
+      [&] {
+        save_each({bad, good, short_of_memory});
+      },
+      ::testing::Throws<OutputError>(::testing::Property(
+          &OutputError::what, ::testing::StrEq("disk: is full; waymark: out of memory"))));
+  EXPECT_EQ(num_calls, 7);
+}
+
 TEST(AtomicFile, WritesThroughLinks) {
   const TemporaryFolder folder;
   folder.write("target.txt", "old");

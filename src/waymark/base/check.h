@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <exception>
+#include <new>
 #include <stdexcept>
 #include <string>
 
@@ -22,6 +24,8 @@ class OutputError : public std::runtime_error {
   /// where: the file or device; what: why it cannot be written.
   OutputError(const std::string& where, const std::string& what)
       : std::runtime_error(where + ": " + what) {}
+  /// A whole message of that form.
+  explicit OutputError(const std::string& message) : std::runtime_error(message) {}
 };
 
 /// A broken promise of our own code.
@@ -29,6 +33,21 @@ class CheckError : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
+
+/// What is said of an exception to whoever runs the program, in one line.
+inline std::string describe_failure(const std::exception_ptr& failure) {
+  try {
+    std::rethrow_exception(failure);
+  } catch (const InputError& error) {
+    return error.what();
+  } catch (const OutputError& error) {
+    return error.what();
+  } catch (const std::bad_alloc&) {
+    return "waymark: out of memory";
+  } catch (const std::exception& error) {
+    return std::string("waymark: internal failure: ") + error.what();
+  }
+}
 
 /// Throws the CheckError of WAYMARK_CHECK.
 [[noreturn]] inline void fail_check(const char* condition, const char* file, int line) {

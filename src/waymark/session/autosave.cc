@@ -31,9 +31,13 @@ std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& ma
   if (!is_due && wanted_.empty()) return std::nullopt;
   last_start_ = now;
   served_ = std::exchange(wanted_, {});
-  // The map never changes, the rest is fixed: nothing is shared that anyone writes.
-  under_way_ =
-      std::async(std::launch::async, [this, stored = prepare(map)] { save_map(path_, stored); });
+  try {
+    // The map never changes, the rest is fixed: nothing is shared that anyone writes.
+    under_way_ =
+        std::async(std::launch::async, [this, stored = prepare(map)] { save_map(path_, stored); });
+  } catch (const std::exception&) {
+    return describe_failure(std::current_exception());  // No memory or no thread is left, now.
+  }
   return std::nullopt;
 }
 
@@ -45,8 +49,8 @@ std::string Autosave::finish_save() {
   std::string failure;
   try {
     under_way_.get();
-  } catch (const OutputError& error) {
-    failure = error.what();
+  } catch (const std::exception&) {  // Memory may run out, too.
+    failure = describe_failure(std::current_exception());
   }
   for (const auto& on_done : std::exchange(served_, {})) on_done(failure);
   return failure;

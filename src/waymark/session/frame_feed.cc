@@ -59,6 +59,21 @@ FrameImages borrow(const InputFrame& frame) {
   return input;
 }
 
+/// Feeds a frame, unless it has a fault, and adds its row.
+void add_frame(const InputFrame& frame,
+               const std::function<TrackingResult(const FrameImages&)>& feed,
+               FedFrames& frames) {
+  if (frame.fault != FrameFault::kNone) {
+    frames.table.frames.push_back(record_of_fault(frame));
+    return;
+  }
+  const TrackingResult result = feed(borrow(frame));
+  if (result.frame == FrameId{0}) forget_session(frames);
+  frames.fed.push_back(frames.table.frames.size());
+  frames.tracking_ms.push_back(result.stages.tracking_ms());
+  frames.table.frames.push_back(record_of_result(frame, result));
+}
+
 }  // namespace
 
 void forget_session(FedFrames& frames) {
@@ -72,19 +87,16 @@ FedFrames feed_all(Input& input,
                    const FrameObserver& observer) {
   FedFrames frames;
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
-  while (!should_stop || !should_stop()) {
-    const std::optional<InputFrame> frame = input.next();
-    if (!frame) break;
-    if (frame->fault != FrameFault::kNone) {
-      frames.table.frames.push_back(record_of_fault(*frame));
-    } else {
-      const TrackingResult result = feed(borrow(*frame));
-      if (result.frame == FrameId{0}) forget_session(frames);
-      frames.fed.push_back(frames.table.frames.size());
-      frames.tracking_ms.push_back(result.stages.tracking_ms());
-      frames.table.frames.push_back(record_of_result(*frame, result));
+  try {
+    while (!should_stop || !should_stop()) {
+      const std::optional<InputFrame> frame = input.next();
+      if (!frame) break;
+      add_frame(*frame, feed, frames);
+      if (observer) observer(frames.table.frames.back());
     }
-    if (observer) observer(frames.table.frames.back());
+  } catch (...) {
+    if (frames.fed.empty()) throw;
+    frames.failure = std::current_exception();
   }
   return frames;
 }

@@ -4,6 +4,7 @@
 
 #include <chrono>
 #include <cstddef>
+#include <exception>
 #include <functional>
 #include <utility>
 #include <vector>
@@ -23,13 +24,16 @@ struct FedFrames {
   FrameTable table;
   std::vector<std::size_t> fed;
   std::vector<double> tracking_ms;
+  /// What the input or the feeding of a frame threw, which ended it all; null if nothing.
+  std::exception_ptr failure;
 };
 
 /// After a reset: what was fed before belongs to no map.
 void forget_session(FedFrames& frames);
 
 /// Feeds an input until it ends or should_stop() says so. Frames with a fault are not fed, but have
-/// their row.
+/// their row. What is thrown once a frame was fed ends it, and comes with the frames; before that,
+/// it comes through.
 FedFrames feed_all(Input& input,
                    const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,

@@ -2,27 +2,52 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/session/session.h"
 
+#include <sys/mman.h>
+
+#include <algorithm>
+#include <cstddef>
 #include <utility>
 #include <vector>
 
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/export_scene.h"
 
 namespace waymark {
 namespace {
 
+/// Where memory runs out, what is left to save with: addresses, behind which there is no memory.
+/// An allocator that finds no more room may take a good part of them for a heap of its own.
+class MemoryReserve {
+ public:
+  MemoryReserve() : start_(mmap(nullptr, kBytes, PROT_NONE, MAP_PRIVATE | MAP_ANONYMOUS, -1, 0)) {}
+  ~MemoryReserve() { release(); }
+  MemoryReserve(const MemoryReserve&) = delete;
+  MemoryReserve& operator=(const MemoryReserve&) = delete;
+
+  void release() {
+    if (start_ != MAP_FAILED) munmap(std::exchange(start_, MAP_FAILED), kBytes);
+  }
+
+ private:
+  static constexpr std::size_t kBytes = std::size_t{64} << 20;
+  void* start_;  ///< MAP_FAILED: there is none.
+};
+
 /// What became of the frames after the fact: filled in, moved to another sub-map.
 void update_states(const System& system, FedFrames& frames) {
   const std::vector<FrameState> states = system.frame_states();
   if (states.empty()) forget_session(frames);  // There was a reset since the last frame.
-  WAYMARK_CHECK(states.size() == frames.fed.size());
-  for (std::size_t i = 0; i < states.size(); ++i) {
+  // What fails while it is fed may be known to the system, but has no row.
+  WAYMARK_CHECK(states.size() == frames.fed.size() || frames.failure);
+  for (std::size_t i = 0; i < std::min(states.size(), frames.fed.size()); ++i) {
     FrameRecord& record = frames.table.frames[frames.fed[i]];
     record.state = states[i];
     if (states[i] == FrameState::kFilled) record.reason = FrameReason::kNone;
   }
   for (const TrajectoryFrame& frame : system.trajectory()) {
-    frames.table.frames[frames.fed.at(frame.frame.value)].submap = frame.submap;
+    if (frame.frame.value >= frames.fed.size()) break;
+    frames.table.frames[frames.fed[frame.frame.value]].submap = frame.submap;
   }
 }
 
@@ -41,9 +66,22 @@ RunSummary summarize(const System& system, const FedFrames& frames) {
   return summary;
 }
 
-std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system) {
+/// Finishes the system; what fails then ends the session as what fails before.
+void finish(System& system, const SessionHooks& hooks, FedFrames& frames) {
+  try {
+    if (hooks.on_input_end) hooks.on_input_end();
+    system.finish();
+  } catch (...) {
+    if (!frames.failure) frames.failure = std::current_exception();
+  }
+}
+
+/// Of the frames that have a row.
+std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system,
+                                                         const FedFrames& frames) {
   std::vector<std::pair<SubmapId, StampedPose>> poses;
   for (const TrajectoryFrame& frame : system.trajectory()) {
+    if (frame.frame.value >= frames.fed.size()) break;
     poses.push_back({frame.submap, {frame.timestamp_ns, frame.world_from_rig}});
   }
   return poses;
@@ -53,20 +91,22 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system) {
 
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
+  MemoryReserve reserve;
   const auto feed = [&](const FrameImages& frame) {
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
     return result;
   };
   FedFrames frames = feed_all(input, feed, hooks.should_stop, hooks.observer);
-  if (hooks.on_input_end) hooks.on_input_end();
-  system.finish();
+  finish(system, hooks, frames);
+  reserve.release();
   update_states(system, frames);
 
   SessionResults results;
   results.summary = summarize(system, frames);
-  add_trajectories(*system.map(), list_poses(system), results);
+  add_trajectories(*system.map(), list_poses(system, frames), results);
   results.table = std::move(frames.table);
+  results.failure = frames.failure;
   usage.write_to(results.summary);
   return results;
 }
@@ -83,11 +123,22 @@ void add_trajectories(const Map& map,
   }
 }
 
+void prepare_results(const std::filesystem::path& folder) {
+  make_output_folder(folder);
+  for (const char* name : {"trajectory.txt", "keyframes.txt", "summary.json", "frames.csv"}) {
+    AtomicFile{folder / name};
+    remove_abandoned_parts(folder / name);
+  }
+}
+
 void write_results(const std::filesystem::path& folder, const SessionResults& results) {
-  write_trajectories(folder, results.trajectories);
-  write_trajectory(folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
-  write_frames_csv(folder, results.table);
-  write_summary_json(folder, results.summary);
+  save_each({[&] { write_trajectories(folder, results.trajectories); },
+             [&] {
+               write_trajectory(
+                   folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
+             },
+             [&] { write_summary_json(folder, results.summary); },
+             [&] { write_frames_csv(folder, results.table); }});
 }
 
 std::string_view to_string(Timing timing) {
@@ -108,6 +159,7 @@ SessionResults localize_input(Input& input,
                               const std::function<bool()>& should_stop,
                               const FrameObserver& observer) {
   const UsageMeter usage;
+  MemoryReserve reserve;
   std::vector<std::pair<SubmapId, StampedPose>> poses;
   const auto feed = [&](const FrameImages& frame) {
     const TrackingResult result =
@@ -118,6 +170,7 @@ SessionResults localize_input(Input& input,
     return result;
   };
   FedFrames frames = feed_all(input, feed, should_stop, observer);
+  reserve.release();
 
   SessionResults results;
   const Map& map = localizer.map();
@@ -131,6 +184,7 @@ SessionResults localize_input(Input& input,
   summary.stages_ms = summarize_stages(frames.table);
   add_trajectories(map, poses, results);
   results.table = std::move(frames.table);
+  results.failure = frames.failure;
   usage.write_to(summary);
   return results;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <exception>
 #include <filesystem>
 #include <functional>
 #include <string_view>
@@ -26,6 +27,8 @@ struct SessionResults {
   std::vector<std::vector<StampedPose>> trajectories;
   std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
   RunSummary summary;
+  /// What ended the session before its input did; the rest is what there was until then.
+  std::exception_ptr failure;
 };
 
 /// Who takes part in a session while it runs; any may be empty.
@@ -39,8 +42,8 @@ struct SessionHooks {
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and
 /// collects the results. Frames with a fault are not fed, but have their row. setup, timing, seed
-/// and version of the summary are left to the caller. What the input throws ends it, and the map
-/// made so far stays with the system.
+/// and version of the summary are left to the caller. What is thrown once a frame was fed ends the
+/// session, whose results until then come with that failure.
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks = {});
 
 /// Fills in the trajectories of all sub-maps, and what follows from them.
@@ -48,8 +51,12 @@ void add_trajectories(const Map& map,
                       const std::vector<std::pair<SubmapId, StampedPose>>& poses,
                       SessionResults& results);
 
-/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json; throws
-/// OutputError.
+/// Makes the folder and tries its files, so that write_results() will not be the first to find out
+/// that they cannot be written. Throws OutputError.
+void prepare_results(const std::filesystem::path& folder);
+
+/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json, each
+/// whatever becomes of the others; throws OutputError.
 void write_results(const std::filesystem::path& folder, const SessionResults& results);
 
 /// "inline", "lockstep", "realtime".

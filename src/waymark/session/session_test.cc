@@ -115,16 +115,73 @@ TEST(RunSession, EndsEarlyWithWhatItHas) {
   EXPECT_EQ(results.summary.counts.tracked, 8u);
 }
 
-TEST(RunSession, HasAMapWhenTheInputThrows) {
+void expect_failure(const SessionResults& results, const std::string& message) {
+  ASSERT_TRUE(results.failure);
+  EXPECT_THAT(
+      [&] { std::rethrow_exception(results.failure); },
+      ::testing::Throws<InputError>(::testing::Property(&InputError::what, HasSubstr(message))));
+}
+
+TEST(RunSession, HasItsResultsWhenTheInputThrows) {
   for (const Timing timing : {Timing::kInline, Timing::kLockstep, Timing::kRealtime}) {
     MemoryInput input(rendered_frames(), 20);
     System system(small_rig(), small_settings(), timing);
-    EXPECT_THROW(run_session(input, system), InputError);
-    system.finish();
+    const SessionResults results = run_session(input, system);
+    expect_failure(results, "torn out");
     EXPECT_FALSE(system.map()->keyframes().is_empty());
     EXPECT_EQ(system.map()->broken_invariants(), "");
-    EXPECT_THAT(system.trajectory(), SizeIs(20));
+    EXPECT_THAT(results.table.frames, SizeIs(20));
+    EXPECT_EQ(results.summary.counts.tracked, 20u);
+    ASSERT_THAT(results.trajectories, SizeIs(1));
+    EXPECT_THAT(results.trajectories[0], SizeIs(20));
   }
+}
+
+TEST(RunSession, HasItsResultsWhenAFrameCannotBeFed) {
+  std::vector<InputFrame> frames = rendered_frames();
+  frames[20].timestamp_ns = frames[19].timestamp_ns;
+  MemoryInput input(std::move(frames));
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  const SessionResults results = run_session(input, system);
+  expect_failure(results, "time stamp is not later");
+  ASSERT_THAT(results.trajectories, SizeIs(1));
+  EXPECT_GE(results.trajectories[0].size(), 19u);
+}
+
+TEST(RunSession, HasItsResultsWhenAnObserverThrows) {
+  MemoryInput input(rendered_frames());
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  SessionHooks hooks;
+  hooks.on_result = [](const FrameImages&, const TrackingResult& result) {
+    if (result.frame.value == 20) throw InputError("observer", "gave up");
+  };
+  const SessionResults results = run_session(input, system, hooks);
+  expect_failure(results, "gave up");
+  ASSERT_THAT(results.trajectories, SizeIs(1));
+  EXPECT_THAT(results.trajectories[0], SizeIs(20));
+}
+
+TEST(RunSession, HasNoResultsWhenNothingWasFed) {
+  MemoryInput input(rendered_frames(), 0);
+  System system(small_rig(), small_settings(), Timing::kInline);
+  EXPECT_THROW(run_session(input, system), InputError);
+}
+
+TEST(WriteResults, WritesWhateverCanBeWritten) {
+  MemoryInput input(rendered_frames());
+  System system(small_rig(), small_settings(), Timing::kInline);
+  const SessionResults results = run_session(input, system);
+  const testing::TemporaryFolder folder;
+  for (const char* name : {"trajectory.txt", "frames.csv"}) {
+    std::filesystem::create_directory(folder / name);
+  }
+  EXPECT_THROW(prepare_results(folder.path()), OutputError);
+  EXPECT_THAT(
+      [&] { write_results(folder.path(), results); },
+      ::testing::Throws<OutputError>(::testing::Property(
+          &OutputError::what, AllOf(HasSubstr("trajectory.txt"), HasSubstr("frames.csv")))));
+  EXPECT_THAT(read_trajectory(folder / "keyframes.txt"), SizeIs(results.keyframes.size()));
+  EXPECT_THAT(read_text_file(folder / "summary.json", "a summary"), HasSubstr("keyframes"));
 }
 
 TEST(RunSession, HasRowsButNoTrajectoryWhereNothingIsSeen) {
@@ -174,10 +231,14 @@ TEST(LocalizeInput, FindsStreamsAndSingleImagesInAMap) {
   }
 }
 
-TEST(LocalizeInput, PassesOnWhatTheInputThrows) {
-  MemoryInput input(rendered_frames(), 2);
+TEST(LocalizeInput, HasItsResultsWhenTheInputThrows) {
+  MemoryInput input(rendered_frames(), 6);
   Localizer localizer(small_rig(), small_settings(), small_map());
-  EXPECT_THROW(localize_input(input, localizer, ImageOrder::kStream, nullptr, nullptr), InputError);
+  const SessionResults results =
+      localize_input(input, localizer, ImageOrder::kStream, nullptr, nullptr);
+  expect_failure(results, "torn out");
+  EXPECT_THAT(results.table.frames, SizeIs(6));
+  EXPECT_GE(*results.summary.localized, 3u);
 }
 
 TEST(MergeStored, JoinsAMapWithItselfAndKeepsTheImagesOfBoth) {

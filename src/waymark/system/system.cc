@@ -228,7 +228,12 @@ const FocalCheck* System::Impl::focal_check() const {
 void System::Impl::finish() {
   if (is_finished_) return;
   is_finished_ = true;
-  worker_.finish();
+  try {
+    worker_.finish();
+  } catch (...) {
+    adjuster_.stop();  // What may be short, memory above all, is needed to save what there is.
+    throw;
+  }
   if (adjuster_.is_busy()) finish_adjustment();
   mapper_.finish();
   visible_.snapshot = mapper_.snapshot();

@@ -80,9 +80,12 @@ AdjustmentWorker::AdjustmentWorker(Timing timing) : timing_(timing) {
   if (timing_ != Timing::kInline) thread_ = std::jthread([this] { run(); });
 }
 
-AdjustmentWorker::~AdjustmentWorker() {
+AdjustmentWorker::~AdjustmentWorker() { stop(); }
+
+void AdjustmentWorker::stop() {
   tasks_.close();
   outcomes_.close();
+  if (thread_.joinable()) thread_.join();
 }
 
 void AdjustmentWorker::start(AdjustmentTask task) {

@@ -94,6 +94,8 @@ class AdjustmentWorker {
   bool has_result() const { return outcomes_.size() > 0; }
   /// Waits for the result of the task that was started. Rethrows what failed.
   Result finish();
+  /// Ends the thread once it is done with its task, whose result is lost. No start() afterwards.
+  void stop();
 
  private:
   struct Outcome {

@@ -1,0 +1,37 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <fmt/format.h>
+
+#include <cstdio>
+#include <string_view>
+#include <utility>
+
+/// The standard streams, which may be closed, full or nobody's any more: writing to them never
+/// throws, since what was computed is worth more than what is said of it.
+namespace waymark {
+
+/// Opens what is closed of the standard streams to nowhere, so that no file that is opened later
+/// takes their place; standard output then still fails when it is written to.
+void keep_standard_streams();
+
+/// Writes to a standard stream; std::ferror() tells when that failed.
+void write_text(std::FILE* stream, std::string_view text);
+
+/// Results that were asked for, to standard output.
+template <class... Arguments>
+void print_result(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write_text(stdout, fmt::format(format, std::forward<Arguments>(arguments)...));
+}
+
+/// Messages, to standard error.
+template <class... Arguments>
+void print_message(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
+  write_text(stderr, fmt::format(format, std::forward<Arguments>(arguments)...));
+}
+
+/// Throws OutputError when something written to standard output got lost.
+void check_standard_output();
+
+}  // namespace waymark
