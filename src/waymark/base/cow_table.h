@@ -7,7 +7,6 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
-#include <optional>
 #include <utility>
 #include <vector>
 
@@ -16,7 +15,9 @@
 namespace waymark {
 
 /// Ordered table from Id to T whose copies are cheap: a table and its frozen copies share pages,
-/// and the writer clones a page the first time it edits it after freezing.
+/// and the writer clones a page the first time it edits it after freezing. Its memory follows what
+/// it holds: a page has room for what lives, and none is left where nothing does. Of the ids that
+/// were ever given only a pointer for each page of them stays.
 ///
 /// Invariant: a page with the stamp of a table belongs to that table alone.
 /// Thread safety: a frozen table is for any number of readers; a live table has one writer.
@@ -30,14 +31,17 @@ class CowTable {
 
   /// Copy that shares every page with this table and never changes. O(pages).
   CowTable freeze() {
+    for (const std::size_t index : own_pages_) {
+      if (pages_[index]) pages_[index]->tighten();
+    }
+    own_pages_.clear();
     ++stamp_;  // From now on no page belongs to this table or to the copy, so that edits clone.
-    has_own_pages_ = false;
     return CowTable(*this);
   }
 
   /// Editable table that starts as a frozen one, which stays valid and unchanged.
   static CowTable thaw(const CowTable& frozen) {
-    WAYMARK_CHECK(!frozen.has_own_pages_);
+    WAYMARK_CHECK(frozen.own_pages_.empty());
     return CowTable(frozen);
   }
 
@@ -56,8 +60,7 @@ class CowTable {
   const T* find(Key id) const {
     const std::size_t page = id.value / kPageSize;
     if (page >= pages_.size() || !pages_[page]) return nullptr;
-    const std::optional<T>& slot = pages_[page]->slots[id.value % kPageSize];
-    return slot ? &*slot : nullptr;
+    return pages_[page]->find(id.value % kPageSize);
   }
 
   /// The element, which must exist.
@@ -71,7 +74,7 @@ class CowTable {
   /// freeze(), or until the element is erased.
   T& edit(Key id) {
     WAYMARK_CHECK(contains(id));
-    return *own(id.value / kPageSize).slots[id.value % kPageSize];
+    return *own(id.value / kPageSize).find(id.value % kPageSize);
   }
 
   /// Adds an element under a new id. Ids ascend and are never used again, so that the id of an
@@ -79,10 +82,18 @@ class CowTable {
   Key insert(T value) {
     WAYMARK_CHECK(next_ != UINT32_MAX);
     const Key id{next_};
-    own(id.value / kPageSize).slots[id.value % kPageSize].emplace(std::move(value));
+    own(id.value / kPageSize).add(id.value % kPageSize, std::move(value));
     ++next_;
     ++size_;
     return id;
+  }
+
+  /// Adds an element under an id that has none. References to others of its page may end.
+  void put(Key id, T value) {
+    WAYMARK_CHECK(id.value != UINT32_MAX && !contains(id));
+    own(id.value / kPageSize).add(id.value % kPageSize, std::move(value));
+    next_ = std::max(next_, id.value + 1);
+    ++size_;
   }
 
   /// Makes `id`, which is not below end_id(), the next one that insert() gives: ids in between were
@@ -95,7 +106,12 @@ class CowTable {
   /// Removes an element; false if there is none.
   bool erase(Key id) {
     if (!contains(id)) return false;
-    own(id.value / kPageSize).slots[id.value % kPageSize].reset();
+    const std::size_t page = id.value / kPageSize;
+    if (pages_[page]->num_living > 1) {
+      own(page).erase(id.value % kPageSize);
+    } else {
+      pages_[page].reset();
+    }
     --size_;
     return true;
   }
@@ -107,8 +123,8 @@ class CowTable {
     for (std::size_t page = 0; page < pages_.size(); ++page) {
       if (!pages_[page]) continue;
       for (std::size_t i = 0; i < kPageSize; ++i) {
-        if (const std::optional<T>& slot = pages_[page]->slots[i]) {
-          visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, *slot);
+        if (const T* element = pages_[page]->find(i)) {
+          visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, *element);
         }
       }
     }
@@ -124,8 +140,8 @@ class CowTable {
       const Page* before = page < earlier.pages_.size() ? earlier.pages_[page].get() : nullptr;
       if (now == before) continue;
       for (std::size_t i = 0; i < kPageSize; ++i) {
-        const T* old = before && before->slots[i] ? &*before->slots[i] : nullptr;
-        const T* current = now && now->slots[i] ? &*now->slots[i] : nullptr;
+        const T* old = before ? before->find(i) : nullptr;
+        const T* current = now ? now->find(i) : nullptr;
         if (old || current) {
           visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, old, current);
         }
@@ -134,9 +150,47 @@ class CowTable {
   }
 
  private:
+  static_assert(kPageSize < UINT8_MAX);
+  static constexpr std::uint8_t kNone = UINT8_MAX;
+
+  /// Elements in the order in which they came; those erased keep their place until the page is
+  /// copied, so that references to the others last.
   struct Page {
+    Page() { places.fill(kNone); }
+
+    const T* find(std::size_t slot) const {
+      return places[slot] == kNone ? nullptr : elements.data() + places[slot];
+    }
+    T* find(std::size_t slot) {
+      return places[slot] == kNone ? nullptr : elements.data() + places[slot];
+    }
+    void add(std::size_t slot, T value) {
+      if (elements.size() == kPageSize) tighten();
+      places[slot] = static_cast<std::uint8_t>(elements.size());
+      elements.push_back(std::move(value));
+      ++num_living;
+    }
+    void erase(std::size_t slot) {
+      places[slot] = kNone;
+      --num_living;
+    }
+    /// Leaves room for what lives only.
+    void tighten() {
+      if (elements.capacity() == num_living) return;
+      std::vector<T> living;
+      living.reserve(num_living);
+      for (std::uint8_t& place : places) {
+        if (place == kNone) continue;
+        living.push_back(std::move(elements[place]));
+        place = static_cast<std::uint8_t>(living.size() - 1);
+      }
+      elements = std::move(living);
+    }
+
     std::uint64_t stamp = 0;
-    std::array<std::optional<T>, kPageSize> slots;
+    std::size_t num_living = 0;
+    std::array<std::uint8_t, kPageSize> places;  ///< Of a slot's element, kNone where none lives.
+    std::vector<T> elements;
   };
 
   CowTable(const CowTable&) = default;
@@ -145,17 +199,23 @@ class CowTable {
     if (index >= pages_.size()) pages_.resize(index + 1);
     std::shared_ptr<Page>& page = pages_[index];
     if (page && page->stamp == stamp_) return *page;
-    page = page ? std::make_shared<Page>(*page) : std::make_shared<Page>();
+    const std::shared_ptr<const Page> shared = std::exchange(page, std::make_shared<Page>());
     page->stamp = stamp_;
-    has_own_pages_ = true;
+    // What insert() adds must not move what is there, to which there may be references.
+    const bool grows = index == next_ / kPageSize;
+    page->elements.reserve(grows ? kPageSize : shared ? shared->num_living : 1);
+    for (std::size_t slot = 0; shared && slot < kPageSize; ++slot) {
+      if (const T* element = std::as_const(*shared).find(slot)) page->add(slot, *element);
+    }
+    own_pages_.push_back(index);
     return *page;
   }
 
   std::vector<std::shared_ptr<Page>> pages_;
+  std::vector<std::size_t> own_pages_;  ///< With the stamp of now.
   std::uint64_t stamp_ = 0;
   std::uint32_t next_ = 0;
   std::size_t size_ = 0;
-  bool has_own_pages_ = false;
 };
 
 }  // namespace waymark

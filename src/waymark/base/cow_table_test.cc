@@ -56,6 +56,57 @@ TEST(CowTable, IdsAreNeverUsedAgain) {
   EXPECT_EQ(content_of(table), (Content{{1, "b"}, {100, "c"}}));
 }
 
+TEST(CowTable, PutsElementsWhereverThereIsNone) {
+  Table table;
+  table.put(LandmarkId{9}, "i");
+  table.put(LandmarkId{8}, "h");
+  EXPECT_THROW(table.put(LandmarkId{9}, "again"), CheckError);
+  EXPECT_EQ(table.end_id(), LandmarkId{10});
+  for (int i = 0; i < 20; ++i) {  // More often than a page has places.
+    table.erase(LandmarkId{8});
+    table.put(LandmarkId{8}, std::to_string(i));
+  }
+  EXPECT_EQ(content_of(table), (Content{{8, "19"}, {9, "i"}}));
+}
+
+TEST(CowTable, ReferencesLastWhileOthersComeAndGo) {
+  Table table;
+  for (int i = 0; i < 5; ++i) table.insert(std::to_string(i));
+  table.freeze();
+  std::string& first = table.edit(LandmarkId{4});
+  table.insert("5");
+  table.insert("6");
+  table.erase(LandmarkId{5});
+  table.insert("7");
+  first += " edited";
+  EXPECT_EQ(table.at(LandmarkId{4}), "4 edited");
+  table.freeze();
+  EXPECT_EQ(content_of(table).at(4), "4 edited");
+}
+
+/// Counts those of its kind that are there.
+struct Counted {
+  inline static int num_there = 0;
+  Counted() { ++num_there; }
+  Counted(const Counted&) { ++num_there; }
+  Counted(Counted&&) noexcept { ++num_there; }
+  Counted& operator=(const Counted&) = default;
+  ~Counted() { --num_there; }
+};
+
+TEST(CowTable, ItsMemoryFollowsWhatItHoldsAndNotWhatItHeld) {
+  CowTable<LandmarkId, Counted> table;
+  for (std::uint32_t i = 0; i < 10000; ++i) {
+    table.insert({});
+    if (i >= 100) table.erase(LandmarkId{i - 100});  // A hundred live at a time.
+    if (i % 50 == 0) {
+      const auto frozen = table.freeze();
+      EXPECT_EQ(Counted::num_there, static_cast<int>(table.size()));
+    }
+  }
+  EXPECT_EQ(table.size(), 100u);
+}
+
 TEST(CowTable, FrozenCopiesShareWhatIsNotEdited) {
   Table table;
   for (int i = 0; i < 12; ++i) table.insert(std::to_string(i));

@@ -161,8 +161,8 @@ void find_broken_forwarding(const Map& map, Findings& findings) {
   }
   const LandmarkId end_landmark = map.landmarks().end_id();
   std::vector<std::pair<LandmarkId, LandmarkId>> merged;
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (!survivor.is_valid()) return;
+  map.landmark_forwarding().for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
+    const LandmarkId survivor = forwarding.survivor;
     merged.push_back({id, survivor});
     if (map.landmarks().contains(id)) findings.add(name(id), "lives and was merged");
     if (survivor >= end_landmark) findings.add(name(id), "was merged into one never there");

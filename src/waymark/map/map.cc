@@ -37,6 +37,7 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
   frozen->submaps_ = submaps_;
   frozen->loop_edges_ = loop_edges_;
+  frozen->newest_frame_ = newest_frame_;
   last_frozen_ = frozen;
   return frozen;
 }
@@ -50,13 +51,15 @@ Map Map::thaw(const Map& frozen) {
   map.landmark_forwarding_ = decltype(landmark_forwarding_)::thaw(frozen.landmark_forwarding_);
   map.submaps_ = frozen.submaps_;
   map.loop_edges_ = frozen.loop_edges_;
+  map.newest_frame_ = frozen.newest_frame_;
+  map.freeze();  // Keeps references to what is edited first.
   return map;
 }
 
 LandmarkId Map::resolve(LandmarkId id) const {
   while (id.is_valid() && !landmarks_.find(id)) {
-    const LandmarkId* survivor = landmark_forwarding_.find(id);
-    id = survivor ? *survivor : LandmarkId{};  // Of those erased long ago there is no entry.
+    const LandmarkForwarding* forwarding = landmark_forwarding_.find(id);
+    id = forwarding ? forwarding->survivor : LandmarkId{};
   }
   return id;
 }
@@ -126,17 +129,18 @@ KeyframeId Map::add_keyframe(Keyframe keyframe) {
   Submap& submap = submaps_[keyframe.submap.value];
   const bool is_root = !submap.root.is_valid();
   WAYMARK_CHECK(is_root != keyframe.parent.is_valid());
+  newest_frame_ = std::max(newest_frame_, keyframe.frame);
   const KeyframeId id = keyframes_.insert(std::move(keyframe));
   covisibility_.insert({});
-  keyframe_forwarding_.insert({});
   if (is_root) submap.root = id;
+  constexpr std::uint32_t kPeriod = 64;
+  if (id.value % kPeriod == 0) forget_old_merges();
   return id;
 }
 
 LandmarkId Map::add_landmark(SubmapId submap,
                              const Eigen::Vector3d& position_in_world,
                              KeyframeId reference) {
-  landmark_forwarding_.insert({});
   return landmarks_.insert({submap, position_in_world, reference, {}, {}});
 }
 
@@ -180,7 +184,7 @@ void Map::merge_landmarks(LandmarkId survivor, LandmarkId absorbed) {
   Landmark& merged = landmarks_.edit(survivor);
   merged.num_visible += old.num_visible;
   merged.num_found += old.num_found;
-  landmark_forwarding_.edit(absorbed) = survivor;
+  landmark_forwarding_.put(absorbed, {survivor, newest_frame_});
 }
 
 void Map::erase_landmark(LandmarkId id) {
@@ -206,10 +210,11 @@ void Map::erase_keyframe(KeyframeId id) {
   });
   for (KeyframeId child : children) keyframes_.edit(child).parent = old.parent;
   const Keyframe& heir = keyframes_.at(old.parent);
-  keyframe_forwarding_.edit(id) = {old.parent,
-                                   old.rig_from_world * heir.rig_from_world.inverse(),
-                                   heir.applied_scale,
-                                   old.applied_scale};
+  keyframe_forwarding_.put(id,
+                           {old.parent,
+                            old.rig_from_world * heir.rig_from_world.inverse(),
+                            heir.applied_scale,
+                            old.applied_scale});
   keyframes_.erase(id);
   covisibility_.erase(id);
 }
@@ -269,6 +274,14 @@ void Map::count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_
   Landmark& landmark = landmarks_.edit(id);
   landmark.num_visible += num_visible;
   landmark.num_found += num_found;
+}
+
+void Map::forget_old_merges() {
+  std::vector<LandmarkId> old;
+  landmark_forwarding_.for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
+    if (newest_frame_.value - forwarding.frame.value > kRemembersMerged) old.push_back(id);
+  });
+  for (const LandmarkId id : old) landmark_forwarding_.erase(id);
 }
 
 void Map::change_covisibility(KeyframeId a, KeyframeId b, int change) {

@@ -49,10 +49,16 @@ struct Covisibility {
 
 /// Where an erased keyframe went: poses relative to it are read relative to its heir.
 struct KeyframeForwarding {
-  KeyframeId heir;          ///< Invalid while the keyframe lives.
+  KeyframeId heir;          ///< May be erased in turn.
   Rigid3 rig_from_heir;     ///< The erased keyframe's rig from the heir's.
   double heir_scale = 1.0;  ///< applied_scale of the heir at that time.
   double scale = 1.0;       ///< That of the erased keyframe.
+};
+
+/// Where a merged landmark went.
+struct LandmarkForwarding {
+  LandmarkId survivor;  ///< May be gone in turn.
+  FrameId frame;        ///< Of the newest keyframe when they were merged.
 };
 
 /// Two keyframes that were found to show the same place, and how they lie to each other.
@@ -156,6 +162,9 @@ struct MapParts {
 /// at the old value: collect ids first, then edit.
 class Map {
  public:
+  /// So many frames after a merge nobody holds the id of what was merged.
+  static constexpr std::uint32_t kRemembersMerged = 2000;
+
   Map() = default;
   /// Takes everything over; what is left may only be assigned to or destroyed.
   Map(Map&&) noexcept = default;
@@ -183,15 +192,15 @@ class Map {
   }
   /// Covisible keyframes of every living keyframe.
   const CowTable<KeyframeId, Covisibility>& covisibility() const { return covisibility_; }
-  /// Where each keyframe that is gone went; for those that live the heir is invalid.
+  /// Where each keyframe that is gone went.
   const CowTable<KeyframeId, KeyframeForwarding>& keyframe_forwarding() const {
     return keyframe_forwarding_;
   }
-  /// What each landmark that is gone was merged into; invalid for others.
-  const CowTable<LandmarkId, LandmarkId>& landmark_forwarding() const {
+  /// What landmarks were merged into, for at least kRemembersMerged frames after that.
+  const CowTable<LandmarkId, LandmarkForwarding>& landmark_forwarding() const {
     return landmark_forwarding_;
   }
-  /// The landmark that an id stands for now, through merges; invalid if erased.
+  /// The landmark that an id stands for now, through merges; invalid if erased or merged long ago.
   LandmarkId resolve(LandmarkId id) const;
   /// The sub-map that an id stands for now, through joins.
   SubmapId resolve(SubmapId id) const;
@@ -253,6 +262,8 @@ class Map {
   std::vector<std::string> list_broken_invariants(std::size_t max_count) const;
 
  private:
+  /// Drops what was merged so long ago that nobody asks any more.
+  void forget_old_merges();
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
   /// From scratch; what is associated but not there is passed over.
   CowTable<KeyframeId, Covisibility> count_covisibility() const;
@@ -261,7 +272,8 @@ class Map {
   CowTable<LandmarkId, Landmark> landmarks_;
   CowTable<KeyframeId, Covisibility> covisibility_;
   CowTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
-  CowTable<LandmarkId, LandmarkId> landmark_forwarding_;
+  CowTable<LandmarkId, LandmarkForwarding> landmark_forwarding_;
+  FrameId newest_frame_{0};  ///< Of all keyframes that ever were.
   std::vector<Submap> submaps_;
   std::vector<LoopEdge> loop_edges_;        ///< Lengths in the units before any correction.
   std::shared_ptr<const Map> last_frozen_;  ///< Keeps references alive until the next freeze().

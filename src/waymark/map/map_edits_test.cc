@@ -51,8 +51,9 @@ std::string content_of(const Map& map) {
     out << id.value << '>' << forwarding.heir.value << ' ' << forwarding.scale << '\n';
     write(out, forwarding.rig_from_heir);
   });
-  map.landmark_forwarding().for_each(
-      [&](LandmarkId id, LandmarkId survivor) { out << id.value << '>' << survivor.value << ' '; });
+  map.landmark_forwarding().for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
+    out << id.value << '>' << forwarding.survivor.value << ' ';
+  });
   for (const LoopEdge& edge : map.measured_loop_edges()) {
     out << edge.from.value << '-' << edge.to.value << ' ' << edge.to_from_from.scale << '\n';
   }

@@ -36,6 +36,51 @@ TEST(Map, ThawedMapsGoOnAndLeaveTheFrozenOneAlone) {
   EXPECT_EQ(frozen->broken_invariants(), "");
 }
 
+TEST(Map, ReferencesToWhatWasThawedLastUntilTheNextFreeze) {
+  Map original;
+  const SubmapId submap = original.add_submap(true);
+  const KeyframeId root = original.add_keyframe(make_keyframe(5, submap, {}));
+  const LandmarkId landmark = original.add_landmark(submap, Eigen::Vector3d::Ones(), root);
+  auto frozen = original.freeze();
+  Map thawed = Map::thaw(*frozen);
+  frozen.reset();
+  original = Map();
+  const Landmark& before = thawed.landmarks().at(landmark);
+  thawed.move_landmark(landmark, Eigen::Vector3d::Zero());
+  EXPECT_EQ(before.position_in_world, Eigen::Vector3d::Ones());
+  EXPECT_EQ(thawed.landmarks().at(landmark).position_in_world, Eigen::Vector3d::Zero());
+}
+
+/// A map in which ids come and go, as in a room that is walked through again and again.
+TEST(Map, RemembersWhatIsGoneOnlyAsLongAsSomeoneMayAsk) {
+  Map map;
+  const SubmapId submap = map.add_submap(true);
+  Keyframe first = make_keyframe(5, submap, {});
+  first.frame = FrameId{0};
+  const KeyframeId root = map.add_keyframe(first);
+  const LandmarkId lasting = map.add_landmark(submap, Eigen::Vector3d::Ones(), root);
+  map.observe(root, 0, lasting);
+  std::vector<LandmarkId> merged;
+  for (std::uint32_t frame = 10; frame <= 30000; frame += 10) {
+    for (int i = 0; i < 10; ++i) {
+      map.erase_landmark(map.add_landmark(submap, Eigen::Vector3d::Ones(), root));
+    }
+    merged.push_back(map.add_landmark(submap, Eigen::Vector3d::Ones(), root));
+    map.merge_landmarks(lasting, merged.back());
+    Keyframe keyframe = make_keyframe(5, submap, root);
+    keyframe.frame = FrameId{frame};
+    map.erase_keyframe(map.add_keyframe(keyframe));
+    // Those of the last 64 keyframes may wait to be dropped, and three are at the ends.
+    ASSERT_LE(map.landmark_forwarding().size(), (Map::kRemembersMerged / 10) + 64 + 3);
+  }
+  EXPECT_EQ(map.broken_invariants(), "");
+  EXPECT_EQ(map.keyframe_forwarding().size(), 3000u);
+  for (std::size_t i = 0; i < Map::kRemembersMerged / 10; ++i) {
+    EXPECT_EQ(map.resolve(merged[merged.size() - 1 - i]), lasting);
+  }
+  EXPECT_FALSE(map.resolve(merged.front()).is_valid());
+}
+
 TEST(Map, CountsDistinctKeyframesNotFeatures) {
   Map map;
   const SubmapId submap = map.add_submap(true);

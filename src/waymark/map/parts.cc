@@ -85,7 +85,6 @@ void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
     parts.keyframes.push_back({shift(id), std::move(keyframe)});
   });
   map.keyframe_forwarding().for_each([&](KeyframeId id, KeyframeForwarding forwarding) {
-    if (!forwarding.heir.is_valid()) return;
     forwarding.heir = shift(forwarding.heir);
     parts.erased_keyframes.push_back({shift(id), forwarding});
   });
@@ -98,15 +97,9 @@ void append_landmarks(const Map& map, const Shift& shift, MapParts& parts) {
     landmark.observations.clear();
     parts.landmarks.push_back({shift(id), std::move(landmark)});
   });
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (survivor.is_valid()) parts.merged_landmarks.push_back({shift(id), shift(survivor)});
+  map.landmark_forwarding().for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
+    parts.merged_landmarks.push_back({shift(id), shift(forwarding.survivor)});
   });
-}
-
-template <class Id, class T>
-void put(CowTable<Id, T>& table, Id id, T value) {
-  table.skip_to(id);
-  table.insert(std::move(value));
 }
 
 }  // namespace
@@ -131,29 +124,9 @@ Map Map::restore(MapParts parts) {
   map.submaps_ = std::move(parts.submaps);
   map.loop_edges_ = std::move(parts.loop_edges);
   for (MapParts::StoredLandmark& stored : parts.landmarks) {
-    put(map.landmarks_, stored.id, std::move(stored.landmark));
+    map.landmarks_.put(stored.id, std::move(stored.landmark));
   }
   map.landmarks_.skip_to(parts.end_landmark);
-  // One entry for each that lives or was merged, in order.
-  auto merged = parts.merged_landmarks.begin();
-  const auto put_merged_before = [&](LandmarkId end) {
-    for (; merged != parts.merged_landmarks.end() && merged->id < end; ++merged) {
-      put(map.landmark_forwarding_, merged->id, merged->survivor);
-    }
-  };
-  map.landmarks_.for_each([&](LandmarkId id, const Landmark&) {
-    put_merged_before(id);
-    put(map.landmark_forwarding_, id, LandmarkId{});
-  });
-  put_merged_before(parts.end_landmark);
-  map.landmark_forwarding_.skip_to(parts.end_landmark);
-
-  auto erased = parts.erased_keyframes.begin();
-  const auto put_erased_before = [&](KeyframeId end) {
-    for (; erased != parts.erased_keyframes.end() && erased->id < end; ++erased) {
-      put(map.keyframe_forwarding_, erased->id, erased->forwarding);
-    }
-  };
   for (MapParts::StoredKeyframe& stored : parts.keyframes) {
     Keyframe& keyframe = stored.keyframe;
     WAYMARK_CHECK(keyframe.features && keyframe.rig);
@@ -162,13 +135,16 @@ Map Map::restore(MapParts parts) {
       if (!map.landmarks_.contains(landmark)) continue;
       map.landmarks_.edit(landmark).observations.push_back({stored.id, feature});
     }
-    put_erased_before(stored.id);
-    put(map.keyframe_forwarding_, stored.id, KeyframeForwarding{});
-    put(map.keyframes_, stored.id, std::move(keyframe));
+    map.newest_frame_ = std::max(map.newest_frame_, keyframe.frame);
+    map.keyframes_.put(stored.id, std::move(keyframe));
   }
-  put_erased_before(parts.end_keyframe);
-  map.keyframe_forwarding_.skip_to(parts.end_keyframe);
   map.keyframes_.skip_to(parts.end_keyframe);
+  for (const MapParts::ErasedKeyframe& erased : parts.erased_keyframes) {
+    map.keyframe_forwarding_.put(erased.id, erased.forwarding);
+  }
+  for (const MapParts::MergedLandmark& merged : parts.merged_landmarks) {
+    map.landmark_forwarding_.put(merged.id, {merged.survivor, map.newest_frame_});
+  }
   map.covisibility_ = map.count_covisibility();
   return map;
 }

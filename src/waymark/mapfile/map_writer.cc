@@ -183,7 +183,6 @@ void write_landmarks(MapRecordWriter& writer, const Map& map) {
 
 void write_erased_keyframes(MapRecordWriter& writer, const Map& map) {
   map.keyframe_forwarding().for_each([&](KeyframeId id, const KeyframeForwarding& forwarding) {
-    if (!forwarding.heir.is_valid()) return;
     writer.begin("erased_keyframe", id.value);
     writer.add_id("heir", forwarding.heir);
     writer.add_transform("rig_from_heir", forwarding.rig_from_heir);
@@ -204,10 +203,9 @@ void write_merged_landmarks(MapRecordWriter& writer, const Map& map) {
     landmarks.clear();
     survivors.clear();
   };
-  map.landmark_forwarding().for_each([&](LandmarkId id, LandmarkId survivor) {
-    if (!survivor.is_valid()) return;
+  map.landmark_forwarding().for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
     landmarks.push_back(id);
-    survivors.push_back(survivor);
+    survivors.push_back(forwarding.survivor);
     if (landmarks.size() == kLandmarksPerRecord) write();
   });
   if (!landmarks.empty()) write();
