@@ -35,6 +35,18 @@ bool may_see_session(const AccessRules& rules, const HttpRequest& request) {
                             as_view(request[http::field::origin]));
 }
 
+/// Whatever the answer: pages of other sites must neither frame it, where a click would be led to
+/// the controls of the session, nor embed it, nor learn a URL that has the token.
+void add_security_fields(http::fields& fields) {
+  fields.set("Content-Security-Policy",
+             "default-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; "
+             "frame-ancestors 'none'");
+  fields.set("X-Frame-Options", "DENY");
+  fields.set("Cross-Origin-Resource-Policy", "same-origin");
+  fields.set("Referrer-Policy", "no-referrer");
+  fields.set("X-Content-Type-Options", "nosniff");
+}
+
 /// By the suffix of a path.
 beast::string_view content_type_of(std::string_view path) {
   using Entry = std::pair<std::string_view, std::string_view>;
@@ -64,6 +76,8 @@ WebSocketClient::WebSocketClient(beast::tcp_stream stream,
                                  ViewHub& hub,
                                  std::shared_ptr<void> count)
     : count_(std::move(count)), stream_(std::move(stream)), hub_(hub) {
+  stream_.set_option(websocket::stream_base::decorator(
+      [](websocket::response_type& response) { add_security_fields(response); }));
   stream_.set_option(websocket::stream_base::timeout{10s, 60s, true});
   stream_.read_message_max(kMaxIncoming);
   stream_.write_buffer_bytes(65536);
@@ -174,7 +188,7 @@ HttpConnection::Response HttpConnection::respond_to(const HttpRequest& request) 
   response.keep_alive(request.keep_alive());
   response.set(http::field::server, "waymark");
   response.set(http::field::cache_control, "no-cache");
-  response.set("X-Content-Type-Options", "nosniff");
+  add_security_fields(response);
   response.set(http::field::content_type, "text/plain; charset=utf-8");
   const bool is_session = path == "/ws" || path == "/status";
   if (request.method() != http::verb::get && request.method() != http::verb::head) {
@@ -204,6 +218,7 @@ HttpConnection::Response HttpConnection::respond_to(const HttpRequest& request) 
 
 void HttpConnection::refuse() {
   Response response{http::status::service_unavailable, 11};
+  add_security_fields(response);
   response.keep_alive(false);
   response.body() = "too many connections\n";
   response.prepare_payload();

@@ -15,6 +15,7 @@
 namespace waymark {
 namespace {
 
+using ::testing::ContainsRegex;
 using ::testing::HasSubstr;
 using ::testing::Not;
 
@@ -280,7 +281,25 @@ TEST(Viewer, KnowsGetAndHeadOnly) {
   EXPECT_EQ(page.substr(0, page.find("\r\n\r\n")), head.substr(0, head.find("\r\n\r\n")));
   EXPECT_THAT(ask("POST / HTTP/1.1\r\n"), HasSubstr("405"));
   EXPECT_THAT(ask("GET /nowhere HTTP/1.1\r\n"), HasSubstr("404"));
-  EXPECT_THAT(page, HasSubstr("X-Content-Type-Options: nosniff"));
+}
+
+TEST(Viewer, NoAnswerMayBeFramedOrEmbedded) {
+  Viewer viewer({"127.0.0.1", 0}, {});
+  const std::string url = viewer.url().substr(0, viewer.url().size() - 1);
+  for (const std::string& answer : {get(url, "/"),
+                                    get(url, "/status"),
+                                    get(url, "/waymark.js"),
+                                    get(url, "/nowhere"),
+                                    get(url, "/", "Host: evil.example\r\n"),
+                                    WebSocket(viewer.url()).answer}) {
+    EXPECT_THAT(answer,
+                ContainsRegex("Content-Security-Policy: default-src 'self';.*"
+                              "frame-ancestors 'none'\r"));
+    EXPECT_THAT(answer, HasSubstr("X-Frame-Options: DENY\r"));
+    EXPECT_THAT(answer, HasSubstr("Cross-Origin-Resource-Policy: same-origin\r"));
+    EXPECT_THAT(answer, HasSubstr("Referrer-Policy: no-referrer\r"));
+    EXPECT_THAT(answer, HasSubstr("X-Content-Type-Options: nosniff\r"));
+  }
 }
 
 TEST(Viewer, UpdatesNeverWait) {
