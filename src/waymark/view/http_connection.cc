@@ -18,6 +18,10 @@ using namespace std::chrono_literals;
 
 constexpr std::size_t kMaxIncoming = 65536;
 constexpr auto kTimeout = 10s;
+/// For the first request, which browsers send at once; a connection that never sends one whole
+/// holds a place no longer.
+constexpr auto kFirstRequestTimeout = 3s;
+constexpr int kMaxViewers = 32;
 constexpr std::uint32_t kMaxHeader = 8192;
 constexpr std::size_t kMaxBuffer = 16384;
 
@@ -33,6 +37,12 @@ bool may_see_session(const AccessRules& rules, const HttpRequest& request) {
                             as_view(request.target()),
                             as_view(request[http::field::host]),
                             as_view(request[http::field::origin]));
+}
+
+/// Of nobody where the peer has gone already.
+ConnectionPool::Address peer_of(const beast::tcp_stream& stream) {
+  beast::error_code error;
+  return stream.socket().remote_endpoint(error).address();
 }
 
 /// Whatever the answer: pages of other sites must neither frame it, where a click would be led to
@@ -72,10 +82,9 @@ beast::string_view content_type_of(std::string_view path) {
 
 }  // namespace
 
-WebSocketClient::WebSocketClient(beast::tcp_stream stream,
-                                 ViewHub& hub,
-                                 std::shared_ptr<void> count)
-    : count_(std::move(count)), stream_(std::move(stream)), hub_(hub) {
+WebSocketClient::WebSocketClient(beast::tcp_stream stream, ServerState& state)
+    : stream_(std::move(stream)), state_(state) {
+  ++state_.num_viewers;
   stream_.set_option(websocket::stream_base::decorator(
       [](websocket::response_type& response) { add_security_fields(response); }));
   stream_.set_option(websocket::stream_base::timeout{10s, 60s, true});
@@ -84,11 +93,13 @@ WebSocketClient::WebSocketClient(beast::tcp_stream stream,
   stream_.auto_fragment(false);
 }
 
+WebSocketClient::~WebSocketClient() { --state_.num_viewers; }
+
 void WebSocketClient::accept(const HttpRequest& request) {
   stream_.async_accept(request, [self = shared_from_this()](const beast::error_code& error) {
     if (error) return;
     self->is_open_ = true;
-    self->number_ = self->hub_.add(self);
+    self->number_ = self->state_.hub.add(self);
     self->read();
   });
 }
@@ -102,7 +113,7 @@ void WebSocketClient::read() {
           return;
         }
         const auto* data = static_cast<const char*>(self->incoming_.data().data());
-        self->hub_.receive(self->number_, {data, num_bytes}, ViewHub::Clock::now());
+        self->state_.hub.receive(self->number_, {data, num_bytes}, ViewHub::Clock::now());
         self->incoming_.consume(self->incoming_.size());
         self->read();
       });
@@ -145,20 +156,22 @@ void WebSocketClient::close() {
 
 void WebSocketClient::leave() {
   if (number_ == 0) return;
-  hub_.remove(std::exchange(number_, 0));
+  state_.hub.remove(std::exchange(number_, 0));
 }
 
 HttpConnection::HttpConnection(beast::tcp_stream stream, ServerState& state)
-    : stream_(std::move(stream)), state_(state), buffer_(kMaxBuffer) {
-  ++state_.num_connections;
-  count_ = std::shared_ptr<void>(nullptr, [&state](void*) { --state.num_connections; });
-}
+    : stream_(std::move(stream)),
+      state_(state),
+      number_(state.connections.add(peer_of(stream_), [this] { stream_.close(); })),
+      buffer_(kMaxBuffer) {}
+
+HttpConnection::~HttpConnection() { state_.connections.remove(number_); }
 
 void HttpConnection::read() {
   parser_.emplace();
   parser_->header_limit(kMaxHeader);
   parser_->body_limit(0);
-  stream_.expires_after(kTimeout);
+  stream_.expires_after(has_asked_ ? kTimeout : kFirstRequestTimeout);
   http::async_read(stream_,
                    buffer_,
                    *parser_,
@@ -172,11 +185,13 @@ void HttpConnection::read() {
 }
 
 void HttpConnection::answer(const HttpRequest& request) {
+  has_asked_ = true;
+  state_.connections.renew(number_);
   if (path_of(request) == "/ws" && may_see_session(state_.rules, request) &&
-      websocket::is_upgrade(request)) {
+      websocket::is_upgrade(request) && state_.num_viewers < kMaxViewers) {
+    state_.connections.remove(number_);
     stream_.expires_never();
-    std::make_shared<WebSocketClient>(std::move(stream_), state_.hub, std::move(count_))
-        ->accept(request);
+    std::make_shared<WebSocketClient>(std::move(stream_), state_)->accept(request);
   } else {
     write(respond_to(request));
   }
@@ -198,6 +213,9 @@ HttpConnection::Response HttpConnection::respond_to(const HttpRequest& request) 
              (is_session && !may_see_session(state_.rules, request))) {
     response.result(http::status::forbidden);
     response.body() = "not allowed: use the URL that waymark printed\n";
+  } else if (path == "/ws" && websocket::is_upgrade(request)) {
+    response.result(http::status::service_unavailable);
+    response.body() = "too many viewers\n";
   } else if (path == "/ws") {
     response.result(http::status::upgrade_required);
     response.body() = "expected a WebSocket\n";
@@ -214,15 +232,6 @@ HttpConnection::Response HttpConnection::respond_to(const HttpRequest& request) 
   response.prepare_payload();
   if (request.method() == http::verb::head) response.body().clear();
   return response;
-}
-
-void HttpConnection::refuse() {
-  Response response{http::status::service_unavailable, 11};
-  add_security_fields(response);
-  response.keep_alive(false);
-  response.body() = "too many connections\n";
-  response.prepare_payload();
-  write(std::move(response));
 }
 
 void HttpConnection::write(Response response) {

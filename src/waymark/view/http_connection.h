@@ -10,17 +10,29 @@
 #include <optional>
 
 #include "waymark/view/access.h"
+#include "waymark/view/connection_pool.h"
 #include "waymark/view/hub.h"
 
 namespace waymark {
 
 using HttpRequest = boost::beast::http::request<boost::beast::http::empty_body>;
 
+/// What connections share; lives in the viewer's thread.
+struct ServerState {
+  AccessRules rules;
+  ViewHub& hub;
+  ConnectionPool connections;  ///< Those that are no viewers'.
+  int num_viewers = 0;         ///< WebSockets.
+};
+
 /// A viewer's connection. Lives as long as an operation on it is under way.
 class WebSocketClient : public ViewClient, public std::enable_shared_from_this<WebSocketClient> {
  public:
-  /// count: of the connections, kept until the client is gone.
-  WebSocketClient(boost::beast::tcp_stream stream, ViewHub& hub, std::shared_ptr<void> count);
+  /// Counts among the viewers of the state.
+  WebSocketClient(boost::beast::tcp_stream stream, ServerState& state);
+  ~WebSocketClient() override;
+  WebSocketClient(const WebSocketClient&) = delete;
+  WebSocketClient& operator=(const WebSocketClient&) = delete;
 
   void accept(const HttpRequest& request);
   void send() override;
@@ -31,9 +43,8 @@ class WebSocketClient : public ViewClient, public std::enable_shared_from_this<W
   void finish_write(const boost::beast::error_code& error);
   void leave();
 
-  const std::shared_ptr<void> count_;
   boost::beast::websocket::stream<boost::beast::tcp_stream> stream_;
-  ViewHub& hub_;
+  ServerState& state_;
   boost::beast::flat_buffer incoming_;
   Outbox::Outgoing outgoing_;  ///< Under way.
   std::uint64_t number_ = 0;   ///< Given by the hub; 0: not there.
@@ -42,23 +53,17 @@ class WebSocketClient : public ViewClient, public std::enable_shared_from_this<W
   bool is_closing_ = false;
 };
 
-/// What connections share; lives in the viewer's thread.
-struct ServerState {
-  AccessRules rules;
-  ViewHub& hub;
-  int num_connections = 0;
-};
-
 /// Serves the page to one browser's connection, until that becomes a WebSocket. Lives as long as an
 /// operation on it is under way.
 class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
  public:
-  /// Counts itself, and what it becomes, among the connections of the state.
+  /// One of the connections of the state, until it becomes a WebSocket.
   HttpConnection(boost::beast::tcp_stream stream, ServerState& state);
+  ~HttpConnection();
+  HttpConnection(const HttpConnection&) = delete;
+  HttpConnection& operator=(const HttpConnection&) = delete;
 
   void read();
-  /// Says that there are too many, and goes.
-  void refuse();
 
  private:
   using Response = boost::beast::http::response<boost::beast::http::string_body>;
@@ -70,7 +75,8 @@ class HttpConnection : public std::enable_shared_from_this<HttpConnection> {
 
   boost::beast::tcp_stream stream_;
   ServerState& state_;
-  std::shared_ptr<void> count_;  ///< One of the connections, until it is gone.
+  const std::uint64_t number_;  ///< Of the connection.
+  bool has_asked_ = false;      ///< At least once.
   boost::beast::flat_buffer buffer_;
   std::optional<boost::beast::http::request_parser<boost::beast::http::empty_body>> parser_;
   Response response_;

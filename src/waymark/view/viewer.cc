@@ -30,7 +30,8 @@ using namespace std::chrono_literals;
 
 constexpr auto kTick = 100ms;
 constexpr auto kFarewell = 1s;
-constexpr int kMaxConnections = 32;
+/// That are no viewers'.
+constexpr std::size_t kMaxConnections = 32;
 /// The tracker and the mapper go first where there are not enough cores for all.
 constexpr int kNiceness = 10;
 
@@ -68,7 +69,10 @@ ViewerOptions parse_viewer_address(const std::string& text, const std::string& w
 class Viewer::Impl {
  public:
   Impl(const ViewerOptions& options, SessionInfo info)
-      : hub_(channel_, std::move(info)), state_{{}, hub_}, acceptor_(context_), timer_(context_) {
+      : hub_(channel_, std::move(info)),
+        state_{{}, hub_, ConnectionPool(kMaxConnections)},
+        acceptor_(context_),
+        timer_(context_) {
     listen(endpoint_of(options));
     thread_ = std::jthread([this] { run(); });
   }
@@ -132,14 +136,7 @@ class Viewer::Impl {
   void welcome(Tcp::socket socket) {
     ErrorCode ignored;
     socket.set_option(Tcp::no_delay(true), ignored);
-    if (state_.num_connections >= 2 * kMaxConnections) return;  // Closes it.
-    const auto connection =
-        std::make_shared<HttpConnection>(boost::beast::tcp_stream(std::move(socket)), state_);
-    if (state_.num_connections > kMaxConnections) {
-      connection->refuse();
-    } else {
-      connection->read();
-    }
+    std::make_shared<HttpConnection>(boost::beast::tcp_stream(std::move(socket)), state_)->read();
   }
 
   void tick() {
@@ -152,7 +149,7 @@ class Viewer::Impl {
       if (ViewHub::Clock::now() >= *leave_at_) context_.stop();
       if (!hub_.is_idle()) return;
       hub_.close_clients();
-      if (state_.num_connections == 0) context_.stop();
+      if (state_.num_viewers == 0) context_.stop();
     });
   }
 
@@ -161,7 +158,7 @@ class Viewer::Impl {
     ErrorCode ignored;
     acceptor_.close(ignored);
     hub_.tick(ViewHub::Clock::now());
-    if (state_.num_connections == 0) context_.stop();
+    if (state_.num_viewers == 0) context_.stop();
   }
 
   ViewChannel channel_;
