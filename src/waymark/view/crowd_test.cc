@@ -1,7 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <dlfcn.h>
 #include <gmock/gmock.h>
 
+#include <atomic>
+#include <cerrno>
 #include <memory>
 #include <vector>
 
@@ -9,6 +12,25 @@
 #include "waymark/view/viewer.h"
 
 // The server where more come than it has places for.
+namespace {
+
+/// While set, accept() fails as it does where no file descriptor is left.
+std::atomic<bool> is_out_of_descriptors{false};
+std::atomic<int> num_failed_accepts{0};
+
+}  // namespace
+
+/// In place of that of the C library.
+extern "C" int accept(int socket, sockaddr* address, socklen_t* size) {
+  if (is_out_of_descriptors) {
+    ++num_failed_accepts;
+    errno = EMFILE;
+    return -1;
+  }
+  static const auto real = reinterpret_cast<decltype(&accept)>(dlsym(RTLD_NEXT, "accept"));
+  return real(socket, address, size);
+}
+
 namespace waymark {
 namespace {
 
@@ -63,6 +85,34 @@ TEST(Crowd, ViewersAreBoundedToo) {
   }
   EXPECT_THAT(WebSocket(viewer.url()).answer, HasSubstr("503"));
   EXPECT_THAT(get(server_of(viewer), "/status"), HasSubstr("\"clients\":32"));
+}
+
+/// Requests on an open connection are the clock here: without a pause the server tries many times
+/// within each of them.
+TEST(Crowd, TriesSeldomWithoutFileDescriptorsAndServesAfterwards) {
+  Viewer viewer({"127.0.0.1", 0}, {});
+  const std::string url = server_of(viewer);
+  const Connection open(url);
+  const auto ask = [](const Connection& connection) {
+    connection.send("HEAD / HTTP/1.1\r\nHost: 127.0.0.1\r\n\r\n");
+    std::string answer;
+    while (!answer.ends_with("\r\n\r\n")) {
+      const std::string byte = connection.receive(1);
+      if (byte.empty()) break;
+      answer += byte;
+    }
+    return answer;
+  };
+  EXPECT_THAT(ask(open), HasSubstr("200 OK"));
+  constexpr int kNumRequests = 200;
+  num_failed_accepts = 0;
+  is_out_of_descriptors = true;
+  const Connection waiting(url);
+  while (num_failed_accepts == 0) EXPECT_THAT(ask(open), HasSubstr("200 OK"));
+  for (int i = 0; i < kNumRequests; ++i) EXPECT_THAT(ask(open), HasSubstr("200 OK"));
+  EXPECT_LT(num_failed_accepts, kNumRequests);
+  is_out_of_descriptors = false;
+  EXPECT_THAT(ask(waiting), HasSubstr("200 OK"));
 }
 
 }  // namespace

@@ -126,10 +126,12 @@ class Viewer::Impl {
   }
 
   void accept() {
+    is_accepting_ = true;
     acceptor_.async_accept([this](const ErrorCode& error, Tcp::socket socket) {
-      if (error == asio::error::operation_aborted) return;
-      if (!error) welcome(std::move(socket));
+      is_accepting_ = false;
+      if (error) return;  // No descriptor is left, say: the next try at once would fail, too.
       accept();
+      welcome(std::move(socket));
     });
   }
 
@@ -144,6 +146,7 @@ class Viewer::Impl {
     timer_.async_wait([this](const ErrorCode& error) {
       if (error) return;
       tick();
+      if (!leave_at_ && !is_accepting_) accept();
       hub_.tick(ViewHub::Clock::now());
       if (!leave_at_) return;
       if (ViewHub::Clock::now() >= *leave_at_) context_.stop();
@@ -170,6 +173,7 @@ class Viewer::Impl {
   ServerState state_;
   asio::io_context context_{1};
   Tcp::acceptor acceptor_;
+  bool is_accepting_ = false;
   asio::steady_timer timer_;
   std::optional<ViewHub::Clock::time_point> leave_at_;
   std::jthread thread_;
