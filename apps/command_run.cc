@@ -115,6 +115,7 @@ void save_final_map(const System& system,
 void start_viewer(const RunOptions& options,
                   const Session& session,
                   const ControlledParts& parts,
+                  Reporter& reporter,
                   std::optional<LiveControl>& live) {
   const InputInfo& input = session.input->info();
   SessionInfo info;
@@ -127,7 +128,9 @@ void start_viewer(const RunOptions& options,
                std::move(info),
                *session.system,
                parts,
-               input.num_frames);
+               input.num_frames,
+               reporter);
+  reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
 int run(RunOptions options, Reporter& reporter) {
@@ -155,8 +158,8 @@ int run(RunOptions options, Reporter& reporter) {
                     images);
 
   std::optional<LiveControl> live;
-  if (!options.viewer.empty()) start_viewer(options, session, {autosave, images, is_paused}, live);
-  if (live) reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
+  if (!options.viewer.empty())
+    start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
 
   SessionResults results = map_input(session, images, autosave, live ? &*live : nullptr, reporter);
   reporter.finish_progress();

@@ -91,7 +91,12 @@ int view(const ViewOptions& options) {
   print_result("{}\n", describe(*stored.map, options.map));
   print_result("open {} in a browser; Ctrl-C ends\n", viewer.url());
   std::fflush(stdout);
-  while (!is_interrupted()) std::this_thread::sleep_for(50ms);
+  while (!is_interrupted()) {
+    std::this_thread::sleep_for(50ms);
+    if (const auto problem = viewer.next_problem()) {
+      fmt::print(stderr, "warning: viewer: {}\n", *problem);
+    }
+  }
   return kDone;
 }
 

@@ -19,11 +19,13 @@ LiveControl::LiveControl(const ViewerOptions& options,
                          SessionInfo info,
                          System& system,
                          const ControlledParts& parts,
-                         std::optional<std::size_t> num_frames)
+                         std::optional<std::size_t> num_frames,
+                         Reporter& reporter)
     : system_(system),
       parts_(parts),
       viewer_(options, std::move(info)),
-      publisher_(viewer_, num_frames) {}
+      publisher_(viewer_, num_frames),
+      reporter_(reporter) {}
 
 void LiveControl::show(const FrameImages& input, const TrackingResult& result) {
   publisher_.tell(system_, input, result);
@@ -47,6 +49,7 @@ bool LiveControl::should_stop(const std::function<bool()>& is_interrupted) {
 
 void LiveControl::take_requests() {
   while (const std::optional<ViewRequest> request = viewer_.next_request()) answer(*request);
+  if (const auto problem = viewer_.next_problem()) reporter_.warning("viewer: " + *problem);
 }
 
 void LiveControl::answer(const ViewRequest& request) {

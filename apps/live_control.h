@@ -5,6 +5,7 @@
 #include <atomic>
 #include <string>
 
+#include "reporter.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/session/image_keeper.h"
@@ -28,7 +29,8 @@ class LiveControl {
               SessionInfo info,
               System& system,
               const ControlledParts& parts,
-              std::optional<std::size_t> num_frames);
+              std::optional<std::size_t> num_frames,
+              Reporter& reporter);
 
   std::string url() const { return viewer_.url(); }
   /// A frame was fed.
@@ -49,6 +51,7 @@ class LiveControl {
   const ControlledParts parts_;
   Viewer viewer_;
   ViewPublisher publisher_;
+  Reporter& reporter_;
   bool is_stopped_ = false;
 };
 

@@ -27,6 +27,8 @@ struct ViewChannel {
   Mailbox<ViewUpdate> updates{64};
   Mailbox<ViewRequest> requests{64};
   Mailbox<ViewReply> replies{64};
+  /// What went wrong in the viewer's thread.
+  Mailbox<std::string> problems{1};
   /// Set by the viewer when it could take one, cleared by the session.
   std::atomic<bool> wants_image{false};
 };

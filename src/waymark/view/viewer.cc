@@ -119,10 +119,16 @@ class Viewer::Impl {
       try {
         context_.run();
         return;
-      } catch (const std::exception&) {
-        // One connection's trouble; the others go on.
+      } catch (const std::exception& error) {
+        // One connection's or one update's trouble; the others go on.
+        tell(error.what());
       }
     }
+  }
+
+  /// Once: what fails may fail at every tick.
+  void tell(std::string problem) {
+    if (!std::exchange(has_told_, true)) channel_.problems.try_push(problem);
   }
 
   void accept() {
@@ -174,6 +180,7 @@ class Viewer::Impl {
   asio::io_context context_{1};
   Tcp::acceptor acceptor_;
   bool is_accepting_ = false;
+  bool has_told_ = false;
   asio::steady_timer timer_;
   std::optional<ViewHub::Clock::time_point> leave_at_;
   std::jthread thread_;
@@ -186,6 +193,7 @@ std::string Viewer::url() const { return impl_->url(); }
 ViewChannel& Viewer::channel() { return impl_->channel(); }
 bool Viewer::try_push(ViewUpdate& update) { return impl_->channel().updates.try_push(update); }
 std::optional<ViewRequest> Viewer::next_request() { return impl_->channel().requests.try_pop(); }
+std::optional<std::string> Viewer::next_problem() { return impl_->channel().problems.try_pop(); }
 void Viewer::reply(ViewReply reply) { impl_->channel().replies.try_push(reply); }
 
 }  // namespace waymark

@@ -42,6 +42,8 @@ class Viewer {
   bool try_push(ViewUpdate& update);
   /// What a client asked for, oldest first.
   std::optional<ViewRequest> next_request();
+  /// What went wrong in the server, which goes on; only the first is told.
+  std::optional<std::string> next_problem();
   /// Tells a client how its request ended.
   void reply(ViewReply reply);
 

@@ -4,6 +4,9 @@
 
 #include <gmock/gmock.h>
 
+#include <chrono>
+#include <thread>
+
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
 #include "waymark/view/assets.h"
@@ -177,6 +180,28 @@ TEST(Viewer, NoAnswerMayBeFramedOrEmbedded) {
     EXPECT_THAT(answer, HasSubstr("Referrer-Policy: no-referrer\r"));
     EXPECT_THAT(answer, HasSubstr("X-Content-Type-Options: nosniff\r"));
   }
+}
+
+TEST(Viewer, TellsOnceWhatWentWrongAndGoesOn) {
+  Viewer viewer({"127.0.0.1", 0}, {});
+  const WebSocket socket(viewer.url());
+  EXPECT_THAT(socket.receive_text("status"), HasSubstr("starting"));
+  EXPECT_FALSE(viewer.next_problem());
+  ViewUpdate update;
+  update.status.phase = static_cast<SessionPhase>(99);  // Has no name to be sent.
+  ASSERT_TRUE(viewer.try_push(update));
+  std::optional<std::string> problem;
+  for (int i = 0; i < 500 && !problem; ++i) {
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+    problem = viewer.next_problem();
+  }
+  EXPECT_THAT(problem.value_or("nothing"), HasSubstr("99"));
+  EXPECT_EQ(get(viewer.url().substr(0, viewer.url().size() - 1), "/status"),
+            "");  // The same again.
+  update.status.phase = SessionPhase::kRunning;
+  ASSERT_TRUE(viewer.try_push(update));
+  EXPECT_THAT(socket.receive_text("running"), HasSubstr("\"clients\":1"));
+  EXPECT_FALSE(viewer.next_problem());
 }
 
 TEST(Viewer, UpdatesNeverWait) {
