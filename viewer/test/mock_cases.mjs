@@ -154,6 +154,25 @@ async function saysWhatIsMissing(context) {
   await until(right.page, isOpen);
 }
 
+/** The page is as wide as its window and the picture as wide as its place, whatever they were before. */
+async function followsItsWindow(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 200 }, { size: { width: 1280, height: 800 } });
+  await until(page, isOpen);
+  mock.hold();
+  for (const size of [{ width: 390, height: 844 }, { width: 800, height: 400 }, { width: 1280, height: 800 }]) {
+    await page.setViewportSize(size);
+    await page.waitForFunction((width) => {
+      const { clientWidth, clientHeight } = document.querySelector("#stage");
+      const { width: drawn, height } = document.querySelector("#scene");
+      const isNarrow = width <= 800;
+      const sizes = [document.documentElement.scrollWidth, document.querySelector("#timeline").offsetWidth, clientWidth];
+      const expected = [width, isNarrow ? width : width - 288, isNarrow ? width : width - 288];
+      return String([...sizes, drawn, height]) === String([...expected, clientWidth, clientHeight]);
+    }, size.width, { timeout: 10000 });
+  }
+  assert.deepEqual(page.problems, []);
+}
+
 /** Half a million landmarks and five thousand keyframes. Times are told, not judged: they depend on the machine. */
 async function drawsLargeMaps(context) {
   const { page } = await serve(context, { world: "large" }, { isDark: true, size: { width: 800, height: 500 } });
@@ -170,5 +189,6 @@ async function drawsLargeMaps(context) {
 }
 
 export const mockCases = [
-  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, saysWhatIsMissing, drawsLargeMaps,
+  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, saysWhatIsMissing,
+  followsItsWindow, drawsLargeMaps,
 ];
