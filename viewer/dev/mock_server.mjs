@@ -21,6 +21,8 @@ const REASONS = [
 ];
 const STAGES = ["features", "depth", "wait", "predict", "local_map", "initialize", "recover", "keyframe"];
 const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/css", ".svg": "image/svg+xml" };
+/** As the program sends it, so that tests see what the page may not do. */
+const POLICY = "default-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 const DIST = fileURLToPath(new URL("../dist/", import.meta.url));
 
 export class MockServer {
@@ -72,7 +74,7 @@ export class MockServer {
     }
     const path = normalize(url.pathname === "/" ? "/index.html" : url.pathname);
     const body = await readFile(DIST + path).catch(() => null);
-    response.writeHead(body ? 200 : 404, { "content-type": TYPES[extname(path)] ?? "text/plain" });
+    response.writeHead(body ? 200 : 404, { "content-type": TYPES[extname(path)] ?? "text/plain", "content-security-policy": POLICY });
     response.end(body ?? "not found");
   }
 

@@ -3,6 +3,7 @@
 import assert from "node:assert/strict";
 import { spawn } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
+import { createServer as createHttpServer } from "node:http";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
@@ -111,6 +112,25 @@ async function showsARun(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** A page of another site must not get at the controls by showing ours inside of it. */
+async function refusesToBeFramed(context) {
+  const out = folder(context);
+  const port = await freePort();
+  await start(context, port, "run", context.input, "--viewer", String(port), "--pace", "0.2", "-o", out);
+  const url = `http://127.0.0.1:${port}/`;
+  const foreign = createHttpServer((_, response) => {
+    response.writeHead(200, { "content-type": "text/html" });
+    response.end(`<!doctype html><iframe src="${url}"></iframe>`);
+  });
+  await new Promise((resolve) => foreign.listen(0, "127.0.0.1", resolve));
+  context.cleanUp.push(() => foreign.close());
+  const page = await context.browser.newPage();
+  const refusal = page.waitForEvent("console", { predicate: (message) => message.text().includes("frame-ancestors"), timeout: 20000 });
+  await page.goto(`http://127.0.0.1:${foreign.address().port}/`);
+  await refusal;
+  assert.equal((await status(port)).clients, 0);
+}
+
 async function outlivesARestart(context) {
   const out = folder(context);
   const port = await freePort();
@@ -134,4 +154,4 @@ async function outlivesARestart(context) {
 }
 
 /** Need the program (`context.waymark`) and a sequence for it (`context.input`). */
-export const programCases = [showsARun, outlivesARestart];
+export const programCases = [showsARun, refusesToBeFramed, outlivesARestart];
