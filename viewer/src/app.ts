@@ -71,11 +71,7 @@ export class App implements Listener {
     this.connectionState = state;
     this.retryAt_ms = retryAt_ms;
     byId("app").dataset["connection"] = state;
-    if (state === "waiting" || state === "refused") {
-      setText(byId("state-name"), "No connection");
-      setText(byId("state-detail"), this.store.landmarks.count > 0 ? "What is shown is the last that came" : "");
-      byId("app").style.setProperty("--state", "var(--muted)");
-    }
+    if (state === "waiting" || state === "refused") this.session.setGone(this.status, this.store.landmarks.count > 0);
     this.panelsAt_ms = 0;
   }
 

@@ -143,6 +143,26 @@ async function connectsAgain(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** That a session is done stays to be read when the program leaves, as it does then; only what broke off is a lost connection. */
+async function remembersTheEnd(context) {
+  const { mock, port, page } = await serve(context, { world: "walk", skip: 100 });
+  await until(page, isOpen);
+  mock.phase = "done";
+  await until(page, (w) => w.session.phase === "done");
+  await mock.close();
+  await until(page, (w) => w.connection === "waiting");
+  await page.waitForFunction(() => document.querySelector("#state-detail").textContent.endsWith("The program has ended"));
+  assert.equal(await page.innerText("#state-name"), "Finished");
+  assert.ok(await page.isHidden("#banner"));
+  const restarted = new MockServer({ world: "walk", skip: 100 });
+  context.cleanUp.push(() => restarted.close());
+  await restarted.listen(port);
+  await until(page, (w) => w.connection === "open" && w.session.phase === "running");
+  await restarted.close();
+  await page.waitForFunction(() => document.querySelector("#state-name").textContent === "No connection");
+  assert.deepEqual(page.problems, []);
+}
+
 async function saysWhatIsMissing(context) {
   const { page } = await serve(context, { world: "empty" }, { isPhone: true });
   await page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Waiting for the first image");
@@ -189,6 +209,6 @@ async function drawsLargeMaps(context) {
 }
 
 export const mockCases = [
-  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, saysWhatIsMissing,
-  followsItsWindow, drawsLargeMaps,
+  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
+  saysWhatIsMissing, followsItsWindow, drawsLargeMaps,
 ];

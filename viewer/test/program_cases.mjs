@@ -143,6 +143,9 @@ async function outlivesARestart(context) {
   assert.deepEqual([shown.landmarks, shown.keyframes], [shown.session.landmarks, shown.session.keyframes], "the last map stays");
   const [, keyframes, landmarks] = first.output().match(/(\d+) keyframes, (\d+) landmarks/).map(Number);
   assert.deepEqual([shown.landmarks, shown.keyframes], [landmarks, keyframes], "it is what the program says at its end");
+  assert.equal(shown.session.phase, "done");
+  assert.equal(await page.innerText("#state-name"), "Finished");
+  assert.match(await page.innerText("#state-detail"), /frames have a pose. The program has ended$/);
 
   await start(context, port, "view", join(out, "map.wmap"), "--port", String(port));
   // Its keyframes stand for the trajectory; until its snapshot comes, the page shows that of the run.

@@ -4,7 +4,7 @@ import type { ConnectionState } from "../connection";
 import type { Store } from "../store/store";
 import type { Status } from "../text_messages";
 import { byId, grouped, setText } from "./dom";
-import { ADVICE, REASON_WORDS } from "./words";
+import { ADVICE, isOver, REASON_WORDS } from "./words";
 
 type Words = { title: string; text: string; isStill?: boolean };
 
@@ -12,7 +12,7 @@ type Words = { title: string; text: string; isStill?: boolean };
 export class Notice {
   show(connection: ConnectionState, retryIn_s: number, status: Status | null, store: Store): void {
     const hasMap = store.landmarks.count > 0 || store.keyframes.count > 0;
-    const problem = connection === "open" ? null : problemOf(connection, retryIn_s);
+    const problem = connection === "open" || isOver(status) ? null : problemOf(connection, retryIn_s);
     const notice = store.isLoading ? loading(store) : hasMap ? null : (problem ?? waiting(status));
     const host = byId("notice");
     host.toggleAttribute("data-on", notice !== null);
@@ -43,7 +43,7 @@ function loading(store: Store): Words {
 
 function waiting(status: Status | null): Words {
   if (!status || status.phase === "starting") return { title: "Waiting for the first image", text: "The map grows here as soon as there are images." };
-  if (status.phase === "map" || status.phase === "done") return { title: "An empty map", text: "It holds neither keyframes nor landmarks.", isStill: true };
+  if (status.phase === "map" || isOver(status)) return { title: "An empty map", text: "It holds neither keyframes nor landmarks.", isStill: true };
   return { title: "Finding a start", text: ADVICE[status.reason] ?? ADVICE["none"]! };
 }
 

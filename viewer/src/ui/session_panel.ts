@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { Hello, Status } from "../text_messages";
 import { byId, grouped, make, setText } from "./dom";
-import { PHASE_WORDS, REASON_WORDS, STAGE_WORDS, STATE_COLOURS, STATE_WORDS } from "./words";
+import { isOver, PHASE_WORDS, REASON_WORDS, STAGE_WORDS, STATE_COLOURS, STATE_WORDS } from "./words";
 
 const STAGE_COLOURS = ["--part-0", "--part-7", "--hairline", "--part-4", "--part-5", "--part-1", "--part-6", "--part-3"];
 
@@ -37,6 +37,17 @@ export class SessionPanel {
     set("Dropped", grouped(status.dropped + status.unreadable));
     set("Times lost", grouped(status.lost_count));
     this.setStages(status);
+  }
+
+  /** The program is gone; what it said last stays where it had said that all was done. */
+  setGone(status: Status | null, hasMap: boolean): void {
+    if (status && isOver(status)) {
+      setText(byId("state-detail"), `${detailOf(status)}. The program has ended`);
+      return;
+    }
+    setText(byId("state-name"), "No connection");
+    setText(byId("state-detail"), hasMap ? "What is shown is the last that came" : "");
+    byId("app").style.setProperty("--state", "var(--muted)");
   }
 
   private setState(status: Status): void {

@@ -1,5 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+import type { Status } from "../text_messages";
 
 /** What states and reasons of the protocol are called here, and what one can do about them. */
 
@@ -42,3 +43,8 @@ export const PHASE_WORDS: Record<string, string> = {
 };
 
 export const STAGE_WORDS: Record<string, string> = { local_map: "local map", wait: "waiting", initialize: "start", recover: "recovery" };
+
+/** The session came to its end, after which the program takes its leave. */
+export function isOver(status: Status | null): boolean {
+  return status?.phase === "done";
+}
