@@ -3,7 +3,7 @@
 
 // A server of docs/viewer-protocol.md without the program behind it, for work on the page and its tests.
 //
-// usage: node dev/mock_server.mjs [--port N] [--world walk|sphere|large|map|empty|lost] [--skip FRAMES] [--token TOKEN]
+// usage: node dev/mock_server.mjs [--port N] [--world walk|sphere|large|map|empty|loading|lost] [--skip FRAMES] [--token TOKEN]
 import { createServer } from "node:http";
 import { readFile } from "node:fs/promises";
 import { extname, normalize } from "node:path";
@@ -30,7 +30,7 @@ export class MockServer {
     this.token = token;
     this.kind = world;
     this.generation = 0;
-    this.phase = world === "map" ? "map" : "running";
+    this.phase = world === "map" ? "map" : world === "empty" || world === "loading" ? "starting" : "running";
     this.requests = [];
     this.dots = random(11);
     this.reset();
@@ -49,7 +49,7 @@ export class MockServer {
     return new Promise((resolve) => {
       this.server.listen(port, "127.0.0.1", () => {
         if (this.kind === "large") this.ready = [...this.snapshot()];
-        if (this.kind !== "empty") this.timer = setInterval(() => this.tick(), 100);
+        if (this.phase !== "starting") this.timer = setInterval(() => this.tick(), 100);
         resolve(this.server.address().port);
       });
     });
@@ -94,7 +94,7 @@ export class MockServer {
   }
 
   hello() {
-    const isLive = this.kind !== "map";
+    const isLive = this.kind !== "map" && this.kind !== "loading";
     return {
       type: "hello", protocol: 1, program: "waymark mock", mode: isLive ? "live" : "map", input: isLive ? "courtyard" : "courtyard.wmap",
       setup: "stereo", timing: "realtime", controls: isLive ? ["pause", "resume", "reset", "save", "mapping", "stop"] : [],
@@ -107,7 +107,7 @@ export class MockServer {
     const last = world.frames.at(-1) ?? { frame: 0, time_s: 0, state: 0, reason: 0, tracking_ms: 0 };
     const t = last.tracking_ms;
     return {
-      type: "status", phase: this.kind === "empty" ? "starting" : this.phase, is_mapping: world.isMapping, frame: last.frame, time_s: last.time_s,
+      type: "status", phase: this.phase, is_mapping: world.isMapping, frame: last.frame, time_s: last.time_s,
       state: STATES[this.kind === "lost" ? 3 : last.state], reason: REASONS[this.kind === "lost" ? 3 : last.reason], submap: 0, matches: 412, inliers: 377,
       stages_ms: [0.45 * t, 0.2 * t, 0, 0.08 * t, 0.25 * t, 0, 0, 0.02 * t], tracking_ms: t, tracking_ms_median: 12.4,
       frames: world.frames.length, frames_total: 3682, tracked: world.frames.filter((each) => each.state === 1).length, unreadable: 0, dropped: 0,

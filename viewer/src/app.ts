@@ -148,7 +148,7 @@ export class App implements Listener {
 
   private updatePanels(now_ms: number): void {
     this.panelsAt_ms = now_ms;
-    this.notice.show(this.connectionState, (this.retryAt_ms - now_ms) / 1000, this.status, this.store);
+    this.notice.show(this.connectionState, (this.retryAt_ms - now_ms) / 1000, this.hello, this.status, this.store);
     this.legend.update();
     this.timeline.draw();
     const { view, ground } = this.scene;

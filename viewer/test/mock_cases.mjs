@@ -167,6 +167,9 @@ async function saysWhatIsMissing(context) {
   const { page } = await serve(context, { world: "empty" }, { isPhone: true });
   await page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Waiting for the first image");
   await picture(page, `${context.pictures}/phone_empty.png`);
+  const loading = await serve(context, { world: "loading" });
+  await loading.page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Loading the map");
+  assert.equal(await loading.page.innerText("#state-detail"), "Loading the map");
   const refused = await serve(context, { world: "walk", skip: 100, token: "0123456789abcdef" });
   await until(refused.page, (w) => w.connection === "refused");
   await refused.page.waitForFunction(() => document.querySelector("#notice-title").textContent === "This address needs its token");

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { ConnectionState } from "../connection";
 import type { Store } from "../store/store";
-import type { Status } from "../text_messages";
+import type { Hello, Status } from "../text_messages";
 import { byId, grouped, setText } from "./dom";
 import { ADVICE, isOver, REASON_WORDS } from "./words";
 
@@ -10,10 +10,10 @@ type Words = { title: string; text: string; isStill?: boolean };
 
 /** What to say where the map would be, as long as there is none; and a line above it when something is wrong. */
 export class Notice {
-  show(connection: ConnectionState, retryIn_s: number, status: Status | null, store: Store): void {
+  show(connection: ConnectionState, retryIn_s: number, hello: Hello | null, status: Status | null, store: Store): void {
     const hasMap = store.landmarks.count > 0 || store.keyframes.count > 0;
     const problem = connection === "open" || isOver(status) ? null : problemOf(connection, retryIn_s);
-    const notice = store.isLoading ? loading(store) : hasMap ? null : (problem ?? waiting(status));
+    const notice = store.isLoading ? loading(store) : hasMap ? null : (problem ?? waiting(hello, status));
     const host = byId("notice");
     host.toggleAttribute("data-on", notice !== null);
     host.toggleAttribute("data-still", notice?.isStill ?? false);
@@ -41,7 +41,8 @@ function loading(store: Store): Words {
   return { title: "Reading the map", text: expectedLandmarks > 0 ? `${grouped(landmarks.count)} of ${grouped(expectedLandmarks)} landmarks` : "" };
 }
 
-function waiting(status: Status | null): Words {
+function waiting(hello: Hello | null, status: Status | null): Words {
+  if (hello?.mode === "map" && status?.phase === "starting") return { title: "Loading the map", text: "The program prepares it to be shown." };
   if (!status || status.phase === "starting") return { title: "Waiting for the first image", text: "The map grows here as soon as there are images." };
   if (status.phase === "map" || isOver(status)) return { title: "An empty map", text: "It holds neither keyframes nor landmarks.", isStill: true };
   return { title: "Finding a start", text: ADVICE[status.reason] ?? ADVICE["none"]! };

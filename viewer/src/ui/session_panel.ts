@@ -11,6 +11,7 @@ export class SessionPanel {
   private readonly figures = new Map<string, HTMLElement>();
   private readonly bars: HTMLElement[] = [];
   private readonly times: HTMLElement[] = [];
+  private isLive = true;
 
   setHello(hello: Hello): void {
     setText(byId("title"), hello.input || "Waymark");
@@ -18,8 +19,9 @@ export class SessionPanel {
     setText(byId("subtitle"), `${kind} · ${hello.program}`);
     document.title = `${hello.input || "map"} · Waymark`;
     byId("app").dataset["mode"] = hello.mode;
-    this.makeFigures(hello.mode === "live");
-    this.makeStages(hello.mode === "live" ? hello.stages : []);
+    this.isLive = hello.mode === "live";
+    this.makeFigures();
+    this.makeStages(this.isLive ? hello.stages : []);
   }
 
   setStatus(status: Status): void {
@@ -55,18 +57,19 @@ export class SessionPanel {
     const isPaused = status.phase === "paused";
     const word = isTracking && !isPaused ? STATE_WORDS[status.state] : PHASE_WORDS[status.phase];
     setText(byId("state-name"), `${word ?? status.state}${isTracking && !status.is_mapping ? ", map kept as it is" : ""}`);
-    setText(byId("state-detail"), detailOf(status));
+    const isLoading = status.phase === "starting" && !this.isLive;
+    setText(byId("state-detail"), isLoading ? "Loading the map" : detailOf(status));
     const colour = isTracking && !isPaused ? STATE_COLOURS[status.state] : undefined;
     const settled = status.phase === "done" || status.phase === "map" ? "--keyframe" : "--starting";
     byId("app").style.setProperty("--state", `var(${colour ?? settled})`);
   }
 
-  private makeFigures(isLive: boolean): void {
+  private makeFigures(): void {
     this.figures.clear();
     const list = byId("figures");
     list.replaceChildren();
     const names = ["Keyframes", "Landmarks", "Loops", "Parts"];
-    if (isLive) names.push("Frames", "Frames/s", "Dropped", "Times lost");
+    if (this.isLive) names.push("Frames", "Frames/s", "Dropped", "Times lost");
     for (const name of names) {
       const value = make("dd", {}, "–");
       this.figures.set(name, value);
