@@ -148,13 +148,15 @@ export class App implements Listener {
 
   private updatePanels(now_ms: number): void {
     this.panelsAt_ms = now_ms;
-    this.notice.show(this.connectionState, (this.retryAt_ms - now_ms) / 1000, this.hello, this.status, this.store);
+    const { hello, status, scene } = this;
+    const retryIn_s = (this.retryAt_ms - now_ms) / 1000;
+    this.notice.show({ connection: this.connectionState, retryIn_s, hello, status, canDraw: scene.canDraw }, this.store);
     this.legend.update();
     this.timeline.draw();
-    const { view, ground } = this.scene;
-    const perPixel = this.scene.unitsPerPixel;
+    const { view, ground } = scene;
+    const perPixel = scene.unitsPerPixel;
     const unit = this.store.submaps?.is_metric[0] === 0 ? "units" : "m";
-    byId("scale").hidden = this.store.keyframes.count === 0;
+    byId("scale").hidden = this.store.keyframes.count === 0 || !scene.canDraw;
     const length = ground.spacing * (ground.spacing / perPixel < 24 ? 10 : 1);
     byId("scale").style.setProperty("--length", `${Math.min(400, length / perPixel).toFixed(0)}px`);
     setText(byId("scale"), `${length >= 1 ? length : length.toPrecision(1)} ${unit}`);

@@ -7,9 +7,9 @@ const FLAGS = [
   "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ];
 
-/** Chromium without a window, which draws in software. */
-export function launch() {
-  return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: FLAGS });
+/** Chromium without a window, which draws in software; with more flags if needed. */
+export function launch(more = []) {
+  return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: [...FLAGS, ...more] });
 }
 
 /** A page on `url`, as large as a desktop's window or as a phone; complaints of the page are collected in `problems`. */

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import assert from "node:assert/strict";
 import { MockServer } from "../dev/mock_server.mjs";
-import { open, pickSomething, picture, report, until } from "./chromium.mjs";
+import { launch, open, pickSomething, picture, report, until } from "./chromium.mjs";
 
 const isOpen = (w) => w.connection === "open" && !w.isLoading && w.generation > 0;
 
@@ -177,6 +177,23 @@ async function saysWhatIsMissing(context) {
   await until(right.page, isOpen);
 }
 
+async function worksWithoutWebGl({ cleanUp, pictures }) {
+  const browser = await launch(["--disable-3d-apis"]);
+  cleanUp.push(() => browser.close());
+  const { page } = await serve({ browser, cleanUp }, { world: "walk", skip: 200 });
+  await page.waitForFunction(() => document.querySelector("#notice-title").textContent === "This browser offers no WebGL");
+  await until(page, (w) => w.connection === "open" && w.agreement.equal >= 3 && w.keyframes > 0);
+  assert.equal((await report(page)).agreement.different, 0);
+  assert.equal(await page.innerText("#state-name"), "Tracking");
+  for (const button of ["#fit", "#screenshot", "#theme", "#view-choice [data-value=top]", "#colouring-choice [data-value=age]"]) {
+    await page.click(button);
+  }
+  await page.click("[data-control=pause]");
+  await until(page, (w) => w.session.phase === "paused");
+  await picture(page, `${pictures}/desktop_no_webgl.png`);
+  assert.deepEqual(page.problems.filter((problem) => !problem.includes("WebGL context")), []);
+}
+
 /** The page is as wide as its window and the picture as wide as its place, whatever they were before. */
 async function followsItsWindow(context) {
   const { mock, page } = await serve(context, { world: "walk", skip: 200 }, { size: { width: 1280, height: 800 } });
@@ -213,5 +230,5 @@ async function drawsLargeMaps(context) {
 
 export const mockCases = [
   growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
-  saysWhatIsMissing, followsItsWindow, drawsLargeMaps,
+  saysWhatIsMissing, worksWithoutWebGl, followsItsWindow, drawsLargeMaps,
 ];

@@ -32,7 +32,8 @@ export class Scene {
   };
   palette!: Palette;
   needsRender = true;
-  private readonly renderer: WebGLRenderer;
+  /** Null where the browser has no WebGL. */
+  private readonly renderer: WebGLRenderer | null;
   private readonly scene = new ThreeScene();
   private readonly world = new Group();
   private readonly shapes = new CameraShapes();
@@ -53,8 +54,7 @@ export class Scene {
   private hasSubject = false;
 
   constructor(private readonly store: Store, private readonly canvas: HTMLCanvasElement) {
-    this.renderer = new WebGLRenderer({ canvas, antialias: window.devicePixelRatio < 2, powerPreference: "high-performance" });
-    this.renderer.outputColorSpace = LinearSRGBColorSpace; // The colours of the style sheet, as they are.
+    this.renderer = makeRenderer(canvas);
     this.view = new View(canvas);
     this.landmarks = new LandmarkLayer(store.landmarks, this.parts.texture);
     this.keyframes = new KeyframeLayer(store.keyframes, this.shapes, this.parts.texture);
@@ -70,8 +70,13 @@ export class Scene {
     this.view.controls.addEventListener("change", () => (this.needsRender = true));
   }
 
+  /** Without it only the picture is missing. */
+  get canDraw(): boolean {
+    return this.renderer !== null;
+  }
+
   get drawCalls(): number {
-    return this.renderer.info.render.calls;
+    return this.renderer?.info.render.calls ?? 0;
   }
 
   /** Length at the point that is looked at that is as long as a pixel of the page. */
@@ -81,7 +86,7 @@ export class Scene {
 
   setPalette(): void {
     this.palette = readPalette();
-    this.renderer.setClearColor(this.palette.ground);
+    this.renderer?.setClearColor(this.palette.ground);
     for (const layer of [this.landmarks, this.keyframes, this.trail, this.current, this.selection, this.ground]) {
       layer.setPalette(this.palette);
     }
@@ -104,8 +109,8 @@ export class Scene {
 
   resize(width: number, height: number): void {
     const ratio = Math.min(window.devicePixelRatio, 2);
-    this.renderer.setPixelRatio(ratio);
-    this.renderer.setSize(width, height, false);
+    this.renderer?.setPixelRatio(ratio);
+    this.renderer?.setSize(width, height, false);
     this.view.setAspect(width / Math.max(1, height));
     this.needsRender = true;
   }
@@ -132,6 +137,7 @@ export class Scene {
 
   /** Takes up what changed and draws where needed; `cursor` is the frame to show the camera at. True where it drew. */
   update(now_ms: number, dt_s: number, cursor: number, isLost: boolean): boolean {
+    if (!this.renderer) return false;
     if (this.sync(now_ms)) {
       this.needsRender = true;
       this.isSelectionStale = this.selected !== null || this.isSelectionStale;
@@ -142,7 +148,7 @@ export class Scene {
     if (this.view.update(dt_s, this.hasSubject ? this.subject : null, this.extent.radius)) this.needsRender = true;
     if (!this.needsRender) return false;
     this.needsRender = false;
-    this.draw(cursor);
+    this.draw(this.renderer, cursor);
     return true;
   }
 
@@ -157,6 +163,7 @@ export class Scene {
   }
 
   screenshot(): Promise<Blob | null> {
+    if (!this.renderer) return Promise.resolve(null);
     this.renderer.render(this.scene, this.view.camera);
     return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
   }
@@ -173,9 +180,9 @@ export class Scene {
     return this.trail.sync() || landmarks || keyframes || camerasChanged;
   }
 
-  private draw(cursor: number): void {
+  private draw(renderer: WebGLRenderer, cursor: number): void {
     const { canvas, extent, view, shown } = this;
-    const ratio = this.renderer.getPixelRatio();
+    const ratio = renderer.getPixelRatio();
     this.landmarks.setView(ratio, canvas.height, 0.035 * extent.step);
     this.landmarks.points.visible = shown.landmarks && this.store.landmarks.count > 0;
     this.trail.setView(canvas.width, canvas.height, ratio);
@@ -191,7 +198,7 @@ export class Scene {
     loops.visible = shown.loops && loops.geometry.drawRange.count > 0;
     this.ground.place(view.controls.target, extent.floor, this.seenHeight);
     this.ground.mesh.visible = shown.grid && this.store.keyframes.count > 0;
-    this.renderer.render(this.scene, view.camera);
+    renderer.render(this.scene, view.camera);
   }
 
   /** Half of what is seen from bottom to top at the point that is looked at. */
@@ -247,5 +254,15 @@ export class Scene {
     out.y += table.position[3 * slot + 1]!;
     out.z += table.position[3 * slot + 2]!;
     return true;
+  }
+}
+
+function makeRenderer(canvas: HTMLCanvasElement): WebGLRenderer | null {
+  try {
+    const renderer = new WebGLRenderer({ canvas, antialias: window.devicePixelRatio < 2, powerPreference: "high-performance" });
+    renderer.outputColorSpace = LinearSRGBColorSpace; // The colours of the style sheet, as they are.
+    return renderer;
+  } catch {
+    return null;
   }
 }

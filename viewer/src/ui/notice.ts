@@ -8,12 +8,29 @@ import { ADVICE, isOver, REASON_WORDS } from "./words";
 
 type Words = { title: string; text: string; isStill?: boolean };
 
+/** What there is to say something about. */
+export interface Situation {
+  connection: ConnectionState;
+  retryIn_s: number;
+  hello: Hello | null;
+  status: Status | null;
+  /** Whether the browser has WebGL. */
+  canDraw: boolean;
+}
+
+const NO_WEBGL: Words = {
+  title: "This browser offers no WebGL",
+  text: "The map cannot be drawn; all else works. Switch on hardware acceleration in its settings, or open the page in another browser.",
+  isStill: true,
+};
+
 /** What to say where the map would be, as long as there is none; and a line above it when something is wrong. */
 export class Notice {
-  show(connection: ConnectionState, retryIn_s: number, hello: Hello | null, status: Status | null, store: Store): void {
+  show({ connection, retryIn_s, hello, status, canDraw }: Situation, store: Store): void {
     const hasMap = store.landmarks.count > 0 || store.keyframes.count > 0;
     const problem = connection === "open" || isOver(status) ? null : problemOf(connection, retryIn_s);
-    const notice = store.isLoading ? loading(store) : hasMap ? null : (problem ?? waiting(hello, status));
+    const missing = hasMap ? null : (problem ?? waiting(hello, status));
+    const notice = store.isLoading ? loading(store) : canDraw || (problem && !hasMap) ? missing : NO_WEBGL;
     const host = byId("notice");
     host.toggleAttribute("data-on", notice !== null);
     host.toggleAttribute("data-still", notice?.isStill ?? false);
