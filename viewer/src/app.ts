@@ -46,14 +46,15 @@ export class App implements Listener {
   private beganAt_ms = 0;
   private isFitted = false;
   private isUserView = false;
+  /** Pixels of the screen in one of the page, as the scene knows it. */
+  private density = window.devicePixelRatio;
 
   constructor() {
     const views = [["follow", "Follow"], ["orbit", "Orbit"], ["top", "Top"]] as const;
     this.viewChoice = new Choice<ViewName>(byId("view-choice"), views, (name) => this.setView(name, true));
     this.setUpButtons();
     this.setUpPicking();
-    const stage = byId("stage");
-    new ResizeObserver(() => this.scene.resize(stage.clientWidth, stage.clientHeight)).observe(stage);
+    new ResizeObserver(() => this.resize()).observe(byId("stage"));
   }
 
   get colouring(): string {
@@ -148,6 +149,8 @@ export class App implements Listener {
 
   private updatePanels(now_ms: number): void {
     this.panelsAt_ms = now_ms;
+    // The stage stays as it is where the window goes to another screen.
+    if (this.density !== window.devicePixelRatio) this.resize();
     const { hello, status, scene } = this;
     const retryIn_s = (this.retryAt_ms - now_ms) / 1000;
     this.notice.show({ connection: this.connectionState, retryIn_s, hello, status, canDraw: scene.canDraw }, this.store);
@@ -161,6 +164,12 @@ export class App implements Listener {
     byId("scale").style.setProperty("--length", `${Math.min(400, length / perPixel).toFixed(0)}px`);
     setText(byId("scale"), `${length >= 1 ? length : length.toPrecision(1)} ${unit}`);
     this.viewChoice.set(view.name);
+  }
+
+  private resize(): void {
+    const stage = byId("stage");
+    this.density = window.devicePixelRatio;
+    this.scene.resize(stage.clientWidth, stage.clientHeight);
   }
 
   private setView(name: ViewName, isUser: boolean): void {

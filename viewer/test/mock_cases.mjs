@@ -213,6 +213,21 @@ async function followsItsWindow(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** The picture is as dense as the screen that the window comes to. */
+async function followsItsScreen(context) {
+  const { page } = await serve(context, { world: "walk", skip: 200 });
+  await until(page, isOpen);
+  const device = await page.context().newCDPSession(page);
+  for (const deviceScaleFactor of [2, 1]) {
+    await device.send("Emulation.setDeviceMetricsOverride", { width: 960, height: 640, deviceScaleFactor, mobile: false });
+    await page.waitForFunction((ratio) => {
+      const canvas = document.querySelector("#scene");
+      return canvas.width === ratio * canvas.clientWidth && canvas.height === ratio * canvas.clientHeight;
+    }, deviceScaleFactor, { timeout: 10000 });
+  }
+  assert.deepEqual(page.problems, []);
+}
+
 /** Half a million landmarks and five thousand keyframes. Times are told, not judged: they depend on the machine. */
 async function drawsLargeMaps(context) {
   const { page } = await serve(context, { world: "large" }, { isDark: true, size: { width: 800, height: 500 } });
@@ -230,5 +245,6 @@ async function drawsLargeMaps(context) {
 
 export const mockCases = [
   growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
-  saysWhatIsMissing, worksWithoutWebGl, followsItsWindow, drawsLargeMaps,
+  saysWhatIsMissing, worksWithoutWebGl, followsItsWindow, followsItsScreen,
+  drawsLargeMaps,
 ];

@@ -11,6 +11,20 @@ export const COLOURINGS = ["image", "height", "age", "observations", "part"] as 
 export type Colouring = (typeof COLOURINGS)[number];
 
 const NUM_SAMPLES = 4096;
+/** Of a point, in pixels of the page: far away it can still be seen, close by it covers little. */
+const SIZE_PX = { least: 2, most: 16 };
+
+/** How the landmarks are looked at. */
+export interface LandmarkView {
+  /** Pixels of the screen in one of the page. */
+  pixelRatio: number;
+  /** Of the picture, in pixels of the screen. */
+  height_px: number;
+  /** Of a point, in units of the map. */
+  worldSize: number;
+  /** Distances between which points fade towards the background. */
+  fog: { from: number; to: number };
+}
 
 /** All landmarks: one buffer, one draw call. */
 export class LandmarkLayer {
@@ -33,8 +47,8 @@ export class LandmarkLayer {
       fragmentShader: pointFragment,
       uniforms: {
         partPlaces: { value: partPlaces }, mode: { value: 1 }, range: { value: this.low_high.height },
-        pointSize: { value: new Vector2(1.5, 6) }, worldSize: { value: 0.02 }, viewHeight: { value: 1 },
-        ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, dim: { value: 1 },
+        pointSize: { value: new Vector2() }, worldSize: { value: 0.02 }, viewHeight: { value: 1 }, fog: { value: new Vector2() },
+        ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, ground: { value: null }, dim: { value: 1 },
       },
     });
     this.points = new Points(geometry, material);
@@ -46,6 +60,7 @@ export class LandmarkLayer {
     uniforms["ramp"]!.value = palette.ramp;
     uniforms["parts"]!.value = palette.parts;
     uniforms["ink"]!.value = palette.ink;
+    uniforms["ground"]!.value = palette.ground;
   }
 
   setColouring(colouring: Colouring): void {
@@ -64,11 +79,12 @@ export class LandmarkLayer {
     material.depthWrite = !isDim;
   }
 
-  setView(pixelRatio: number, height_px: number, worldSize: number): void {
+  setView({ pixelRatio, height_px, worldSize, fog }: LandmarkView): void {
     const { uniforms } = this.points.material;
-    (uniforms["pointSize"]!.value as Vector2).set(2 * pixelRatio, 6 * pixelRatio);
+    (uniforms["pointSize"]!.value as Vector2).set(SIZE_PX.least * pixelRatio, SIZE_PX.most * pixelRatio);
     uniforms["viewHeight"]!.value = 0.5 * height_px;
     uniforms["worldSize"]!.value = worldSize;
+    (uniforms["fog"]!.value as Vector2).set(fog.from, fog.to);
   }
 
   sync(): boolean {

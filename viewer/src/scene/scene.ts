@@ -183,7 +183,10 @@ export class Scene {
   private draw(renderer: WebGLRenderer, cursor: number): void {
     const { canvas, extent, view, shown } = this;
     const ratio = renderer.getPixelRatio();
-    this.landmarks.setView(ratio, canvas.height, 0.035 * extent.step);
+    // What is looked at, and all in front of it, is clear.
+    const from = view.camera.position.distanceTo(view.controls.target);
+    const fog = { from, to: from + 1.2 * extent.radius };
+    this.landmarks.setView({ pixelRatio: ratio, height_px: canvas.height, worldSize: 0.035 * extent.step, fog });
     this.landmarks.points.visible = shown.landmarks && this.store.landmarks.count > 0;
     this.trail.setView(canvas.width, canvas.height, ratio);
     this.trail.setCursor(cursor);

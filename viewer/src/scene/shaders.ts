@@ -20,7 +20,8 @@ export const pointVertex = /* glsl */ `
   uniform vec2 pointSize;
   uniform float worldSize;
   uniform float viewHeight;
-  uniform float dim;
+  uniform vec2 fog;
+  uniform vec3 ground;
   uniform vec3 ramp[${NUM_RAMP}];
   uniform vec3 parts[${NUM_PARTS}];
   uniform vec3 ink;
@@ -41,6 +42,7 @@ export const pointVertex = /* glsl */ `
     else if (mode == 2) tint = ramped(frame);
     else if (mode == 3) tint = ramped(log2(facts.x));
     else tint = parts[int(mod(facts.y, ${NUM_PARTS}.0))];
+    tint = mix(tint, ground, 0.6 * smoothstep(fog.x, fog.y, -view.z));
   }`;
 
 export const pointFragment = /* glsl */ `
