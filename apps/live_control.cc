@@ -49,6 +49,10 @@ bool LiveControl::should_stop(const std::function<bool()>& is_interrupted) {
 
 void LiveControl::take_requests() {
   while (const std::optional<ViewRequest> request = viewer_.next_request()) answer(*request);
+  tell_problem();
+}
+
+void LiveControl::tell_problem() {
   if (const auto problem = viewer_.next_problem()) reporter_.warning("viewer: " + *problem);
 }
 

@@ -31,6 +31,9 @@ class LiveControl {
               const ControlledParts& parts,
               std::optional<std::size_t> num_frames,
               Reporter& reporter);
+  ~LiveControl() { tell_problem(); }
+  LiveControl(const LiveControl&) = delete;
+  LiveControl& operator=(const LiveControl&) = delete;
 
   std::string url() const { return viewer_.url(); }
   /// A frame was fed.
@@ -44,6 +47,8 @@ class LiveControl {
 
  private:
   void take_requests();
+  /// Warns of what went wrong in the viewer, if anything did.
+  void tell_problem();
   void answer(const ViewRequest& request);
   void save(const ViewRequest& request);
 
