@@ -93,8 +93,6 @@ class PythonSystem {
 
   SystemStatistics statistics() {
     const Turn turn = take();
-    if (!is_finished_)
-      throw std::runtime_error("System: statistics() before finish(), expected after");
     return system_.statistics();
   }
 
@@ -243,7 +241,7 @@ State of every frame fed so far, including those filled in after the fact: a lis
       .def("statistics", &PythonSystem::statistics, R"(statistics(self)
 --
 
-Totals of the session: Statistics. After finish() only.)")
+Totals up to the map that map() gives: Statistics. Final after finish().)")
       .def("focal_check", &PythonSystem::focal_check, R"(focal_check(self)
 --
 

@@ -85,6 +85,7 @@ class System::Impl {
   std::shared_ptr<const PublishedMap> process(const MapTask& task);
   void add(const MapperMessage& message);
   void finish_adjustment();
+  PublishedMap publish();
 
   // Fixed after construction.
   const std::shared_ptr<const Rig> rig_;
@@ -200,7 +201,11 @@ std::shared_ptr<const PublishedMap> System::Impl::process(const MapTask& task) {
           FrameId{task.frame.value + static_cast<std::uint32_t>(settings_.global_latency)};
     }
   }
-  return std::make_shared<const PublishedMap>(PublishedMap{mapper_.snapshot(), adjustment_due_});
+  return std::make_shared<const PublishedMap>(publish());
+}
+
+PublishedMap System::Impl::publish() {
+  return {mapper_.snapshot(), adjustment_due_, mapper_.num_loops(), mapping_ms_};
 }
 
 void System::Impl::finish_adjustment() {
@@ -236,7 +241,7 @@ void System::Impl::finish() {
   }
   if (adjuster_.is_busy()) finish_adjustment();
   mapper_.finish();
-  visible_.snapshot = mapper_.snapshot();
+  visible_ = publish();
   memory_.settle(*map());
 }
 
@@ -266,16 +271,15 @@ std::vector<FrameState> System::Impl::frame_states() const {
 }
 
 SystemStatistics System::Impl::statistics() const {
-  WAYMARK_CHECK(is_finished_);
   SystemStatistics statistics;
   statistics.num_keyframes = static_cast<int>(map()->keyframes().size());
   statistics.num_landmarks = static_cast<int>(map()->landmarks().size());
   for (const Submap& submap : map()->submaps()) {
     statistics.num_submaps += !submap.joined_into.is_valid();
   }
-  statistics.num_loops = mapper_.num_loops();
+  statistics.num_loops = visible_.num_loops;
   statistics.num_relocalizations = num_relocalizations_;
-  statistics.mapping_ms = mapping_ms_;
+  statistics.mapping_ms = visible_.mapping_ms;
   return statistics;
 }
 

@@ -36,8 +36,8 @@ struct TrajectoryFrame {
 
 /// Totals of a session.
 struct SystemStatistics {
-  int num_keyframes = 0;           ///< Of the map at the end.
-  int num_landmarks = 0;           ///< Of the map at the end.
+  int num_keyframes = 0;           ///< Of the map.
+  int num_landmarks = 0;           ///< Of the map.
   int num_submaps = 0;             ///< Those that were not joined.
   int num_loops = 0;               ///< Closed in the session.
   int num_relocalizations = 0;     ///< Of the session.
@@ -74,8 +74,7 @@ class System {
   /// Begins anew with an empty map; frames count from 0 again. Not after finish().
   void reset();
 
-  /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards;
-  /// statistics() only afterwards.
+  /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards.
   void finish();
 
   /// Every frame that has a pose, in order, with what is known now. After finish(): final.
@@ -91,7 +90,8 @@ class System {
   /// The newest finished map, immutable.
   std::shared_ptr<const Map> map() const;
 
-  /// Totals; after finish() only.
+  /// Totals up to the map that map() gives; of the tracker up to the frame fed last. After
+  /// finish(): final.
   SystemStatistics statistics() const;
 
  private:

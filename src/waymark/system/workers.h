@@ -7,6 +7,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "waymark/base/feed.h"
 #include "waymark/base/mailbox.h"
@@ -28,6 +29,8 @@ struct MapTask {
 struct PublishedMap {
   MapSnapshot snapshot;
   FrameId adjustment_due;  ///< When a global adjustment is to be taken in; invalid if none runs.
+  int num_loops = 0;       ///< Closed so far.
+  std::vector<double> mapping_ms;  ///< Of each message so far.
 };
 
 /// Takes tasks to the mapper, in a thread of its own unless the timing is kInline,
