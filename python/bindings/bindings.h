@@ -3,6 +3,7 @@
 #pragma once
 
 #include <pybind11/pybind11.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <functional>
@@ -52,6 +53,26 @@ class Turn {
 
  private:
   bool& is_taken_;
+};
+
+/// Lets other threads of Python run, until it is destroyed. Once the interpreter ends, Python ends
+/// daemon threads that want to run again by unwinding their stack, which no destructor survives:
+/// such a thread rests here until the process ends.
+class ReleasedGil {
+ public:
+  ReleasedGil() : state_(PyEval_SaveThread()) {}
+  ~ReleasedGil() {
+    try {
+      PyEval_RestoreThread(state_);
+    } catch (...) {
+      while (true) ::pause();
+    }
+  }
+  ReleasedGil(const ReleasedGil&) = delete;
+  ReleasedGil& operator=(const ReleasedGil&) = delete;
+
+ private:
+  PyThreadState* const state_;
 };
 
 /// A class of Python whose properties are listed as name, docstring and getter.

@@ -32,7 +32,7 @@ py::array read_image(const py::object& path) {
   const std::filesystem::path file = path_argument("path", path);
   decltype(Read(file)) image;
   {
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     image = Read(file);
   }
   if (!image) throw InputError(file.string(), "cannot be read, expected an image file");
@@ -67,7 +67,7 @@ class PythonInput {
     const Turn turn(is_taken_, "Input");
     std::optional<InputFrame> frame;
     {
-      const py::gil_scoped_release release;
+      const ReleasedGil released;
       frame = input_->next();
     }
     if (!frame) throw py::stop_iteration();

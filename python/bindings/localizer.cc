@@ -28,14 +28,14 @@ class PythonLocalizer {
     const Turn turn(is_taken_, "Localizer");
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
     const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     return localizer_.track(input);
   }
 
   TrackingResult locate(const ImageArguments& images, const std::optional<PoseHint>& hint) {
     const Turn turn(is_taken_, "Localizer");
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     return localizer_.locate(frame.input(0), hint);
   }
 
@@ -130,7 +130,7 @@ map's frame. One thread at a time; a second one gets a RuntimeError.)");
                             const py::object& settings,
                             const py::object& seed) {
                   SessionConfig config = read_session_config({cameras, setup, settings, seed});
-                  const py::gil_scoped_release release;
+                  const ReleasedGil released;
                   return std::make_unique<PythonLocalizer>(std::move(config), std::move(map));
                 }),
                 py::arg("map").none(false),

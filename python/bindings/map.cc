@@ -102,13 +102,13 @@ std::shared_ptr<PythonMap> with_images(const PythonMap& self, const py::dict& im
 
 std::shared_ptr<PythonMap> load(const py::object& path) {
   const std::filesystem::path file = path_argument("path", path);
-  const py::gil_scoped_release release;
+  const ReleasedGil released;
   return std::make_shared<PythonMap>(PythonMap{load_map(file)});
 }
 
 void save(const PythonMap& self, const py::object& path) {
   const std::filesystem::path file = path_argument("path", path);
-  const py::gil_scoped_release release;
+  const ReleasedGil released;
   save_map(file, self.stored);
 }
 

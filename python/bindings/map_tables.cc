@@ -104,7 +104,7 @@ std::optional<py::array> landmark_colors(const PythonMap& self) {
   if (self.stored.images.empty()) return std::nullopt;
   std::vector<std::uint8_t> colors;
   {
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     colors = find_colors(self.stored);
   }
   const auto count = static_cast<py::ssize_t>(colors.size() / 3);

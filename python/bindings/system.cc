@@ -40,7 +40,7 @@ class PythonSystem {
     const FrameImages input = frame.input(integer_argument("timestamp_ns", timestamp_ns));
     TrackingResult result;
     {
-      const py::gil_scoped_release release;
+      const ReleasedGil released;
       result = system_.feed(input);
     }
     // The first frame decides.
@@ -50,7 +50,7 @@ class PythonSystem {
 
   void finish() {
     const Turn turn = take();
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     system_.finish();
     is_finished_ = true;
   }
@@ -58,7 +58,7 @@ class PythonSystem {
   void reset() {
     const Turn turn = take();
     expect_unfinished("reset");
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     system_.reset();
     images_.clear();
   }
@@ -109,7 +109,7 @@ class PythonSystem {
 
   void save(const std::filesystem::path& path) {
     const std::shared_ptr<PythonMap> newest = map();
-    const py::gil_scoped_release release;
+    const ReleasedGil released;
     save_map(path, newest->stored);
   }
 
@@ -149,7 +149,7 @@ std::unique_ptr<PythonSystem> make_system(const py::object& cameras,
                                           std::shared_ptr<PythonMap> map) {
   SessionConfig config = read_session_config({cameras, setup, settings, seed});
   const Timing mode = timing_argument(timing);
-  const py::gil_scoped_release release;
+  const ReleasedGil released;
   return std::make_unique<PythonSystem>(std::move(config), mode, std::move(map));
 }
 

@@ -189,6 +189,20 @@ class Results(Test):
         done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
         self.assertEqual((done.returncode, done.stderr), (0, ""))
 
+    def test_left_by_a_daemon_thread(self):
+        """The interpreter ends while a thread is in feed(), and does not wait for it."""
+        program = ("import threading, waymark; frames = list(waymark.open_input(%r))\n"
+                   "system, has_begun = waymark.System(%r, timing='inline'), threading.Event()\n"
+                   "def feed():\n"
+                   "    for frame in frames:\n"
+                   "        system.feed(frame.timestamp_ns, frame.image0, frame.image1)\n"
+                   "        has_begun.set()\n"
+                   "threading.Thread(target=feed, daemon=True).start(); has_begun.wait()"
+                   % (str(DATA / "stereo"), str(camchain())))
+        for _ in range(3):
+            done = subprocess.run([sys.executable, "-c", program], capture_output=True, text=True, timeout=60)
+            self.assertEqual((done.returncode, done.stderr), (0, ""))
+
 
 class WrongArguments(Test):
     def setUp(self):
