@@ -79,7 +79,14 @@ class ReleasedGil {
 template <class T, class... Options>
 class Class : public py::class_<T, Options...> {
  public:
-  using py::class_<T, Options...>::class_;
+  Class(py::module_& module, const char* name, const char* about)
+      : py::class_<T, Options...>(module, name, about) {
+    // What __new__() alone made has no content: else pybind11 gives it memory that nobody filled.
+    py::detail::get_type_info(typeid(T))->operator_new = [](std::size_t) -> void* {
+      const std::string type = py::str(py::type::of<T>().attr("__name__"));
+      throw py::type_error(type + ": was made by __new__() alone, expected a whole one");
+    };
+  }
 
   template <class... Arguments>
   Class& def(Arguments&&... arguments) {

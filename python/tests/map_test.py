@@ -186,6 +186,40 @@ class MapFiles(Test):
             waymark.Map()
 
 
+class WithoutContent(Test):
+    """What __new__() alone made is refused by whatever takes it."""
+
+    def test_members(self):
+        classes = [value for value in vars(waymark).values()
+                   if isinstance(value, type) and not issubclass(value, Exception)]
+        self.assertGreater(len(classes), 15)
+        for cls in classes:
+            for name, member in vars(cls).items():
+                with self.subTest(f"{cls.__name__}.{name}"):
+                    if isinstance(member, property):
+                        self.assert_raises(TypeError, "__new__", getattr, cls.__new__(cls), name)
+                    elif name in ("__len__", "__repr__", "__next__", "finish", "map", "submaps", "keyframes"):
+                        self.assert_raises(TypeError, "__new__", member, cls.__new__(cls))
+
+    def test_arguments(self):
+        bare = {name: cls.__new__(cls) for name, cls in vars(waymark).items() if isinstance(cls, type)}
+        loaded = waymark.Map.load(FILE)
+        frame = frames()[0]
+        for function, arguments in ((waymark.System, [bare["Calibration"]]),
+                                    (waymark.Localizer, [loaded, bare["Calibration"]]),
+                                    (waymark.Calibration, [bare["Calibration"]]),
+                                    (waymark.open_input, [DATA / "stereo", bare["Calibration"]]),
+                                    (bare["System"].feed, [0, frame.image0, frame.image1]),
+                                    (bare["System"].save, [self.folder / "a.wmap"]),
+                                    (bare["Map"].save, [self.folder / "a.wmap"]),
+                                    (bare["Localizer"].track, [0, frame.image0, frame.image1])):
+            self.assert_raises(TypeError, "__new__", function, *arguments)
+        with self.assertRaises(RuntimeError):  # Of pybind11, for what is kept by a shared pointer.
+            waymark.System(camchain(), map=bare["Map"])
+        with self.assertRaises(RuntimeError):
+            waymark.Localizer(bare["Map"], camchain())
+
+
 class Cameras(Test):
     def test_calibration(self):
         calibration = waymark.Calibration(camchain())
