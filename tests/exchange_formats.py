@@ -15,7 +15,7 @@ def pack(value):
     if isinstance(value, float):
         return b"\xcb" + struct.pack(">d", value)
     if isinstance(value, str):
-        data = value.encode()
+        data = value.encode(errors="surrogateescape")
         return b"\xdb" + struct.pack(">I", len(data)) + data
     if isinstance(value, bytes):
         return b"\xc6" + struct.pack(">I", len(value)) + value

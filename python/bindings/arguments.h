@@ -45,9 +45,6 @@ CameraChain read_cameras(py::handle cameras);
 /// "mono", "stereo", "rgbd" or None; ValueError for others.
 std::optional<Setup> setup_argument(py::handle setup);
 
-/// A str or os.PathLike; TypeError for others.
-std::filesystem::path path_argument(const char* name, py::handle path);
-
 /// The images of a moment as Python gives them; any but the first may be None.
 struct ImageArguments {
   py::object image0;

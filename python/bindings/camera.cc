@@ -12,6 +12,7 @@
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "texts.h"
 #include "waymark/camera/rig.h"
 
 namespace waymark::python {
@@ -57,7 +58,7 @@ void bind_one_camera(py::module_& module) {
 Its frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-left pixel.)")
       .get("model",
            "str: for example 'pinhole'.",
-           [](auto& self) { return std::string(self.camera->model()); })
+           [](auto& self) { return text_of(self.camera->model()); })
       .get("width_px", "int.", [](auto& self) { return self.camera->width_px(); })
       .get("height_px", "int.", [](auto& self) { return self.camera->height_px(); })
       .get("cam_from_rig",
@@ -69,7 +70,7 @@ Its frame: x right, y down, z forward. Pixel (0, 0) is the centre of the top-lef
       .get("distortion_model",
            "str: as in a camchain.",
            [](auto& self) {
-             return self.description.value_or(CameraDescription()).distortion_model;
+             return text_of(self.description.value_or(CameraDescription()).distortion_model);
            })
       .get("distortion_coeffs",
            "list of float: as in a camchain.",
@@ -87,9 +88,9 @@ array (N,), False where a point is not visible, whose pixel then means nothing.)
 Unit bearings of pixels, an array (N, 2). Returns a float64 array (N, 3) and a bool array (N,),
 False where a pixel has none.)")
       .def("__repr__", [](const RigCamera& self) {
-        return "<Camera " + std::string(self.camera->model()) + " of " +
-               std::to_string(self.camera->width_px()) + "x" +
-               std::to_string(self.camera->height_px()) + " px>";
+        return text_of("<Camera " + std::string(self.camera->model()) + " of " +
+                       std::to_string(self.camera->width_px()) + "x" +
+                       std::to_string(self.camera->height_px()) + " px>");
       });
 }
 
@@ -111,7 +112,11 @@ InputError for what is malformed.)")
       .get("depth_factor",
            "float or None: units of the depth image per metre.",
            &CameraChain::depth_factor)
-      .get("notes", "list of str: what was ignored, with its place.", &CameraChain::notes);
+      .get("notes", "list of str: what was ignored, with its place.", [](auto& self) {
+        py::list notes;
+        for (const std::string& note : self.notes) notes.append(text_of(note));
+        return notes;
+      });
 }
 
 }  // namespace waymark::python

@@ -13,6 +13,7 @@
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "texts.h"
 #include "waymark/base/check.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/input.h"

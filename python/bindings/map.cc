@@ -11,6 +11,7 @@
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "texts.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 
@@ -219,8 +220,9 @@ Writes a map file, whole or not at all. OutputError when that fails.)")
            [](auto& self) { return is_metric(self.map()); })
       .get("num_keyframes", "int.", [](auto& self) { return self.map().keyframes().size(); })
       .get("num_landmarks", "int.", [](auto& self) { return self.map().landmarks().size(); })
-      .get(
-          "settings", "str: those used, as YAML.", [](auto& self) { return self.stored.settings; });
+      .get("settings", "str: those used, as YAML.", [](auto& self) {
+        return text_of(self.stored.settings);
+      });
 }
 
 void bind_access(MapClass& map) {

@@ -6,6 +6,7 @@
 #include <pybind11/pybind11.h>
 
 #include "bindings.h"
+#include "texts.h"
 #include "waymark/base/check.h"
 #include "waymark/base/id.h"
 #include "waymark/input/decode.h"
@@ -13,11 +14,33 @@
 namespace waymark::python {
 namespace {
 
+/// Messages may name files and quote texts that are no UTF-8, which py::register_exception() does
+/// not survive.
+template <class Error>
+void bind_error(py::module_& module, const char* name, PyObject* base, const char* about) {
+  static py::handle type;
+  py::exception<Error> made(module, name, base);
+  made.doc() = about;
+  type = made.release();
+  py::register_exception_translator([](std::exception_ptr thrown) {
+    try {
+      if (thrown) std::rethrow_exception(thrown);
+    } catch (const Error& error) {
+      PyErr_SetObject(type.ptr(), text_of(error.what()).ptr());
+    }
+  });
+}
+
 void bind_errors(py::module_& module) {
-  py::object input = py::register_exception<InputError>(module, "InputError", PyExc_ValueError);
-  input.doc() = "Bad input from outside. One line: where, what is wrong, what was expected.";
-  py::object output = py::register_exception<OutputError>(module, "OutputError", PyExc_OSError);
-  output.doc() = "Results cannot be written. One line of the same form.";
+  bind_error<InputError>(
+      module,
+      "InputError",
+      PyExc_ValueError,
+      "Bad input from outside. One line: where, what is wrong, what was expected.");
+  bind_error<OutputError>(module,
+                          "OutputError",
+                          PyExc_OSError,
+                          "Results cannot be written. One line of the same form.");
 }
 
 /// Everything is known to users under the name of the package.

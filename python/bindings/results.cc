@@ -11,6 +11,8 @@
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "texts.h"
+#include "waymark/base/text.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/mapping/focal_check.h"
 #include "waymark/system/system.h"
@@ -109,7 +111,8 @@ void write(const Trajectory& trajectory, const py::object& path, const std::stri
     if (format == to_string(known))
       return write_trajectory(path_argument("path", path), poses, known);
   }
-  throw py::value_error("format: is '" + format + "', expected tum, kitti or euroc");
+  throw py::value_error("format: is " + quote_for_message(format) +
+                        ", expected tum, kitti or euroc");
 }
 
 void bind_trajectory(py::module_& module) {

@@ -4,9 +4,11 @@
 
 #include "arguments.h"
 #include "arrays.h"
+#include "texts.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/base/config_value.h"
+#include "waymark/base/text.h"
 
 namespace waymark::python {
 namespace {
@@ -50,7 +52,7 @@ void add_settings(py::handle settings, std::vector<ConfigSource>& sources) {
   for (const auto& [key, value] : py::reinterpret_borrow<py::dict>(settings)) {
     if (!py::isinstance<py::str>(key)) fail_type("settings", key, "names of settings as keys");
     // As on the command line, which checks the key.
-    ConfigSource source = ConfigSource::from_assignment(py::cast<std::string>(key) + "=");
+    ConfigSource source = ConfigSource::from_assignment(text_argument("settings", key) + "=");
     source.name = "settings";
     source.text = yaml_of(value);
     sources.push_back(std::move(source));
@@ -81,21 +83,15 @@ void limit_cameras(CameraChain& chain, std::optional<Setup>& setup) {
 
 }  // namespace
 
-std::filesystem::path path_argument(const char* name, py::handle path) {
-  if (!py::isinstance<py::str>(path) && !py::hasattr(path, "__fspath__")) {
-    fail_type(name, path, "a path");
-  }
-  return py::cast<std::string>(py::module_::import("os").attr("fspath")(path));
-}
-
 std::optional<Setup> setup_argument(py::handle setup) {
   if (setup.is_none()) return std::nullopt;
   if (!py::isinstance<py::str>(setup)) fail_type("setup", setup, "mono, stereo, rgbd or None");
-  const std::string name = py::cast<std::string>(setup);
+  const std::string name = text_argument("setup", setup);
   for (const Setup known : {Setup::kMono, Setup::kStereo, Setup::kRgbd}) {
     if (name == to_string(known)) return known;
   }
-  throw py::value_error("setup: is '" + name + "', expected mono, stereo, rgbd or None");
+  throw py::value_error("setup: is " + quote_for_message(name) +
+                        ", expected mono, stereo, rgbd or None");
 }
 
 CameraChain read_cameras(py::handle cameras) {

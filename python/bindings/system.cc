@@ -13,6 +13,8 @@
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "texts.h"
+#include "waymark/base/text.h"
 
 namespace waymark::python {
 namespace {
@@ -21,7 +23,8 @@ Timing timing_argument(const std::string& name) {
   if (name == "inline") return Timing::kInline;
   if (name == "lockstep") return Timing::kLockstep;
   if (name == "realtime") return Timing::kRealtime;
-  throw py::value_error("timing: is '" + name + "', expected inline, lockstep or realtime");
+  throw py::value_error("timing: is " + quote_for_message(name) +
+                        ", expected inline, lockstep or realtime");
 }
 
 /// A System with what the arguments of Python need to be understood. Methods that take long let

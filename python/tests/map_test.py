@@ -3,11 +3,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Map: its arrays agree with each other and with what the program wrote."""
 import gc
+import os
+import pathlib
+import sys
 import unittest
 
 import numpy as np
 import waymark
 from support import DATA, Test, camchain, frames, map_stereo
+
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests"))
+import map_records  # noqa: E402
 
 FILE = DATA / "stereo_out/map.wmap"
 
@@ -184,6 +190,29 @@ class MapFiles(Test):
         self.assert_raises(TypeError, "id: ", loaded.keyframe, "0")
         with self.assertRaises(TypeError):
             waymark.Map()
+
+    def test_text_that_is_no_utf8(self):
+        records = map_records.split(FILE.read_bytes())
+        next(record for record in records if record.get("kind") == "map")["settings"] = "a\udcffb"
+        (self.folder / "odd.wmap").write_bytes(map_records.join(records))
+        odd = waymark.Map.load(self.folder / "odd.wmap")
+        self.assertEqual(odd.settings, "a\ufffdb")
+        odd.save(self.folder / "again.wmap")
+        self.assertIn(b"a\xffb", (self.folder / "again.wmap").read_bytes())
+
+    def test_odd_file_names(self):
+        odd = os.fsdecode(bytes(self.folder) + b"/\xff.wmap")
+        loaded = waymark.Map.load(FILE)
+        self.assert_raises(waymark.InputError, "\ufffd.wmap: missing", waymark.Map.load, odd)
+        loaded.save(odd)
+        self.assertEqual(waymark.Map.load(pathlib.Path(odd)).num_keyframes, loaded.num_keyframes)
+        cut = f"{FILE}\0.wmap"
+        system = waymark.System(camchain())
+        for function in (waymark.Map.load, loaded.save, system.save, system.trajectory().write,
+                         waymark.open_input, waymark.read_grey_image, waymark.read_depth_image,
+                         waymark.Calibration, waymark.System):
+            self.assert_raises(ValueError, "embedded null byte", function, cut)
+        self.assert_raises(ValueError, "format: ", system.trajectory().write, FILE, "tum\0")
 
 
 class WithoutContent(Test):

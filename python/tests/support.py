@@ -41,5 +41,6 @@ class Test(unittest.TestCase):
         self.assertIs(type(caught.exception), error)
         message = str(caught.exception)
         self.assertNotIn("\n", message)
+        self.assertNotIn("\0", message)
         for word in [words] if isinstance(words, str) else words:
             self.assertIn(word, message)
