@@ -16,21 +16,35 @@ namespace {
 constexpr const char* kExpectedCameras =
     "the path of a camchain, a dict with the same content, several of these, or a Calibration";
 
+constexpr int kMaxNesting = 8;
+
 /// YAML of a value of Python's: JSON is YAML.
-std::string yaml_of(py::handle value) {
-  const py::cpp_function numpy_values([](const py::object& object) -> py::object {
-    if (!py::hasattr(object, "tolist")) fail_type("settings", object, "what YAML can hold");
+std::string yaml_of(const char* name, py::handle value) {
+  const py::cpp_function numpy_values([name](const py::object& object) -> py::object {
+    if (!py::hasattr(object, "tolist")) fail_type(name, object, "what YAML can hold");
     return object.attr("tolist")();
   });
   const py::object json = py::module_::import("json").attr("dumps");
-  return py::cast<std::string>(json(value, py::arg("default") = numpy_values));
+  try {
+    return text_argument(name, json(value, py::arg("default") = numpy_values));
+  } catch (const py::error_already_set& error) {
+    const bool is_endless = error.matches(PyExc_RecursionError);  // Or too deep, which is the same.
+    if (!is_endless && !error.matches(PyExc_ValueError)) throw;
+    const std::string why = text_argument(name, py::str(error.value()));
+    throw InputError(name, "cannot be written down (" + why + "), expected what YAML can hold");
+  }
 }
 
-void add_sources(py::handle cameras, std::vector<ConfigSource>& sources) {
+void add_sources(py::handle cameras, std::vector<ConfigSource>& sources, int nesting = 0) {
+  if (nesting > kMaxNesting) {
+    throw InputError("cameras",
+                     "are lists nested deeper than " + std::to_string(kMaxNesting) + ", expected " +
+                         kExpectedCameras);
+  }
   if (py::isinstance<py::dict>(cameras)) {
-    sources.push_back({"cameras", yaml_of(cameras)});
+    sources.push_back({"cameras", yaml_of("cameras", cameras)});
   } else if (py::isinstance<py::list>(cameras) || py::isinstance<py::tuple>(cameras)) {
-    for (const py::handle part : cameras) add_sources(part, sources);
+    for (const py::handle part : cameras) add_sources(part, sources, nesting + 1);
   } else if (py::isinstance<py::str>(cameras) || py::hasattr(cameras, "__fspath__")) {
     sources.push_back(ConfigSource::from_file(path_argument("cameras", cameras)));
   } else {
@@ -54,7 +68,7 @@ void add_settings(py::handle settings, std::vector<ConfigSource>& sources) {
     // As on the command line, which checks the key.
     ConfigSource source = ConfigSource::from_assignment(text_argument("settings", key) + "=");
     source.name = "settings";
-    source.text = yaml_of(value);
+    source.text = yaml_of("settings", value);
     sources.push_back(std::move(source));
   }
 }

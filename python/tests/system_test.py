@@ -266,6 +266,13 @@ class WrongArguments(Test):
 
     def test_constructor(self):
         make = waymark.System
+        endless, deep = [], 1
+        endless.append(endless)
+        for _ in range(100000):
+            deep = [deep]
+        for cameras in (endless, deep, [[[deep]], endless], ((endless,),)):
+            self.assert_raises(waymark.InputError, ["cameras: ", "nested"], make, cameras)
+        self.assert_raises(waymark.InputError, ["cameras: ", "recursion"], make, {"cam0": deep})
         self.assert_raises(TypeError, "cameras: ", make, None)
         self.assert_raises(TypeError, "cameras: ", make, 3)
         self.assert_raises(waymark.InputError, "no camera", make, {})
@@ -281,6 +288,11 @@ class WrongArguments(Test):
                 ({"settings": {3: 1}}, TypeError, "names"), ({"settings": "x"}, TypeError, "dict"),
                 ({"settings": {"features.count": float("nan")}}, waymark.InputError, "NaN"),
                 ({"settings": {"features.count": object()}}, TypeError, "YAML"),
+                ({"settings": {"features.count": endless}}, waymark.InputError, ["settings: ", "Circular"]),
+                ({"settings": {"features": deep}}, waymark.InputError, ["settings: ", "recursion"]),
+                ({"settings": {"\udcff": 1}}, ValueError, "whole characters"),
+                ({"setup": "mono\0x"}, ValueError, "'mono?x'"), ({"setup": "\udcff"}, ValueError, "setup"),
+                ({"timing": "inline\0"}, ValueError, "'inline?'"),
                 ({"seed": -1}, waymark.InputError, "seed"), ({"seed": 0.5}, TypeError, "seed")):
             self.assert_raises(error, words, make, camchain(), **options)
         self.assert_raises(waymark.InputError, "one camera", make, camchain("rgbd"), setup="stereo")
