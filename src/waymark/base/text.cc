@@ -119,6 +119,12 @@ std::string format_seconds(std::int64_t timestamp_ns) {
                      magnitude_ns % 1'000'000'000u);
 }
 
+std::string format_decimals(double value, int num_decimals) {
+  std::string text = fmt::format("{:.{}f}", value, num_decimals);
+  if (text.find_first_not_of("-0.") == std::string::npos && text.front() == '-') text.erase(0, 1);
+  return text;
+}
+
 RowReader::RowReader(std::string_view text, std::string name, char separator)
     : rest_(text), name_(std::move(name)), separator_(separator) {
   constexpr std::string_view kByteOrderMark = "\xEF\xBB\xBF";

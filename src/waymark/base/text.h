@@ -28,6 +28,12 @@ std::optional<std::int64_t> parse_seconds(std::string_view text);
 /// Nanoseconds as seconds with exactly 9 decimals; parse_seconds() gives the same value back.
 std::string format_seconds(std::int64_t timestamp_ns);
 
+/// A number as texts are to show it: zero has no sign.
+inline double unsigned_zero(double value) { return value == 0.0 ? 0.0 : value; }
+
+/// A number with so many decimals; what rounds to zero has no sign.
+std::string format_decimals(double value, int num_decimals);
+
 /// Reads rows of fields from text that came from outside. Blank lines and lines that start with '#'
 /// are passed over; every error is an InputError that names file, line and what was expected.
 class RowReader {

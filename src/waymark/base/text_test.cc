@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
 #include "waymark/base/testing/errors.h"
@@ -70,6 +72,16 @@ TEST(FormatSeconds, IsTheInverseOfParsing) {
     const std::int64_t time_ns = static_cast<std::int64_t>(rng.next() >> 1) * (i % 2 ? 1 : -1);
     EXPECT_THAT(parse_seconds(format_seconds(time_ns)), Optional(time_ns));
   }
+}
+
+TEST(FormatDecimals, GivesZeroNoSign) {
+  EXPECT_EQ(format_decimals(-1.5, 3), "-1.500");
+  EXPECT_EQ(format_decimals(-0.0006, 3), "-0.001");
+  EXPECT_EQ(format_decimals(-0.0004, 3), "0.000");
+  EXPECT_EQ(format_decimals(-0.0, 9), "0.000000000");
+  EXPECT_EQ(format_decimals(-0.4, 0), "0");
+  EXPECT_FALSE(std::signbit(unsigned_zero(-0.0)));
+  EXPECT_EQ(unsigned_zero(-1e-300), -1e-300);
 }
 
 TEST(ParseNumber, WantsTheWholeTextAndFiniteValues) {

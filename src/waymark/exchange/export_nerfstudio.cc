@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/exchange/exports.h"
 
 namespace waymark {
@@ -58,6 +59,7 @@ Json transform_of(const ExportView& view) {
   Eigen::Matrix4d matrix = view.cam_from_world.inverse().matrix();
   matrix.col(1) = -matrix.col(1);
   matrix.col(2) = -matrix.col(2);
+  matrix = matrix.unaryExpr(&unsigned_zero).eval();
   Json rows = Json::array();
   for (int row = 0; row < 4; ++row) {
     rows.push_back({matrix(row, 0), matrix(row, 1), matrix(row, 2), matrix(row, 3)});

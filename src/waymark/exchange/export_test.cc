@@ -118,7 +118,9 @@ TEST(ExportPly, HoldsThePointsWithTheirColours) {
 /// OpenGL's camera: x right, y up, looking along -z.
 TEST(ExportNerfstudio, ShowsPointsWhereTheKeyframesDo) {
   const ExportScene scene = make_export_scene(small_map("plain"), SubmapId{0});
-  const auto json = nlohmann::json::parse(format_nerfstudio(scene, {}));
+  const std::string text = format_nerfstudio(scene, {});
+  EXPECT_EQ(text.find("-0.0,"), std::string::npos) << "zero has no sign";
+  const auto json = nlohmann::json::parse(text);
   EXPECT_EQ(json["camera_model"], "OPENCV");
   EXPECT_EQ(json["ply_file_path"], "points.ply");
   EXPECT_EQ(json["w"], 640);

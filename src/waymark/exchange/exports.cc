@@ -12,6 +12,7 @@
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
@@ -116,13 +117,13 @@ std::string format_images_text(const ExportScene& scene) {
     fmt::format_to(std::back_inserter(text),
                    "{} {} {} {} {} {} {} {} {} {}\n",
                    i + 1,
-                   q.w(),
-                   q.x(),
-                   q.y(),
-                   q.z(),
-                   t.x(),
-                   t.y(),
-                   t.z(),
+                   unsigned_zero(q.w()),
+                   unsigned_zero(q.x()),
+                   unsigned_zero(q.y()),
+                   unsigned_zero(q.z()),
+                   unsigned_zero(t.x()),
+                   unsigned_zero(t.y()),
+                   unsigned_zero(t.z()),
                    view.camera + 1,
                    view.name);
     for (std::size_t k = 0; k < view.pixels.size(); ++k) {
@@ -169,9 +170,9 @@ std::string format_points_text(const ExportScene& scene) {
     fmt::format_to(std::back_inserter(text),
                    "{} {} {} {} {} {} {} {}",
                    std::int64_t{point.landmark.value} + 1,
-                   x.x(),
-                   x.y(),
-                   x.z(),
+                   unsigned_zero(x.x()),
+                   unsigned_zero(x.y()),
+                   unsigned_zero(x.z()),
                    point.color[0],
                    point.color[1],
                    point.color[2],

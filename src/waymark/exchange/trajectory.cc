@@ -8,6 +8,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <array>
+#include <initializer_list>
 #include <iterator>
 
 #include "waymark/base/atomic_file.h"
@@ -53,26 +54,29 @@ Eigen::Quaterniond checked_rotation(const RowReader& rows, const Eigen::Matrix3d
 void append_pose(std::string& text, const StampedPose& pose, TrajectoryFormat format) {
   const Eigen::Vector3d& t = pose.world_from_camera.translation;
   const Eigen::Quaterniond& q = pose.world_from_camera.rotation;
-  auto out = std::back_inserter(text);
+  const auto append = [&](char separator, std::initializer_list<double> numbers) {
+    for (const double number : numbers) text += separator + format_decimals(number, 9);
+  };
   switch (format) {
     case TrajectoryFormat::kTum:
-      fmt::format_to(
-          out, "{} {:.9f} {:.9f} {:.9f} ", format_seconds(pose.timestamp_ns), t.x(), t.y(), t.z());
-      fmt::format_to(out, "{:.9f} {:.9f} {:.9f} {:.9f}\n", q.x(), q.y(), q.z(), q.w());
+      text += format_seconds(pose.timestamp_ns);
+      append(' ', {t.x(), t.y(), t.z(), q.x(), q.y(), q.z(), q.w()});
+      text += '\n';
       return;
     case TrajectoryFormat::kEuroc:
-      fmt::format_to(out, "{},{:.9f},{:.9f},{:.9f},", pose.timestamp_ns, t.x(), t.y(), t.z());
-      fmt::format_to(out, "{:.9f},{:.9f},{:.9f},{:.9f}\n", q.w(), q.x(), q.y(), q.z());
+      text += std::to_string(pose.timestamp_ns);
+      append(',', {t.x(), t.y(), t.z(), q.w(), q.x(), q.y(), q.z()});
+      text += '\n';
       return;
     case TrajectoryFormat::kKitti: {
       const Eigen::Matrix3d r = q.toRotationMatrix();
       for (int i = 0; i < 3; ++i) {
-        fmt::format_to(out,
+        fmt::format_to(std::back_inserter(text),
                        "{:.9e} {:.9e} {:.9e} {:.9e}{}",
-                       r(i, 0),
-                       r(i, 1),
-                       r(i, 2),
-                       t(i),
+                       unsigned_zero(r(i, 0)),
+                       unsigned_zero(r(i, 1)),
+                       unsigned_zero(r(i, 2)),
+                       unsigned_zero(t(i)),
                        i < 2 ? ' ' : '\n');
       }
       return;

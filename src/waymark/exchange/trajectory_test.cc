@@ -69,6 +69,18 @@ TEST(Trajectory, WritesTheDocumentedColumns) {
   EXPECT_LT((back.at(0).rotation_matrix() - r).norm(), 1e-8);
 }
 
+TEST(Trajectory, WritesZeroWithoutASign) {
+  const Rigid3 pose(Eigen::Quaterniond(1.0, -0.0, -1e-12, -0.0), {-0.0, -1e-10, -0.0});
+  for (TrajectoryFormat format : {TrajectoryFormat::kTum, TrajectoryFormat::kEuroc}) {
+    const std::string text = format_trajectory(std::vector<StampedPose>{{0, pose}}, format);
+    EXPECT_EQ(text.find("-0.0"), std::string::npos) << text;
+  }
+  const Rigid3 origin(Eigen::Quaterniond(1.0, -0.0, -0.0, -0.0), {-0.0, -0.0, -0.0});
+  const std::string text =
+      format_trajectory(std::vector<StampedPose>{{0, origin}}, TrajectoryFormat::kKitti);
+  EXPECT_EQ(text.find("-0.0"), std::string::npos) << text;
+}
+
 TEST(Trajectory, IsSortedByTime) {
   const TemporaryFolder folder;
   folder.write("t.txt", "2 0 0 0 0 0 0 1\n1 5 0 0 0 0 0 1\n2 9 0 0 0 0 0 1\n");

@@ -11,6 +11,7 @@
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/exchange/trajectory.h"
 
 namespace waymark {
@@ -44,7 +45,8 @@ std::string size_of(const CameraDescription& camera) {
 
 std::string format_sensor(const ChainCamera& camera, double rate_hz) {
   const CameraDescription& description = camera.description;
-  const Eigen::Matrix4d body_from_sensor = camera.cam_from_rig.inverse().matrix();
+  const Eigen::Matrix4d body_from_sensor =
+      camera.cam_from_rig.inverse().matrix().unaryExpr(&unsigned_zero);
   std::vector<double> coefficients = description.distortion_coeffs;
   if (coefficients.empty()) coefficients.assign(4, 0.0);
   std::string text = "sensor_type: camera\nT_BS:\n  cols: 4\n  rows: 4\n";
@@ -55,10 +57,6 @@ std::string format_sensor(const ChainCamera& camera, double rate_hz) {
   text += "distortion_model: radial-tangential\n";
   text += fmt::format("distortion_coefficients: {}\n", numbers(coefficients));
   return text;
-}
-
-std::string format_seconds(std::int64_t timestamp_ns) {
-  return fmt::format("{}.{:09}", timestamp_ns / 1'000'000'000, timestamp_ns % 1'000'000'000);
 }
 
 template <class T>
