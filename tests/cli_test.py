@@ -126,6 +126,16 @@ class Inputs(CliTest):
     def test_image_folder(self):
         self.assert_maps(self.image_folder(), "-c", self.folder / "camchain.yaml")
 
+    def test_a_third_camera_is_said_to_be_ignored(self):
+        source = self.sequence("stereo")
+        chain = (source / "camchain.yaml").read_text()
+        third = self.config(chain + chain[chain.index("cam1:"):].replace("cam1:", "cam2:"))
+        note = "note: %s:%d: cam2 is ignored" % (third, chain.count("\n") + 1)
+        done = self.run_on(source, "-c", third, "--frames", 2)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(note, done.stderr)
+        self.assertIn(note, waymark("config", third).stdout)
+
     def test_video(self):
         source, video = self.image_folder(), self.folder / "walk.mkv"
         subprocess.run(["ffmpeg", "-v", "error", "-framerate", "20", "-i", source / "%06d.png",

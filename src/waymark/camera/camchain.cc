@@ -18,6 +18,7 @@ namespace {
 constexpr double kMaxRotationError = 1e-3;
 constexpr double kMaxLastRowError = 1e-9;
 constexpr std::size_t kMaxCameras = 16;
+constexpr std::size_t kMaxUsedCameras = 2;  // Of a stereo pair.
 
 bool is_camera_key(std::string_view key) {
   return key.size() > 3 && key.starts_with("cam") &&
@@ -149,6 +150,10 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
           fmt::format("{} is {}, expected a section of KEY: VALUE", name, describe_value(*camera)));
     }
     check_keys(*camera, name, chain);
+    if (chain.cameras.size() >= kMaxUsedCameras) {
+      chain.notes.push_back(
+          fmt::format("{}: {} is ignored, cam0 and cam1 at most are used", camera->where(), name));
+    }
     const CameraDescription description = read_description(*camera, name);
     chain.cameras.push_back({description, read_cam_from_rig(*camera, name, chain)});
   }

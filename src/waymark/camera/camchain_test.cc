@@ -13,6 +13,7 @@
 namespace waymark {
 namespace {
 
+using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
@@ -117,6 +118,8 @@ TEST(Camchain, TransformationsChain) {
       read(one_camera("") + "cam1: {" + kPlain + step + "}\ncam2: {" + kPlain + step + "}\n");
   ASSERT_TRUE(chain);
   ASSERT_EQ(chain->cameras.size(), 3u);
+  EXPECT_THAT(chain->notes,
+              ElementsAre("a.yaml:3: cam2 is ignored, cam0 and cam1 at most are used"));
   // Two quarter turns about z, each followed by half a metre along x.
   const Eigen::Vector3d point = chain->cameras[2].cam_from_rig * Eigen::Vector3d(1.0, 2.0, 3.0);
   EXPECT_LT((point - Eigen::Vector3d(-0.5, -1.5, 3.0)).norm(), 1e-12);
