@@ -12,6 +12,7 @@
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/exchange/export_folder.h"
 #include "waymark/exchange/export_scene.h"
 #include "waymark/exchange/export_split.h"
 #include "waymark/exchange/exports.h"
@@ -30,6 +31,10 @@ struct ExportOptions {
   bool is_text = false;
   int split_views = 0;  ///< 0: as they are.
 };
+
+bool makes_folder(ExportFormat format) {
+  return format == ExportFormat::kColmap || format == ExportFormat::kNerfstudio;
+}
 
 /// "points.ply", "points_1.ply" and so on.
 std::filesystem::path numbered(std::filesystem::path path, std::size_t number) {
@@ -94,18 +99,32 @@ void export_submap(const ExportOptions& options,
   }
 }
 
+void export_submaps(const ExportOptions& options,
+                    const StoredMap& stored,
+                    const std::vector<SubmapId>& submaps) {
+  for (std::size_t i = 0; i < submaps.size(); ++i) export_submap(options, stored, submaps[i], i);
+}
+
 int export_map(const ExportOptions& options) {
   const StoredMap stored = load_map(options.map);
   const std::vector<SubmapId> submaps = submaps_by_size(*stored.map);
   if (submaps.empty()) {
     throw InputError(options.map.string(), "has no keyframes, expected some to export");
   }
-  for (std::size_t i = 0; i < submaps.size(); ++i) export_submap(options, stored, submaps[i], i);
+  if (makes_folder(options.format)) {
+    ExportFolder folder(options.out);
+    ExportOptions unfinished = options;
+    unfinished.out = folder.unfinished();
+    export_submaps(unfinished, stored, submaps);
+    folder.finish();
+  } else {
+    export_submaps(options, stored, submaps);
+  }
   print_result("{} sub-map{} of {} to {}\n",
-               submaps.size(),
-               submaps.size() == 1 ? "" : "s",
-               options.map.string(),
-               options.out.string());
+             submaps.size(),
+             submaps.size() == 1 ? "" : "s",
+             options.map.string(),
+             options.out.string());
   if (stored.images.empty() && options.format != ExportFormat::kTum &&
       options.format != ExportFormat::kKitti) {
     print_message("note: the map holds no images (run --keep-images); points are grey\n");

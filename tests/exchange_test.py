@@ -53,9 +53,8 @@ class Exchange(CliTest):
         return self.folder / name
 
     def colmap_models(self):
-        folder = self.export("colmap", "colmap") / "sparse" / "0"
-        self.export("colmap", "colmap", "--text")
-        return [ColmapModel(folder, suffix) for suffix in (".bin", ".txt")]
+        return [ColmapModel(self.export("colmap", f"colmap{form}", *form) / "sparse" / "0", suffix)
+                for suffix, form in ((".bin", []), (".txt", ["--text"]))]
 
     def real_map(self):
         if "WAYMARK_DATA" not in os.environ:
@@ -101,6 +100,16 @@ class Export(Exchange):
         self.assertEqual(len(read_ply(folder / transforms["ply_file_path"])), 40)
         last = transforms["frames"][2]["transform_matrix"]
         self.assertEqual(last, [[1, 0, 0, 0.4], [0, -1, 0, 0], [0, 0, -1, 0], [0, 0, 0, 1]])
+
+    def test_an_earlier_export_is_replaced(self):
+        document = small_msg()
+        document["cameras"]["cam"].update(model_type="Fisheye", k4=0.0)
+        self.import_map(document)
+        folder = self.export("colmap", "again", "--text", "--split-views", 5)
+        (folder / "sparse" / "0" / "mine.txt").write_text("mine")
+        self.export("colmap", "again")
+        self.assertEqual({path.name for path in (folder / "sparse" / "0").iterdir()},
+                         {"cameras.bin", "images.bin", "points3D.bin", "mine.txt"})
 
     def test_split_views(self):
         document = small_msg()
