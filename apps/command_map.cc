@@ -57,13 +57,15 @@ void print_rigs(const Map& map) {
   for (std::size_t i = 0; i < rigs.size(); ++i) {
     for (std::size_t j = 0; j < rigs[i]->cameras.size(); ++j) {
       const CameraDescription& camera = rigs[i]->cameras[j].description.value();
-      print_result("rig {}, camera {}: {}, distortion {}, {}x{} px\n",
-                   i,
-                   j,
-                   camera.camera_model,
-                   camera.distortion_model,
-                   camera.width_px,
-                   camera.height_px);
+      const bool is_known = rigs[i]->cameras[j].camera->can_project();
+      print_result("rig {}, camera {}: {}{}, distortion {}, {}x{} px\n",
+                 i,
+                 j,
+                 camera.camera_model,
+                 is_known ? "" : " (unknown model)",
+                 camera.distortion_model,
+                 camera.width_px,
+                 camera.height_px);
     }
   }
 }

@@ -2,9 +2,11 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """The contract of the command line where it uses saved maps."""
+import re
 import shutil
 import unittest
 
+import map_records
 from cli_support import CAMERA, NUM_FRAMES, CliTest, png_size, truncate, waymark, write_png
 
 
@@ -73,6 +75,37 @@ class SavedMap(CliTest):
         self.assertEqual(len(keyframes), summary["keyframes"])
         before = [k for k in keyframes if float(k.split()[0]) * 1e9 < int(first_half) - 1000]
         self.assertGreater(len(before), 0)
+
+    def export(self, kind):
+        out = self.folder / f"export_{kind}"
+        return out, waymark("export", self.map, "--format", kind, "-o", out)
+
+    def test_a_map_of_a_camera_model_of_ones_own(self):
+        """What needs no projection works without the model; the rest says what is missing."""
+        source = self.save_map("mono")
+        points = {}
+        for model in ("pinhole", "mirror"):
+            records = map_records.split(self.map.read_bytes())
+            next(r for r in records if r.get("kind") == "camera")["camera_model"] = model
+            self.map.write_bytes(map_records.join(records))
+            for kind in ("ply", "tum", "kitti"):
+                out, done = self.export(kind)
+                self.assertEqual(done.returncode, 0, done.stderr)
+            header = (self.folder / "export_ply").read_bytes().split(b"end_header")[0].decode()
+            points[model] = int(re.search("element vertex (.*)", header)[1])
+        self.assertGreater(points["mirror"], 0.98 * points["pinhole"])
+        self.assertEqual(waymark("map", "check", self.map).stdout, f"{self.map}: sound\n")
+        self.assertIn("mirror (unknown model), distortion radtan", waymark("map", "info", self.map).stdout)
+        out, done = self.export("colmap")
+        self.assert_fails(done, 2, "mirror")
+        self.assertFalse(out.exists())
+        missing = f"{self.map}: camera 0: camera_model is mirror, expected one of: "
+        self.assert_fails(self.localize(source, "-c", source / "camchain.yaml"), 2, missing)
+        self.assert_fails(self.run_on(source, "-c", source / "camchain.yaml", "--map-in", self.map), 2, missing)
+        aligned = self.folder / "aligned.wmap"
+        done = waymark("map", "align", self.map, "--up", "0,-1,0", "-o", aligned)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("mirror", waymark("map", "info", aligned).stdout)
 
     def test_maps_that_cannot_be_used(self):
         source = self.sequence("stereo")

@@ -200,6 +200,19 @@ class MapFiles(Test):
         odd.save(self.folder / "again.wmap")
         self.assertIn(b"a\xffb", (self.folder / "again.wmap").read_bytes())
 
+    def test_camera_of_an_unknown_model(self):
+        records = map_records.split(FILE.read_bytes())
+        next(record for record in records if record.get("kind") == "camera")["camera_model"] = "mirror"
+        (self.folder / "mirror.wmap").write_bytes(map_records.join(records))
+        kept = waymark.Map.load(self.folder / "mirror.wmap")
+        self.assertEqual(len(kept.landmark_colors()), kept.num_landmarks)
+        camera = kept.keyframe(0).cameras[0]
+        self.assertEqual((camera.model, camera.width_px), ("mirror", 376))
+        missing = "camera_model is mirror, expected one of: "
+        self.assert_raises(waymark.InputError, missing, camera.project, [[0, 0, 1]])
+        self.assert_raises(waymark.InputError, missing, waymark.System, camchain(), map=kept)
+        self.assert_raises(waymark.InputError, missing, waymark.Localizer, kept, camchain())
+
     def test_odd_file_names(self):
         odd = os.fsdecode(bytes(self.folder) + b"/\xff.wmap")
         loaded = waymark.Map.load(FILE)

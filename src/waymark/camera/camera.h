@@ -49,6 +49,10 @@ class Camera {
                          std::span<Eigen::Vector3d> bearings,
                          std::span<std::uint8_t> is_valid) const = 0;
 
+  /// False only for a camera of a map whose model is unknown here (UnknownCamera): then the
+  /// functions above throw InputError.
+  virtual bool can_project() const { return true; }
+
   /// Width after which columns repeat (360 degree images), or 0.
   virtual double wrap_width_px() const { return 0.0; }
 

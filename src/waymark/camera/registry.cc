@@ -12,11 +12,13 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/camera/division.h"
 #include "waymark/camera/equirectangular.h"
 #include "waymark/camera/fisheye.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/camera/unified.h"
+#include "waymark/camera/unknown_camera.h"
 
 namespace waymark {
 namespace {
@@ -24,6 +26,7 @@ namespace {
 constexpr int kMinSizePx = 16;
 constexpr int kMaxSizePx = 20000;
 constexpr std::size_t kLongestMessage = 1000;
+constexpr std::size_t kLongestName = 100;
 
 void expect_finite(const CameraDescription& description,
                    std::string_view name,
@@ -33,6 +36,26 @@ void expect_finite(const CameraDescription& description,
       description.fail(fmt::format("{} holds {}, expected finite numbers", name, value));
     }
   }
+}
+
+/// What all models share.
+void expect_sound_numbers(const CameraDescription& description) {
+  const auto is_good_size = [](int size) { return size >= kMinSizePx && size <= kMaxSizePx; };
+  if (!is_good_size(description.width_px) || !is_good_size(description.height_px)) {
+    description.fail(fmt::format("resolution is [{}, {}], expected width and height from {} to {}",
+                                 description.width_px,
+                                 description.height_px,
+                                 kMinSizePx,
+                                 kMaxSizePx));
+  }
+  expect_finite(description, "intrinsics", description.intrinsics);
+  expect_finite(description, "distortion_coeffs", description.distortion_coeffs);
+}
+
+/// A word that can be shown as it is.
+bool is_name(std::string_view text) {
+  return !text.empty() && text.size() <= kLongestName &&
+         std::ranges::all_of(text, [](char c) { return c > 0x20 && c < 0x7F; });
 }
 
 // Part of the image that may lie beyond a field of view of less than 180 degrees: extreme corners,
@@ -238,25 +261,31 @@ std::shared_ptr<const Camera> CameraRegistry::make_camera(
     const CameraDescription& description) const {
   const auto factory = factories_.find(description.camera_model);
   if (factory == factories_.end()) {
-    std::vector<std::string> names;
-    for (const auto& [name, unused] : factories_) names.push_back(name);
-    description.fail(fmt::format("camera_model is {}, expected one of: {}",
-                                 description.camera_model,
-                                 fmt::join(names, ", ")));
+    description.fail(
+        fmt::format("camera_model is {}, {}", description.camera_model, expected_models()));
   }
-  const auto is_good_size = [](int size) { return size >= kMinSizePx && size <= kMaxSizePx; };
-  if (!is_good_size(description.width_px) || !is_good_size(description.height_px)) {
-    description.fail(fmt::format("resolution is [{}, {}], expected width and height from {} to {}",
-                                 description.width_px,
-                                 description.height_px,
-                                 kMinSizePx,
-                                 kMaxSizePx));
-  }
-  expect_finite(description, "intrinsics", description.intrinsics);
-  expect_finite(description, "distortion_coeffs", description.distortion_coeffs);
+  expect_sound_numbers(description);
   std::shared_ptr<const Camera> camera = factory->second(description);
   WAYMARK_CHECK(camera != nullptr);
   return camera;
+}
+
+std::shared_ptr<const Camera> CameraRegistry::make_stored_camera(
+    const CameraDescription& description) const {
+  const std::string& model = description.camera_model;
+  if (factories_.contains(model) || !is_name(model)) return make_camera(description);
+  if (!is_name(description.distortion_model)) {
+    description.fail(fmt::format("distortion_model is {}, expected the name of one",
+                                 quote_for_message(description.distortion_model)));
+  }
+  expect_sound_numbers(description);
+  return std::make_shared<const UnknownCamera>(description, expected_models());
+}
+
+std::string CameraRegistry::expected_models() const {
+  std::vector<std::string> names;
+  for (const auto& [name, unused] : factories_) names.push_back(name);
+  return fmt::format("expected one of: {}", fmt::join(names, ", "));
 }
 
 void expect_intrinsics(const CameraDescription& description, std::string_view names) {

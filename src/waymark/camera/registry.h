@@ -27,8 +27,13 @@ class CameraRegistry {
 
   /// Checks what all models share (resolution, finite numbers) and calls the model's factory.
   std::shared_ptr<const Camera> make_camera(const CameraDescription& description) const;
+  /// The same for a camera of a map, whose model may be unknown here: then one that cannot
+  /// project.
+  std::shared_ptr<const Camera> make_stored_camera(const CameraDescription& description) const;
 
  private:
+  std::string expected_models() const;
+
   std::map<std::string, CameraFactory, std::less<>> factories_;
 };
 

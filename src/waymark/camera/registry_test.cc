@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "waymark/base/check.h"
+#include "waymark/base/testing/errors.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/camera/rig.h"
@@ -17,6 +18,7 @@ namespace {
 
 using ::testing::AllOf;
 using ::testing::HasSubstr;
+using testing::input_error_of;
 using ::testing::StartsWith;
 
 CameraDescription euroc() {
@@ -240,6 +242,32 @@ TEST(CameraRegistry, NamesOfManyLinesMakeOneLine) {
   const std::string error = error_after([](auto& d) { d.camera_model = "fish\neye"; });
   EXPECT_THAT(error, HasSubstr("camera_model is fish?eye, expected one of"));
   EXPECT_LT(error_after([](auto& d) { d.camera_model.assign(100000, 'x'); }).size(), 1100u);
+}
+
+TEST(CameraRegistry, KeepsWhatAMapHasOfUnknownModels) {
+  CameraDescription description = euroc();
+  description.camera_model = "mirror";
+  const auto registry = CameraRegistry::with_builtin_models();
+  const auto camera = registry.make_stored_camera(description);
+  EXPECT_EQ(camera->model(), "mirror");
+  EXPECT_EQ(camera->width_px(), 752);
+  EXPECT_FALSE(camera->can_project());
+  EXPECT_THAT(input_error_of([&] {
+                project_for_test(*camera, {{0.0, 0.0, 1.0}});
+              }),
+              AllOf(StartsWith("a.yaml:1: cam0: camera_model is mirror, expected one of: division"),
+                    HasSubstr("pinhole")));
+  EXPECT_TRUE(registry.make_stored_camera(euroc())->can_project());
+  for (const std::string& name : {std::string("fish\neye"), std::string(), std::string(101, 'x')}) {
+    description.camera_model = name;
+    EXPECT_THROW(registry.make_stored_camera(description), InputError) << name;
+  }
+  description.camera_model = "mirror";
+  description.distortion_model = "a\nb";
+  EXPECT_THROW(registry.make_stored_camera(description), InputError);
+  description.distortion_model = "none";
+  description.width_px = 0;
+  EXPECT_THROW(registry.make_stored_camera(description), InputError);
 }
 
 TEST(CameraRegistry, UsersAddModels) {

@@ -10,6 +10,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/image/pyramid.h"
 #include "waymark/input/decode.h"
 
 namespace waymark {
@@ -41,6 +42,25 @@ std::optional<double> reprojection_error(const Camera& camera,
   const double wrap = camera.wrap_width_px();
   if (wrap > 0.0) error.x() = std::min(error.x(), wrap - error.x());
   return error.norm();
+}
+
+/// The same by what the feature itself holds, where the camera's model is unknown.
+double error_of_feature(const Features& features,
+                        std::size_t feature,
+                        const Eigen::Vector3d& point_in_cam) {
+  const Eigen::Vector3f off = point_in_cam.normalized().cast<float>() - features.bearings[feature];
+  const Eigen::Vector2f off_px = features.level_pixel_from_bearing[feature] * off;
+  return Pyramid::scale(features.keypoints[feature].level) * double{off_px.norm()};
+}
+
+std::optional<double> sighting_error(const Keyframe& keyframe,
+                                     std::size_t feature,
+                                     const Eigen::Vector3d& point_in_cam) {
+  const Camera& camera = *keyframe.rig->cameras[0].camera;
+  const Features& features = *keyframe.features;
+  if (!camera.can_project()) return error_of_feature(features, feature, point_in_cam);
+  const Keypoint& keypoint = features.keypoints[feature];
+  return reprojection_error(camera, point_in_cam, {keypoint.x_px, keypoint.y_px});
 }
 
 class SceneBuilder {
@@ -82,9 +102,10 @@ class SceneBuilder {
       const std::uint32_t view_index = view_of_.at(observation.keyframe);
       const ExportView& view = scene_.views[view_index];
       if (observation.feature >= view.pixels.size() || observation.keyframe == last) continue;
-      const Camera& camera = *map_.keyframes().at(observation.keyframe).rig->cameras[0].camera;
-      const std::optional<double> error = reprojection_error(
-          camera, view.cam_from_world * point.position_in_world, view.pixels[observation.feature]);
+      const std::optional<double> error =
+          sighting_error(map_.keyframes().at(observation.keyframe),
+                         observation.feature,
+                         view.cam_from_world * point.position_in_world);
       if (!error || *error > kMaxExportErrorPx) continue;
       point.sightings.push_back({view_index, observation.feature});
       point.error_px += *error;

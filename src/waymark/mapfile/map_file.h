@@ -36,7 +36,7 @@ void save_map(const std::filesystem::path& path, const StoredMap& stored);
 
 /// Reads a map file of any version ever written. Whatever is wrong with it, be it damaged or made
 /// to do harm, is an InputError that names the file, the record and what was expected. `registry`
-/// makes the cameras.
+/// makes the cameras; one of a model that it does not have cannot project (UnknownCamera).
 StoredMap load_map(const std::filesystem::path& path,
                    const CameraRegistry& registry = CameraRegistry::with_builtin_models());
 

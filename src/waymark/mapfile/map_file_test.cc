@@ -140,8 +140,16 @@ TEST(MapFile, KeepsCamerasOfRegisteredModels) {
   const StoredMap loaded = load_map(folder / "mine.wmap", registry);
   EXPECT_EQ(loaded.map->keyframes().at(KeyframeId{0}).rig->cameras[0].description->intrinsics,
             std::vector<double>{123.0});
-  EXPECT_THAT(input_error_of([&] { load_map(folder / "mine.wmap"); }),
+  // Without the model the map is kept as it is.
+  const StoredMap kept = load_map(folder / "mine.wmap");
+  const Camera& camera = *kept.map->keyframes().at(KeyframeId{0}).rig->cameras[0].camera;
+  EXPECT_FALSE(camera.can_project());
+  EXPECT_THAT(input_error_of([&] { camera.unproject({}, {}, {}); }),
               HasSubstr("mine.wmap: camera 0: camera_model is mine, expected one of"));
+  EXPECT_THAT(find_map_faults(folder / "mine.wmap"), IsEmpty());
+  save_map(folder / "kept.wmap", kept);
+  EXPECT_EQ(read_text_file(folder / "kept.wmap", "a map"),
+            read_text_file(folder / "mine.wmap", "a map"));
 }
 
 TEST(MapFile, RefusesCamerasWithoutDescription) {

@@ -104,7 +104,8 @@ void MapReader::read_camera(MapRecord& record) {
   description.width_px = static_cast<int>(record.whole("width_px", kMaxImageSizePx));
   description.height_px = static_cast<int>(record.whole("height_px", kMaxImageSizePx));
   const Rigid3 cam_from_rig = record.transform("cam_from_rig");
-  rigs_.back()->cameras.push_back({registry_.make_camera(description), cam_from_rig, description});
+  rigs_.back()->cameras.push_back(
+      {registry_.make_stored_camera(description), cam_from_rig, description});
 }
 
 void MapReader::read_submap(MapRecord& record) {

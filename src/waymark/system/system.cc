@@ -44,6 +44,16 @@ void check_has_scale(const Map& map) {
   }
 }
 
+/// Throws InputError for a map with a camera of an unknown model: mapping looks through all of
+/// them.
+void check_cameras(const Map& map) {
+  map.keyframes().for_each([](KeyframeId, const Keyframe& keyframe) {
+    for (const RigCamera& camera : keyframe.rig->cameras) {
+      if (!camera.camera->can_project()) camera.camera->project({}, {}, {});
+    }
+  });
+}
+
 bool has_pose(FrameState state) {
   return state == FrameState::kTracked || state == FrameState::kFilled;
 }
@@ -62,6 +72,7 @@ class System::Impl {
         adjuster_(timing),
         worker_(timing, [this](const MapTask& task) { return process(task); }) {
     if (!map) return;
+    check_cameras(*map);
     visible_.snapshot = index_map(std::move(map));
     mapper_.take_over(visible_.snapshot);
   }

@@ -53,6 +53,7 @@ class System {
   ///
   /// map: one made before, that is to be extended, by whatever cameras; a copy goes on. The camera
   /// is looked for in it; where it is not found, a new sub-map begins, which is joined once it is.
+  /// Their models must be known (see load_map()), else InputError.
   System(Rig rig,
          const Settings& settings,
          Timing timing,

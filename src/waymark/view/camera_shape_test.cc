@@ -4,6 +4,7 @@
 
 #include "waymark/camera/equirectangular.h"
 #include "waymark/camera/perspective.h"
+#include "waymark/camera/unknown_camera.h"
 #include "waymark/view/scene.h"
 
 namespace waymark {
@@ -57,6 +58,16 @@ TEST(CameraShape, EndsWhereTheFieldOfViewEnds) {
   }
   EXPECT_GT(shape.corners_in_rig[1].x(), 0.0);
   EXPECT_LT(shape.corners_in_rig[3].x(), 0.0);
+}
+
+TEST(CameraShape, OfAnUnknownModelIsWideEnoughToBeSeen) {
+  CameraDescription description;
+  description.camera_model = "mine";
+  description.width_px = 201;
+  description.height_px = 101;
+  const CameraShape shape = shape_of({std::make_shared<UnknownCamera>(description, ""), Rigid3()});
+  EXPECT_FALSE(shape.is_sphere);
+  EXPECT_LT((shape.corners_in_rig[2] - Vector3d(1.0, 0.5, 1.0).normalized()).norm(), 1e-9);
 }
 
 TEST(CameraShape, WholeSpheresAreSpheres) {

@@ -14,6 +14,9 @@ constexpr int kSteps = 40;
 /// none.
 Eigen::Vector3d direction_towards(const Camera& camera, const Eigen::Vector2d& corner_px) {
   const Eigen::Vector2d centre_px(0.5 * (camera.width_px() - 1), 0.5 * (camera.height_px() - 1));
+  if (!camera.can_project()) {  // As if it saw 90 degrees, so that there is something to see.
+    return ((corner_px - centre_px) / centre_px.x()).homogeneous().normalized();
+  }
   for (int step = kSteps; step > 0; --step) {
     const Eigen::Vector2d pixel = centre_px + step * (corner_px - centre_px) / kSteps;
     Eigen::Vector3d bearing;
