@@ -3,6 +3,7 @@
 //
 // The extension waymark._waymark. Docstrings begin with the signature in the form that Python's
 // inspect reads.
+#include <pybind11/numpy.h>
 #include <pybind11/pybind11.h>
 
 #include "bindings.h"
@@ -60,6 +61,8 @@ PYBIND11_MODULE(_waymark, module) {
   module.doc() = "The engine behind the package waymark.";
   module.attr("__version__") = WAYMARK_VERSION;
   module.attr("NO_ID") = waymark::LandmarkId{}.value;
+  // Else the first array does it, and two threads that make one at once can wait for each other.
+  pybind11::detail::npy_api::get();
   waymark::silence_image_library();
   python::bind_errors(module);
   python::bind_camera(module);

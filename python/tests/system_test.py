@@ -303,6 +303,12 @@ class WrongArguments(Test):
 
 
 class Threads(Test):
+    def test_numpy_is_there_before_any_thread(self):
+        """Two threads that made the first arrays at once waited for each other, one to import numpy
+        and one, which kept the interpreter, for it to be imported."""
+        program = "import sys, waymark; sys.exit('numpy.core.multiarray' not in sys.modules)"
+        self.assertEqual(subprocess.run([sys.executable, "-c", program], timeout=60).returncode, 0)
+
     def test_fed_from_another_thread(self):
         system, some, failures = waymark.System(camchain()), frames(), []
 
