@@ -94,7 +94,7 @@ int view(const ViewOptions& options) {
   while (!is_interrupted()) {
     std::this_thread::sleep_for(50ms);
     if (const auto problem = viewer.next_problem()) {
-      fmt::print(stderr, "warning: viewer: {}\n", *problem);
+      print_message("warning: viewer: {}\n", *problem);
     }
   }
   return kDone;
