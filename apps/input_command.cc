@@ -66,6 +66,15 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
   command.add_option("--log", options.log, "Write all messages to this file, too [none]");
 }
 
+namespace {
+
+/// Whether its depth image could not be used: the one bad file that takes no frame away.
+bool is_without_depth(const FrameRecord& frame) {
+  return frame.state != FrameState::kUnreadable && !frame.warning.empty();
+}
+
+}  // namespace
+
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
   return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
              const FrameRecord& frame) mutable {
@@ -77,7 +86,13 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
         has_reason ? ": " : "",
         has_reason ? to_string(frame.reason) : "");
     if (frame.state == FrameState::kUnreadable) {
-      reporter.warning(fmt::format("frame {}: {}, skipped", frame.index, state));
+      reporter.warning(fmt::format("frame {}: {}, skipped{}",
+                                   frame.index,
+                                   state,
+                                   frame.warning.empty() ? "" : " (" + frame.warning + ")"));
+    } else if (is_without_depth(frame)) {
+      reporter.warning(
+          fmt::format("frame {}: used without depth ({})", frame.index, frame.warning));
     }
     const int num_candidates = frame.num_candidates;
     reporter.detail(
@@ -93,8 +108,14 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
 
 void report_reasons(Reporter& reporter, const FrameTable& table) {
   std::map<FrameReason, int> counts;
+  int num_without_depth = 0;
   for (const FrameRecord& frame : table.frames) {
     if (frame.reason != FrameReason::kNone) ++counts[frame.reason];
+    num_without_depth += is_without_depth(frame);
+  }
+  if (num_without_depth > 0) {
+    reporter.info(
+        fmt::format("used without depth, which could not be read: {} frames", num_without_depth));
   }
   if (counts.empty()) return;
   std::vector<std::pair<FrameReason, int>> sorted(counts.begin(), counts.end());

@@ -40,7 +40,8 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
 /// Tells of every frame.
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
 
-/// Why frames have no pose, the commonest reason first; nothing if all have one.
+/// Why frames have no pose, the commonest reason first, and how many came without their depth;
+/// nothing if there are none.
 void report_reasons(Reporter& reporter, const FrameTable& table);
 
 /// Calls work with a reporter and from then on catches interrupts; what it throws also goes to the

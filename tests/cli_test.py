@@ -267,7 +267,8 @@ class BadInput(CliTest):
         self.assertEqual((row["state"], row["reason"]), ("unreadable", reason))
         self.assertEqual(self.summary()["unreadable"], 1)
         self.assertEqual(self.summary()["frames"], NUM_FRAMES)
-        self.assertIn("unreadable", done.stderr)
+        self.assertRegex(done.stderr, f"unreadable: {reason}, skipped \\({self.images(source)[index]}: ")
+        return done.stderr
 
     def test_truncated_image_is_skipped_and_counted(self):
         source = self.sequence("stereo")
@@ -278,6 +279,23 @@ class BadInput(CliTest):
         source = self.sequence("stereo")
         write_png(self.images(source)[9], 64, 48)
         self.assert_skips(source, 9, "wrong_size")
+
+    def test_huge_image_is_skipped_and_counted(self):
+        source = self.sequence("stereo")
+        with open(self.images(source)[9], "wb") as image:  # A bitmap, which the disk need not hold.
+            image.truncate(image.write(b"P4 12000 12000\n") + 12000 * 12000 // 8)
+        said = self.assert_skips(source, 9, "unreadable_image")
+        self.assertIn("is 12000x12000 px, expected at most 135 megapixels", said)
+
+    def test_bad_depth_image_is_told_and_counted(self):
+        source = self.sequence("rgbd")
+        depth = sorted((source / "depth").iterdir())[9]
+        truncate(depth)
+        done = self.run_on(source, "-c", source / "camchain.yaml")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn(f"frame 9: used without depth ({depth}: unreadable", done.stderr)
+        self.assertIn("used without depth, which could not be read: 1 frames", done.stderr)
+        self.assertEqual(self.frames()[9]["state"], "tracked")
 
     def test_first_image_contradicts_the_calibration(self):
         source = self.image_folder()

@@ -80,6 +80,7 @@ class MapDamage(CliTest):
         yield "unknown camera", "camera_model is eye?ball", lambda r: first(r, "camera").update(
             camera_model="eye\nball")
         yield "gigantic image size", "width_px", lambda r: first(r, "camera").update(width_px=2**62)
+        yield "gigantic image", "is 60000x60000 px, expected at most", self.gigantic_image
         yield "duplicated key", "has the key 'frame' twice", self.duplicated_key
         yield "deep nesting", "too deep", lambda r: [r[0], b"\x91" * 100000 + b"\x01"]
         for name, code in (("list", b"\xdd"), ("map", b"\xdf"), ("text", b"\xdb"), ("bytes", b"\xc6")):
@@ -89,6 +90,12 @@ class MapDamage(CliTest):
     def cyclic_parents(records):
         first(records, "keyframe", 1)["parent"] = 2
         first(records, "keyframe", 2)["parent"] = 1
+
+    @staticmethod
+    def gigantic_image(records):
+        jpeg = b"\xff\xd8\xff\xc0\x00\x11\x08" + struct.pack(">HH", 60000, 60000) + bytes(10) + b"\xff\xd9"
+        records.insert(-1, {"kind": "image", "id": first(records, "keyframe")["id"], "jpeg": jpeg})
+        records[-1]["counts"]["image"] = 1
 
     @staticmethod
     def duplicated_key(records):

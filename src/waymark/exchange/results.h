@@ -24,6 +24,8 @@ struct FrameRecord : FrameStatus {
   bool is_keyframe = false;       ///< Whether it was sent to the map.
   /// In the order of the table's stages; empty for a frame that was not processed.
   std::vector<double> stage_ms;
+  /// What is wrong with a file of the frame, for people; in no file.
+  std::string warning = {};
 };
 
 /// frames.csv: a row per input frame.

@@ -158,8 +158,9 @@ TEST(Euroc, SkipsBadImagesInTheMiddleButNotAFirstOneOfAnotherSize) {
       HasSubstr("cam1/data/a.png: is 33x24 px, expected 32x24 px as the calibration of camera 1"));
 
   std::filesystem::remove_all(folder / "mav0/cam0/data");
-  EXPECT_THAT(input_error_of([&] { open_input(folder.path(), {}); }),
-              HasSubstr("cam0/data/a.png: missing or unreadable"));
+  EXPECT_THAT(
+      input_error_of([&] { open_input(folder.path(), {}); }),
+      HasSubstr("cam0/data/a.png: missing, expected an image; none of 2 frames from it on"));
 }
 
 TEST(Euroc, TakesItsGroundTruthToCameraZero) {
@@ -286,6 +287,12 @@ TEST(TumRgbd, ABadDepthImageInTheMiddleIsAMissingOne) {
   const std::optional<InputFrame> last = input->next();
   EXPECT_EQ(last->fault, FrameFault::kNone);
   EXPECT_FALSE(last->depth);
+  EXPECT_THAT(last->warning, HasSubstr("depth/c.png: unreadable, damaged or of another kind"));
+  write_image(folder / "depth/c.png", 16, 12, 50, CV_16UC1);
+  const std::unique_ptr<Input> again = open_input(folder.path(), {});
+  again->next();
+  EXPECT_EQ(again->next()->warning, "");  // The data set has no depth there.
+  EXPECT_THAT(again->next()->warning, HasSubstr("c.png: is 16x12 px, expected 32x24 px"));
 }
 
 TEST(TumRgbd, NamesFileAndLineOfWhatIsWrong) {
@@ -294,7 +301,7 @@ TEST(TumRgbd, NamesFileAndLineOfWhatIsWrong) {
   const auto error = [&] { return input_error_of([&] { open_input(folder.path(), {}); }); };
   write_image(folder / "depth/a.png", 32, 24, 50, CV_8UC1);
   EXPECT_THAT(error(),
-              HasSubstr("depth/a.png: missing or unreadable, expected a 16-bit depth image"));
+              HasSubstr("depth/a.png: unreadable, damaged or of another kind, expected a 16-bit"));
   write_image(folder / "depth/a.png", 16, 12, 50, CV_16UC1);
   EXPECT_THAT(error(), HasSubstr("depth/a.png: depth of 16x12, expected 32x24"));
   folder.write("depth.txt", "20 depth/a.png\n");

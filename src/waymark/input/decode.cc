@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/input/decode.h"
 
+#include <fmt/format.h>
+
 #include <cstdlib>
 #include <cstring>
 #include <fstream>
@@ -14,6 +16,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/image/image_header.h"
 
 namespace waymark {
 namespace {
@@ -32,43 +35,40 @@ std::optional<std::string> read_bytes(const std::filesystem::path& path) {
   return bytes;
 }
 
-/// Walks the chunks of a PNG (ISO/IEC 15948) to its IEND.
-bool is_complete_png(std::string_view bytes) {
-  constexpr std::size_t kChunkOverhead = 12;
-  for (std::size_t at = 8; at + kChunkOverhead <= bytes.size();) {
-    std::uint32_t length = 0;
-    for (std::size_t i = 0; i < 4; ++i)
-      length = length << 8 | static_cast<unsigned char>(bytes[at + i]);
-    if (length > bytes.size() - at - kChunkOverhead) return false;
-    if (bytes.substr(at + 4, 4) == "IEND") return true;
-    at += kChunkOverhead + length;
-  }
-  return false;
+/// Whether the end of the file is there. The library fills the missing part of a truncated JPEG
+/// with grey and reports success.
+bool is_complete_jpeg(std::string_view bytes) {
+  constexpr std::string_view kJpegEnd = "\xFF\xD9";
+  return bytes.rfind(kJpegEnd) != std::string_view::npos;
 }
 
-/// Whether the end of the file is there. The libraries fill the missing part of a truncated JPEG
-/// with grey and report success, and complain on standard error about truncated PNG.
-bool is_complete(std::string_view bytes) {
-  constexpr std::string_view kPngSignature = "\x89PNG\r\n\x1A\n";
-  constexpr std::string_view kJpegEnd = "\xFF\xD9";
-  if (bytes.starts_with(kPngSignature)) return is_complete_png(bytes);
-  if (bytes.starts_with(kJpegStart)) return bytes.rfind(kJpegEnd) != std::string_view::npos;
-  return true;
+/// The bytes to decode: sound as far as can be seen, and without what the library would only
+/// complain about on standard error. Nothing if they are of no image to be read.
+std::optional<std::string_view> vet(std::string_view bytes, std::optional<std::string>& storage) {
+  const std::optional<ImageSize> size = size_in_header(bytes);
+  if (!size || is_too_large(*size)) return std::nullopt;
+  if (bytes.starts_with(kJpegStart) && !is_complete_jpeg(bytes)) return std::nullopt;
+  if (!is_png(bytes)) return bytes;
+  storage = pixels_of_png(bytes);
+  return storage ? std::optional<std::string_view>(*storage) : std::nullopt;
 }
 
 std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
-  if (bytes.empty() || bytes.size() > kMaxFileBytes || !is_complete(bytes)) return std::nullopt;
+  if (bytes.empty() || bytes.size() > kMaxFileBytes) return std::nullopt;
   try {
+    std::optional<std::string> storage;
+    const std::optional<std::string_view> vetted = vet(bytes, storage);
+    if (!vetted) return std::nullopt;
     const cv::Mat encoded(1,
-                          static_cast<int>(bytes.size()),
+                          static_cast<int>(vetted->size()),
                           CV_8UC1,
-                          const_cast<char*>(bytes.data()));  // Is only read.
+                          const_cast<char*>(vetted->data()));  // Is only read.
     cv::Mat decoded = cv::imdecode(encoded, flags);
     if (decoded.empty()) return std::nullopt;
     return decoded;
   } catch (const cv::Exception&) {
     return std::nullopt;
-  } catch (const std::bad_alloc&) {  // A small file may claim to be a huge image.
+  } catch (const std::bad_alloc&) {
     return std::nullopt;
   }
 }
@@ -111,6 +111,26 @@ std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
   return copy_rows<std::uint16_t>(*mat);
 }
 
+std::string describe_bad_image(const std::filesystem::path& path, std::string_view expected) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return fmt::format("missing, expected {}", expected);
+  if (!std::filesystem::is_regular_file(status)) {
+    return fmt::format("is no regular file, expected {}", expected);
+  }
+  const std::optional<std::string> bytes = read_bytes(path);
+  if (!bytes) return fmt::format("unreadable, empty or above 1 GB, expected {}", expected);
+  const std::optional<ImageSize> size = size_in_header(*bytes);
+  if (!size) return fmt::format("unreadable as an image, expected {}", expected);
+  if (!is_too_large(*size)) {
+    return fmt::format("unreadable, damaged or of another kind, expected {}", expected);
+  }
+  return fmt::format("is {}x{} px, expected at most {} megapixels",
+                     size->width_px,
+                     size->height_px,
+                     kMaxMegapixels);
+}
+
 std::optional<ColorImage> decode_color_image(std::string_view bytes) {
   const std::optional<cv::Mat> mat =
       decode_bytes(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
@@ -128,7 +148,8 @@ std::optional<ColorImage> decode_color_image(std::string_view bytes) {
 std::optional<std::string> read_as_jpeg(const std::filesystem::path& path) {
   std::optional<std::string> bytes = read_bytes(path);
   if (!bytes) return std::nullopt;
-  if (bytes->starts_with(kJpegStart) && is_complete(*bytes)) return bytes;
+  std::optional<std::string> unused;
+  if (bytes->starts_with(kJpegStart) && vet(*bytes, unused)) return bytes;
   const std::optional<cv::Mat> mat =
       decode_bytes(*bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (!mat) return std::nullopt;

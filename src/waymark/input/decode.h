@@ -13,14 +13,20 @@
 namespace waymark {
 
 /// Decodes an image file to 8-bit grey: colour is converted, 16 bit scaled down, transparency
-/// dropped, orientation tags ignored. Nothing when the file is missing, truncated or no image.
+/// dropped, orientation tags ignored. Nothing when the file is missing, truncated, too
+/// large or no image.
 std::optional<Image> read_grey_image(const std::filesystem::path& path);
 
 /// Decodes a single-channel 16-bit image, otherwise nothing.
 std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
 
+/// Why an image file could not be read, as messages go on after its name: "is 60000x60000 px,
+/// expected at most ...". `expected`: what it should have been.
+std::string describe_bad_image(const std::filesystem::path& path,
+                               std::string_view expected = "an image");
+
 /// Decodes the bytes of an image file to colour, grey ones too; orientation tags ignored. Nothing
-/// when they are truncated or no image.
+/// when they are truncated, too large or no image.
 std::optional<ColorImage> decode_color_image(std::string_view bytes);
 
 /// The image of a file as a JPEG: the file itself if it is one. Nothing when it is no image.

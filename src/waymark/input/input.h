@@ -39,6 +39,9 @@ struct InputFrame {
   std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
   std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
   FrameFault fault = FrameFault::kNone;  ///< Why there are no images.
+  /// What is wrong with a file of the frame, be it that of the fault or a depth image that is left
+  /// out, for people: "FILE: ..., expected ...". Empty: nothing.
+  std::string warning = {};
 };
 
 /// What to take of an input, and how.

@@ -6,6 +6,7 @@
 
 #include <gmock/gmock.h>
 
+#include <fstream>
 #include <opencv2/videoio.hpp>
 
 #include "waymark/base/testing/errors.h"
@@ -166,6 +167,52 @@ TEST(ReadGreyImage, RefusesDamagedFiles) {
   EXPECT_FALSE(read_grey_image(folder.path()));
 }
 
+/// A bitmap of 0, as large as it says, of which the disk holds next to nothing.
+void write_large_bitmap(const std::filesystem::path& path, int size_px) {
+  const std::string size = std::to_string(size_px);
+  std::ofstream(path) << "P4\n" << size << " " << size << "\n";
+  const std::uintmax_t header_bytes = std::filesystem::file_size(path);
+  const auto row_bytes = static_cast<std::uintmax_t>(size_px) / 8;
+  std::filesystem::resize_file(path,
+                               header_bytes + row_bytes * static_cast<std::uintmax_t>(size_px));
+}
+
+TEST(ReadGreyImage, RefusesHugeImagesByTheirHeaders) {
+  const TemporaryFolder folder;
+  make_images(folder / "images", 3);
+  write_large_bitmap(folder / "images/2.png", 12000);
+  EXPECT_FALSE(read_grey_image(folder / "images/2.png"));
+  EXPECT_FALSE(read_depth_image(folder / "images/2.png"));
+  EXPECT_FALSE(decode_color_image(read_text_file(folder / "images/2.png", "an image")));
+  const std::unique_ptr<Input> input = open_input(folder.path(), {});
+  input->next();
+  const std::optional<InputFrame> frame = input->next();
+  EXPECT_EQ(frame->fault, FrameFault::kUnreadable);
+  EXPECT_EQ(
+      frame->warning,
+      (folder / "images/2.png").string() + ": is 12000x12000 px, expected at most 135 megapixels");
+  InputOptions options;
+  options.mask = folder / "images/2.png";
+  EXPECT_THAT(input_error_of([&] { open_input(folder.path(), options); }),
+              HasSubstr("2.png: is 12000x12000 px, expected at most 135 megapixels"));
+}
+
+TEST(ReadGreyImage, LeavesStandardErrorToTheProgram) {
+  const TemporaryFolder folder;
+  cv::Mat noise(120, 160, CV_8UC1);
+  cv::randu(noise, 0, 255);
+  cv::imwrite((folder / "a.png").string(), noise);
+  const std::string whole = read_text_file(folder / "a.png", "an image");
+  ::testing::internal::CaptureStderr();
+  for (const std::size_t at : {16, 24, 40, 60, 500, 5000}) {
+    std::string flipped = whole;
+    flipped[at] = static_cast<char>(flipped[at] ^ 1);
+    folder.write("b.png", flipped);
+    EXPECT_FALSE(read_grey_image(folder / "b.png")) << at;
+  }
+  EXPECT_EQ(::testing::internal::GetCapturedStderr(), "");
+}
+
 TEST(Mask, OneForAllFrames) {
   const TemporaryFolder folder;
   make_images(folder / "images", 2);
@@ -180,7 +227,7 @@ TEST(Mask, OneForAllFrames) {
               HasSubstr("mask.png: not the size of the image"));
   options.mask = folder / "none.png";
   EXPECT_THAT(input_error_of([&] { open_input(folder.path(), options); }),
-              HasSubstr("none.png: missing or unreadable"));
+              HasSubstr("none.png: missing, expected a mask image"));
 }
 
 TEST(Mask, OnePerFrameByName) {

@@ -15,6 +15,7 @@ namespace {
 
 /// With so many bad images in a row at the start the path is wrong rather than the disk bad.
 constexpr std::size_t kMaxBadAtStart = 50;
+constexpr std::string_view kDepthImage = "a 16-bit depth image";
 
 std::string stem_of(const ListedFrame& frame) { return frame.images.front().stem().string(); }
 
@@ -63,9 +64,14 @@ InputFrame ListingInput::read(std::size_t index) const {
 
 FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& frame) const {
   for (std::size_t i = 0; i < listed.images.size(); ++i) {
-    std::optional<Image> image = read_grey_image(listed.images[i]);
-    if (!image) return FrameFault::kUnreadable;
-    if (!sizes_.empty() && sizes_[i] != ImageSize{image->width_px, image->height_px}) {
+    const std::filesystem::path& path = listed.images[i];
+    std::optional<Image> image = read_grey_image(path);
+    if (!image) {
+      frame.warning = fmt::format("{}: {}", path.string(), describe_bad_image(path));
+      return FrameFault::kUnreadable;
+    }
+    if (!sizes_.empty() && sizes_[i] != size_of(*image)) {
+      frame.warning = describe_wrong_size(path, size_of(*image), sizes_[i]);
       return FrameFault::kWrongSize;
     }
     frame.images.push_back(std::move(*image));
@@ -73,13 +79,18 @@ FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& fram
   return FrameFault::kNone;
 }
 
-/// A bad depth image leaves the frame without depth, as a missing one does.
+/// A bad depth image leaves the frame without depth, as where the data set has none.
 void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) const {
   if (listed.depth.empty()) return;
-  const Image& image = frame.images.front();
-  std::optional<DepthImage> depth = read_depth_image(listed.depth);
-  if (!depth || depth->width_px != image.width_px || depth->height_px != image.height_px) return;
-  frame.depth = std::move(depth);
+  const ImageSize size = size_of(frame.images.front());
+  frame.depth = read_depth_image(listed.depth);
+  if (!frame.depth) {
+    frame.warning =
+        fmt::format("{}: {}", listed.depth.string(), describe_bad_image(listed.depth, kDepthImage));
+  } else if (size_of(*frame.depth) != size) {
+    frame.warning = describe_wrong_size(listed.depth, size_of(*frame.depth), size);
+    frame.depth.reset();
+  }
 }
 
 std::size_t ListingInput::find_first_readable() const {
@@ -89,11 +100,13 @@ std::size_t ListingInput::find_first_readable() const {
     InputFrame frame;
     if (read_images(listing_.frames[index], frame) == FrameFault::kNone) return index;
   }
-  const std::filesystem::path& first = listing_.frames[selection_.first].images.front();
+  const std::vector<std::filesystem::path>& first = listing_.frames[selection_.first].images;
+  const auto bad = std::ranges::find_if(first, [](const auto& p) { return !read_grey_image(p); });
+  WAYMARK_CHECK(bad != first.end());
   throw InputError(
-      first.string(),
-      fmt::format("missing or unreadable as the {} frames from it on, expected an image",
-                  num_tried));
+      bad->string(),
+      fmt::format(
+          "{}; none of {} frames from it on can be read", describe_bad_image(*bad), num_tried));
 }
 
 void ListingInput::check_first_frame(std::size_t index) {
@@ -116,8 +129,7 @@ void ListingInput::check_first_depth() const {
     if (listed.depth.empty()) continue;
     const std::optional<DepthImage> depth = read_depth_image(listed.depth);
     if (!depth) {
-      throw InputError(listed.depth.string(),
-                       "missing or unreadable, expected a 16-bit depth image");
+      throw InputError(listed.depth.string(), describe_bad_image(listed.depth, kDepthImage));
     }
     if (depth->width_px != info_.width_px || depth->height_px != info_.height_px) {
       throw InputError(listed.depth.string(),

@@ -54,6 +54,17 @@ void fit_first_image(CameraChain& chain,
                   camera));
 }
 
+std::string describe_wrong_size(const std::filesystem::path& image,
+                                const ImageSize& size,
+                                const ImageSize& expected) {
+  return fmt::format("{}: is {}x{} px, expected {}x{} px",
+                     image.string(),
+                     size.width_px,
+                     size.height_px,
+                     expected.width_px,
+                     expected.height_px);
+}
+
 std::string describe_calibration(bool is_given, const std::optional<CameraChain>& chain) {
   if (!chain) return "no calibration in the data set: it must come from the settings";
   std::string text = is_given ? "calibration from the settings:" : "calibration from the data set:";
@@ -78,7 +89,7 @@ MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
     return;
   }
   fixed_ = read_grey_image(path_);
-  if (!fixed_) throw InputError(path_.string(), "missing or unreadable, expected a mask image");
+  if (!fixed_) throw InputError(path_.string(), describe_bad_image(path_, "a mask image"));
 }
 
 std::filesystem::path MaskSource::path_of(const std::string& stem) const {
@@ -99,11 +110,14 @@ bool MaskSource::has(const std::string& stem) const { return fixed_ || by_name_.
 void MaskSource::attach(const std::string& stem, InputFrame& frame) const {
   if (!has(stem) || frame.images.empty()) return;
   frame.mask = fixed_ ? fixed_ : read_grey_image(path_of(stem));
-  const Image& image = frame.images.front();
+  const ImageSize size = size_of(frame.images.front());
   if (!frame.mask) {
     frame.fault = FrameFault::kUnreadable;
-  } else if (frame.mask->width_px != image.width_px || frame.mask->height_px != image.height_px) {
+    frame.warning = fmt::format(
+        "{}: {}", path_of(stem).string(), describe_bad_image(path_of(stem), "a mask image"));
+  } else if (size_of(*frame.mask) != size) {
     frame.fault = FrameFault::kWrongSize;
+    frame.warning = describe_wrong_size(path_of(stem), size_of(*frame.mask), size);
   }
   if (frame.fault == FrameFault::kNone) return;
   frame.images.clear();
@@ -116,7 +130,7 @@ void MaskSource::check_first(const std::string& stem, const InputFrame& frame) c
   throw InputError(path_of(stem).string(),
                    frame.fault == FrameFault::kWrongSize
                        ? "not the size of the image, expected a mask of the same size"
-                       : "unreadable, expected a mask image");
+                       : describe_bad_image(path_of(stem), "a mask image"));
 }
 
 std::optional<Image> grey_of(const cv::Mat& frame) {

@@ -14,16 +14,10 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/image/image_header.h"
 #include "waymark/input/input.h"
 
 namespace waymark {
-
-struct ImageSize {
-  int width_px = 0;
-  int height_px = 0;
-
-  friend bool operator==(const ImageSize&, const ImageSize&) = default;
-};
 
 /// The calibration to use: the given one, else that of the data set, else nothing; with as many
 /// cameras as the setup needs. Throws InputError when it has fewer.
@@ -38,6 +32,11 @@ void fit_first_image(CameraChain& chain,
                      std::size_t camera,
                      const ImageSize& size,
                      const std::filesystem::path& image);
+
+/// What is wrong with a file of another size, as messages say it.
+std::string describe_wrong_size(const std::filesystem::path& image,
+                                const ImageSize& size,
+                                const ImageSize& expected);
 
 /// In words, for people.
 std::string describe_calibration(bool is_given, const std::optional<CameraChain>& chain);

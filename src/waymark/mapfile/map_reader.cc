@@ -9,6 +9,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/image/image_header.h"
 #include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
@@ -209,7 +210,15 @@ void MapReader::read_loop_edge(MapRecord& record) {
 void MapReader::read_image(MapRecord& record) {
   const KeyframeId keyframe{static_cast<std::uint32_t>(id_)};
   if (!is_among(parts_.keyframes, keyframe)) record.fail("expected the id of a keyframe");
-  stored_.images.emplace(keyframe, std::make_shared<const std::string>(record.bytes("jpeg")));
+  auto jpeg = std::make_shared<const std::string>(record.bytes("jpeg"));
+  const std::optional<ImageSize> size = size_in_header(*jpeg);
+  if (size && is_too_large(*size)) {
+    record.fail(fmt::format("jpeg is {}x{} px, expected at most {} megapixels",
+                            size->width_px,
+                            size->height_px,
+                            kMaxMegapixels));
+  }
+  stored_.images.emplace(keyframe, std::move(jpeg));
 }
 
 /// What Map::restore() asks for.

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/base/crc32.h"
 #include "waymark/base/text.h"
-#include "waymark/mapfile/crc32c.h"
 #include "waymark/mapfile/map_layout.h"
 
 namespace waymark {

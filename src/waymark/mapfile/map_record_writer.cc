@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapfile/map_record_writer.h"
 
-#include "waymark/mapfile/crc32c.h"
+#include "waymark/base/crc32.h"
 
 namespace waymark {
 

@@ -28,6 +28,7 @@ FrameRecord record_of_fault(const InputFrame& frame) {
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
+  record.warning = frame.warning;
   if (frame.fault == FrameFault::kLate) {
     record.state = FrameState::kDropped;
     record.reason = FrameReason::kLate;
@@ -43,6 +44,7 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
+  record.warning = frame.warning;
   static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
   record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());

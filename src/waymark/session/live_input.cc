@@ -18,6 +18,7 @@ void drop(InputFrame& frame) {
   frame.depth.reset();
   frame.mask.reset();
   frame.jpeg.clear();
+  frame.warning.clear();
 }
 
 }  // namespace

@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/mapfile/crc32c.h"
+#include "waymark/base/crc32.h"
 
 namespace waymark::testing {
 

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapfile/crc32c.h"
+#include "waymark/base/crc32.h"
 
 #include <gtest/gtest.h>
 
@@ -31,6 +31,12 @@ TEST(Crc32c, GivesTheValuesOfTheStandard) {  // RFC 3720, B.4.
   EXPECT_EQ(crc32c(ascending), 0x46DD794Eu);
   EXPECT_EQ(crc32c("123456789"), 0xE3069283u);
   EXPECT_EQ(crc32c(""), 0u);
+}
+
+TEST(Crc32, GivesTheCheckValueOfTheCatalogues) {
+  EXPECT_EQ(crc32("123456789"), 0xCBF43926u);
+  EXPECT_EQ(crc32("6789", crc32("12345")), 0xCBF43926u);
+  EXPECT_EQ(crc32("IEND"), 0xAE426082u);  // As every PNG file ends.
 }
 
 TEST(Crc32c, EqualsItsDefinitionInPartsOfAnySize) {
