@@ -22,6 +22,9 @@ namespace waymark {
 namespace {
 
 constexpr std::int64_t kMaxDifferenceNs = 20'000'000;
+constexpr double kMaxDistanceM = 1e6;  // Of keyframes whose distance is known.
+constexpr double kMaxFactor = 1e6;
+constexpr double kMaxPositionM = 1e9;  // Of poses of a trajectory: on Earth, in any frame.
 
 struct AlignOptions {
   std::filesystem::path map;
@@ -43,6 +46,16 @@ SubmapId submap_of(const Map& map, std::uint32_t id) {
   return keyframe->submap;
 }
 
+/// Beyond this the numbers of maps, or their meaning, would suffer.
+void check_factor(const std::string& where, double factor) {
+  if (factor >= 1.0 / kMaxFactor && factor <= kMaxFactor) return;
+  throw InputError(where,
+                   fmt::format("would scale the map by {:.6g}, expected {:g} to {:g}",
+                               factor,
+                               1.0 / kMaxFactor,
+                               kMaxFactor));
+}
+
 Map scale(Map map, const AlignOptions& options) {
   std::optional<SubmapId> submap;
   std::vector<KnownDistance> known;
@@ -53,8 +66,10 @@ Map scale(Map map, const AlignOptions& options) {
       }
       submap = submap_of(map, id);
     }
-    if (!(metres > 0.0) || !std::isfinite(metres)) {
-      throw InputError("--distance", fmt::format("is {} m, expected more than 0", metres));
+    if (!(metres > 0.0 && metres <= kMaxDistanceM)) {
+      throw InputError(
+          "--distance",
+          fmt::format("is {} m, expected more than 0 and at most {:.0f}", metres, kMaxDistanceM));
     }
     known.push_back({KeyframeId{a}, KeyframeId{b}, metres});
   }
@@ -67,6 +82,7 @@ Map scale(Map map, const AlignOptions& options) {
   const std::optional<double> factor = scale_by_distances(map, known);
   if (!factor)
     throw InputError("--distance", "is between keyframes at the same place, expected two");
+  check_factor("--distance", *factor);
   print_result("sub-map {}: scaled by {:.6g}, now in metres\n", submap->value, *factor);
   return put_into_metres(
       std::move(map), *submap, {Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor});
@@ -76,6 +92,12 @@ Map fit(Map map, const AlignOptions& options) {
   std::vector<std::int64_t> timestamps_ns;
   std::vector<Rigid3> poses;
   for (const StampedPose& pose : read_trajectory(options.trajectory)) {
+    const double farthest_m = pose.world_from_camera.translation.cwiseAbs().maxCoeff();
+    if (!(farthest_m <= kMaxPositionM)) {
+      throw InputError(
+          options.trajectory.string(),
+          fmt::format("has a pose {:g} m away, expected at most {:g}", farthest_m, kMaxPositionM));
+    }
     timestamps_ns.push_back(pose.timestamp_ns);
     poses.push_back(pose.world_from_camera);
   }
@@ -83,6 +105,7 @@ Map fit(Map map, const AlignOptions& options) {
   bool has_fit = false;
   for (const auto& [submap, found] : fit_submaps(map, {timestamps_ns, poses}, kMaxDifferenceNs)) {
     has_fit = has_fit || found;
+    if (found) check_factor(options.trajectory.string(), found->trajectory_from_map.scale);
     report +=
         found
             ? fmt::format(
@@ -106,8 +129,9 @@ Map fit(Map map, const AlignOptions& options) {
 
 Map level(Map map, const AlignOptions& options) {
   const Eigen::Vector3d up(options.up[0], options.up[1], options.up[2]);
-  if (!up.allFinite() || !(up.norm() > 0.0)) {
-    throw InputError("--up", "is no direction, expected three numbers, not all 0");
+  const double length = up.stableNorm();
+  if (!(length > 1.0 / kMaxFactor && length < kMaxFactor)) {
+    throw InputError("--up", "is no direction, expected three numbers, not all 0, below 1000000");
   }
   const std::vector<SubmapId> submaps = submaps_by_size(map);
   if (submaps.empty()) throw InputError(options.map.string(), "has no keyframes, expected some");

@@ -6,6 +6,7 @@ what, and what was expected."""
 import copy
 import math
 import random
+import resource
 import struct
 import unittest
 
@@ -29,6 +30,10 @@ def put(array, index, code, value):
     data = bytearray(array["data"])
     data[size * index:size * (index + 1)] = struct.pack("<" + code, value)
     array["data"] = bytes(data)
+
+
+def limit_memory():
+    resource.setrlimit(resource.RLIMIT_AS, (2**30, 2**30))
 
 
 class MapDamage(CliTest):
@@ -56,6 +61,8 @@ class MapDamage(CliTest):
         yield "no id", "", lambda r: first(r, "keyframe").update(id=None)
         yield "negative id", "", lambda r: first(r, "keyframe").update(id=-1)
         yield "many ids", "end_landmark", lambda r: first(r, "map").update(end_landmark=2**40)
+        yield "far ids", "end_landmark is 268435456, expected at most", lambda r: first(r, "map").update(
+            end_landmark=2**28)
         yield "cyclic parents", "cycle", self.cyclic_parents
         yield "parent that is gone", "parent", lambda r: first(r, "keyframe", 1).update(parent=2**20)
         yield "sub-map in itself", "", lambda r: first(r, "submap").update(joined_into=0, root=None)
@@ -118,7 +125,7 @@ class MapDamage(CliTest):
 
     def refuse(self, name, data, expected):
         self.map.write_bytes(data)
-        done = waymark("map", "info", self.map)
+        done = waymark("map", "info", self.map, preexec_fn=limit_memory)
         with self.subTest(name):
             self.assertEqual(done.returncode, 2, done.stdout + done.stderr)
             self.assertEqual(done.stdout, "")

@@ -10,16 +10,13 @@
 namespace waymark {
 namespace {
 
-constexpr double kMaxAngle = 10.0;      // Of angles in radians; more is no angle.
 constexpr double kMaxUnitError = 1e-3;  // Of bearings, which are single floats.
 constexpr double kMaxOutsidePx = 2.0;   // Noise and rounding may leave the image a little.
-constexpr double kMaxSlope = 1e9;       // In pixels per unit of bearing.
-constexpr NumberRange kAngle{-kMaxAngle, kMaxAngle};
 
 std::vector<Keypoint> read_keypoints(MapRecord& record) {
   const auto pixels = record.array<Eigen::Vector2f>("pixel", std::nullopt);
   const std::size_t count = pixels.size();
-  const auto angles = record.array<float>("angle_rad", count, kAngle);
+  const auto angles = record.array<float>("angle_rad", count, kAngleRange);
   const auto responses = record.array<float>("response", count);
   const auto levels = record.array<std::uint8_t>("level", count);
   const auto cameras = record.array<std::uint8_t>("camera", count);
@@ -102,8 +99,8 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
   }
   features->bearings = record.array<Eigen::Vector3f>("bearing", count);
   features->level_pixel_from_bearing =
-      record.array<Matrix23f>("level_pixel_from_bearing", count, {-kMaxSlope, kMaxSlope});
-  features->size_rad = record.array<float>("size_rad", count, {kPositive.low, kMaxAngle});
+      record.array<Matrix23f>("level_pixel_from_bearing", count, kSlopeRange);
+  features->size_rad = record.array<float>("size_rad", count, kFeatureSizeRange);
   features->partner = record.array<std::uint32_t>("partner", count);
   features->range_m = record.array<float>("range_m", num_primary, kNotNegative);
   features->inverse_range_sigma =

@@ -32,6 +32,10 @@ struct StoredMap {
 /// Writes a map file, record by record into a temporary file that replaces `path` at the end: at
 /// any moment there is the old file or the new one. The same map gives the same bytes. Throws
 /// OutputError when that fails, InputError for a camera that was made without a description.
+/// Numbers that load_map() would refuse (not finite, or beyond what is possible) are an
+/// OutputError, too, before the old file goes: each is compared with its range as it is written.
+/// Reading the new file once more would find no more in a map that was sound, and cost its time and
+/// memory again.
 void save_map(const std::filesystem::path& path, const StoredMap& stored);
 
 /// Reads a map file of any version ever written. Whatever is wrong with it, be it damaged or made

@@ -4,6 +4,8 @@
 
 #include <gmock/gmock.h>
 
+#include <cmath>
+#include <functional>
 #include <sstream>
 
 #include "waymark/base/testing/errors.h"
@@ -11,7 +13,9 @@
 #include "waymark/base/text.h"
 #include "waymark/camera/model_camera.h"
 #include "waymark/camera/perspective.h"
+#include "waymark/map/parts.h"
 #include "waymark/map/testing/random_map.h"
+#include "waymark/mapfile/map_layout.h"
 
 namespace waymark {
 namespace {
@@ -167,6 +171,47 @@ TEST(MapFile, RefusesCamerasWithoutDescription) {
   EXPECT_THAT(input_error_of([&] { save_map(folder / "a.wmap", stored); }),
               HasSubstr("expected rigs made by make_rig()"));
   EXPECT_FALSE(std::filesystem::exists(folder / "a.wmap"));
+}
+
+TEST(MapFile, RefusesToWriteWhatCouldNotBeRead) {
+  const TemporaryFolder folder;
+  const StoredMap good = stored_map(1);
+  save_map(folder / "a.wmap", good);
+  const std::string before = read_text_file(folder / "a.wmap", "a map");
+  const auto error = [&](const std::function<void(MapParts&)>& harm) {
+    MapParts parts = take_apart(*good.map);
+    harm(parts);
+    StoredMap harmed = good;
+    harmed.map = Map::restore(std::move(parts)).freeze();
+    try {
+      save_map(folder / "a.wmap", harmed);
+    } catch (const OutputError& refusal) {
+      EXPECT_EQ(read_text_file(folder / "a.wmap", "a map"), before);
+      return std::string(refusal.what());
+    }
+    return std::string("no error");
+  };
+  EXPECT_THAT(error([](MapParts& p) { p.landmarks[0].landmark.position_in_world.y() = INFINITY; }),
+              HasSubstr("a.wmap: landmarks 0: position_in_world would hold inf, expected"));
+  EXPECT_THAT(error([](MapParts& p) { p.landmarks[0].landmark.position_in_world.x() = -2e15; }),
+              HasSubstr("position_in_world would hold -2e+15"));
+  EXPECT_THAT(error([](MapParts& p) { p.landmarks[0].landmark.appearance.size_m = NAN; }),
+              HasSubstr("size_m would hold nan"));
+  EXPECT_THAT(
+      error([](MapParts& p) { p.keyframes[0].keyframe.rig_from_world.translation.z() = INFINITY; }),
+      HasSubstr("rig_from_world would hold inf"));
+  EXPECT_THAT(
+      error([](MapParts& p) { p.keyframes[0].keyframe.rig_from_world.rotation.coeffs()[0] = NAN; }),
+      HasSubstr("rig_from_world would hold nan"));
+  EXPECT_THAT(error([](MapParts& p) { p.keyframes[0].keyframe.applied_scale = 1e13; }),
+              HasSubstr("applied_scale would hold 1e+13"));
+  EXPECT_THAT(error([](MapParts& p) { p.end_landmark = LandmarkId{kMaxIds}; }),
+              HasSubstr("would have ids of landmarks up to 268435456, expected at most"));
+  StoredMap with_image = good;
+  with_image.images.begin()->second =
+      std::make_shared<const std::string>("\xFF\xD8\xFF\xC0\0\x11\x08\xEA\x60\xEA\x60\3", 16);
+  EXPECT_THROW(save_map(folder / "a.wmap", with_image), OutputError);
+  EXPECT_EQ(read_text_file(folder / "a.wmap", "a map"), before);
 }
 
 TEST(MapFile, LeavesOutImagesOfErasedKeyframes) {

@@ -3,10 +3,13 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cstddef>
 #include <cstdint>
+#include <limits>
+#include <optional>
 #include <string_view>
 #include <type_traits>
 #include <vector>
@@ -26,6 +29,62 @@ inline constexpr std::uint32_t kMaxIds = std::uint32_t{1} << 28;  ///< Ids are b
 inline constexpr std::size_t kMaxCamerasPerRig = 16;
 inline constexpr std::size_t kMaxSubmaps = std::size_t{1} << 20;
 inline constexpr std::size_t kLandmarksPerRecord = 4096;
+
+/// Ids of landmarks are below this in a map of so many, those merged into others counted. Most ids
+/// of a long session are of landmarks that are gone, yet memory goes by the largest one.
+constexpr std::uint32_t max_end_landmark(std::size_t num_landmarks) {
+  constexpr std::uint64_t kAnyway = std::uint64_t{1} << 24, kPerLandmark = 4096;
+  const std::uint64_t num_counted = std::min<std::uint64_t>(num_landmarks, kMaxIds);
+  return static_cast<std::uint32_t>(
+      std::min<std::uint64_t>(kMaxIds, kAnyway + kPerLandmark * num_counted));
+}
+
+/// What a number may be; NaN never is within.
+struct NumberRange {
+  double low = std::numeric_limits<double>::lowest();
+  double high = std::numeric_limits<double>::max();
+
+  /// Whether a number may be so.
+  constexpr bool contains(double number) const { return number >= low && number <= high; }
+};
+
+// What the numbers of a map may be: the writer asks for it as the reader does, so that no map is
+// written that cannot be read.
+inline constexpr NumberRange kNotNegative{0.0};
+inline constexpr NumberRange kPositive{std::numeric_limits<double>::min()};
+inline constexpr NumberRange kScaleRange{1e-12, 1e12};
+inline constexpr NumberRange kLengthRange{-1e15, 1e15};
+inline constexpr NumberRange kLandmarkSizeRange{0.0, kLengthRange.high};
+inline constexpr NumberRange kDirectionRange{-2.0, 2.0};
+inline constexpr NumberRange kAngleRange{-10.0, 10.0};  ///< In radians.
+inline constexpr NumberRange kFeatureSizeRange{kPositive.low, kAngleRange.high};
+inline constexpr NumberRange kSlopeRange{-1e9, 1e9};  ///< In pixels per unit of bearing.
+inline constexpr double kMaxNormError = 1e-6;         ///< Of quaternions.
+
+/// A number that is not what it may be, and its place.
+struct OutsideNumber {
+  std::size_t index = 0;
+  double number = 0.0;
+};
+
+/// The first number of an array's elements that is outside of the range; nothing if none is, or
+/// they hold no floating-point numbers.
+template <class T>
+std::optional<OutsideNumber> find_outside(const std::vector<T>& values, const NumberRange& range) {
+  if constexpr (std::is_floating_point_v<T>) {
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      const auto number = static_cast<double>(values[i]);
+      if (!range.contains(number)) return OutsideNumber{i, number};
+    }
+  } else if constexpr (requires { typename T::Scalar; }) {
+    constexpr std::size_t kPerElement = sizeof(T) / sizeof(typename T::Scalar);
+    for (std::size_t i = 0; i < kPerElement * values.size(); ++i) {
+      const auto number = static_cast<double>(values[i / kPerElement].data()[i % kPerElement]);
+      if (!range.contains(number)) return OutsideNumber{i, number};
+    }
+  }
+  return std::nullopt;
+}
 
 // Arrays are written and read as they lie in memory.
 static_assert(std::endian::native == std::endian::little);

@@ -15,8 +15,6 @@
 namespace waymark {
 namespace {
 
-constexpr NumberRange kScale{1e-12, 1e12};
-constexpr NumberRange kLength{-1e15, 1e15};
 constexpr std::size_t kMaxCameraNumbers = 16;
 constexpr std::uint64_t kMaxImageSizePx = 1u << 16;
 
@@ -131,7 +129,7 @@ void MapReader::read_keyframe(MapRecord& record) {
   keyframe.submap = record.id<SubmapId>("submap", parts_.submaps.size());
   keyframe.parent = record.id<KeyframeId>("parent", parts_.end_keyframe.value);
   keyframe.rig_from_world = record.transform("rig_from_world");
-  keyframe.applied_scale = record.number("applied_scale", kScale);
+  keyframe.applied_scale = record.number("applied_scale", kScaleRange);
   keyframe.features = read_features(record, *keyframe.rig);
   keyframe.landmarks = record.array<LandmarkId>("landmark", keyframe.features->size());
   parts_.keyframes.push_back(std::move(stored));
@@ -162,13 +160,13 @@ void MapReader::read_landmarks(MapRecord& record) {
   const std::vector<LandmarkId> ids = read_landmark_ids(record, parts_.landmarks);
   const std::size_t count = ids.size();
   const auto submaps = record.array<SubmapId>("submap", count);
-  const auto positions = record.array<Eigen::Vector3d>("position_in_world", count, kLength);
+  const auto positions = record.array<Eigen::Vector3d>("position_in_world", count, kLengthRange);
   const auto references = record.array<KeyframeId>("reference", count);
   const auto num_visible = record.array<std::uint32_t>("num_visible", count);
   const auto num_found = record.array<std::uint32_t>("num_found", count);
   const auto descriptors = record.array<Descriptor>("descriptor", count);
-  const auto directions = record.array<Eigen::Vector3d>("direction", count, {-2.0, 2.0});
-  const auto sizes_m = record.array<double>("size_m", count, {0.0, kLength.high});
+  const auto directions = record.array<Eigen::Vector3d>("direction", count, kDirectionRange);
+  const auto sizes_m = record.array<double>("size_m", count, kLandmarkSizeRange);
   for (std::size_t i = 0; i < count; ++i) {
     MapParts::StoredLandmark stored{ids[i], {}};
     stored.landmark.submap = submaps[i];
@@ -185,8 +183,8 @@ void MapReader::read_erased_keyframe(MapRecord& record) {
   KeyframeForwarding forwarding;
   forwarding.heir = record.id<KeyframeId>("heir", parts_.end_keyframe.value);
   forwarding.rig_from_heir = record.transform("rig_from_heir");
-  forwarding.heir_scale = record.number("heir_scale", kScale);
-  forwarding.scale = record.number("scale", kScale);
+  forwarding.heir_scale = record.number("heir_scale", kScaleRange);
+  forwarding.scale = record.number("scale", kScaleRange);
   parts_.erased_keyframes.push_back({KeyframeId{static_cast<std::uint32_t>(id_)}, forwarding});
 }
 
@@ -203,7 +201,7 @@ void MapReader::read_loop_edge(MapRecord& record) {
   edge.from = record.id<KeyframeId>("from", parts_.end_keyframe.value);
   edge.to = record.id<KeyframeId>("to", parts_.end_keyframe.value);
   const Rigid3 rigid = record.transform("to_from_from");
-  edge.to_from_from = {rigid.rotation, rigid.translation, record.number("scale", kScale)};
+  edge.to_from_from = {rigid.rotation, rigid.translation, record.number("scale", kScaleRange)};
   parts_.loop_edges.push_back(edge);
 }
 
@@ -233,6 +231,14 @@ void MapReader::check_ids() const {
     if (!is_among(parts_.landmarks, merged.id)) continue;
     throw InputError(fmt::format("{}: merged_landmarks", name_),
                      fmt::format("landmark {} is there, too, expected it gone", merged.id.value));
+  }
+  const std::size_t num_landmarks = parts_.landmarks.size() + parts_.merged_landmarks.size();
+  if (parts_.end_landmark.value > max_end_landmark(num_landmarks)) {
+    throw InputError(fmt::format("{}: map 0", name_),
+                     fmt::format("end_landmark is {}, expected at most {} for {} landmarks",
+                                 parts_.end_landmark.value,
+                                 max_end_landmark(num_landmarks),
+                                 num_landmarks));
   }
   const std::size_t num_keyframes = parts_.keyframes.size() + parts_.erased_keyframes.size();
   if (num_keyframes != parts_.end_keyframe.value) {

@@ -15,8 +15,6 @@
 namespace waymark {
 namespace {
 
-constexpr double kMaxNormError = 1e-6;
-
 using Kind = MsgpackValue::Kind;
 
 /// The value at bytes[at] of sound bytes; steps behind it.
@@ -167,7 +165,7 @@ std::string MapRecord::bytes(std::string_view key) {
 
 double MapRecord::number(std::string_view key, const NumberRange& range) {
   const MsgpackElement& value = take(key);
-  if (value.kind != Kind::kFloat || !(value.number >= range.low && value.number <= range.high)) {
+  if (value.kind != Kind::kFloat || !range.contains(value.number)) {
     fail_value(key, value, fmt::format("a number from {} to {}", range.low, range.high));
   }
   return value.number;

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <cstdint>
 #include <cstring>
-#include <limits>
 #include <optional>
 #include <string>
 #include <string_view>
@@ -18,15 +17,6 @@
 #include "waymark/mapfile/msgpack.h"
 
 namespace waymark {
-
-/// What a number may be; NaN never is within.
-struct NumberRange {
-  double low = std::numeric_limits<double>::lowest();
-  double high = std::numeric_limits<double>::max();
-};
-
-inline constexpr NumberRange kNotNegative{0.0};
-inline constexpr NumberRange kPositive{std::numeric_limits<double>::min()};
 
 /// A value with the bytes of what is in it.
 struct MsgpackElement : MsgpackValue {
@@ -106,20 +96,7 @@ std::vector<T> MapRecord::array(std::string_view key,
   const std::string_view bytes = array_bytes(key, map_array_layout<T>(), count);
   std::vector<T> values(bytes.size() / sizeof(T));
   if (!bytes.empty()) std::memcpy(static_cast<void*>(values.data()), bytes.data(), bytes.size());
-  const auto check = [&](const auto* numbers, std::size_t num_numbers) {
-    for (std::size_t i = 0; i < num_numbers; ++i) {
-      const auto number = static_cast<double>(numbers[i]);
-      if (!(number >= range.low && number <= range.high)) fail_element(key, i, number);
-    }
-  };
-  if constexpr (std::is_floating_point_v<T>) {
-    check(values.data(), values.size());
-  } else if constexpr (requires { typename T::Scalar; }) {
-    using Scalar = typename T::Scalar;
-    if (!values.empty()) {
-      check(values.front().data(), values.size() * sizeof(T) / sizeof(Scalar));
-    }
-  }
+  if (const auto bad = find_outside(values, range)) fail_element(key, bad->index, bad->number);
   return values;
 }
 

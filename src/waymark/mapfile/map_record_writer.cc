@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapfile/map_record_writer.h"
 
+#include <fmt/format.h>
+
+#include <cmath>
+
+#include "waymark/base/check.h"
 #include "waymark/base/crc32.h"
 
 namespace waymark {
@@ -17,12 +22,31 @@ void MapRecordWriter::write_header(int version, std::string_view producer) {
 }
 
 void MapRecordWriter::begin(std::string_view kind, std::uint64_t id) {
+  record_ = fmt::format("{} {}", kind, id);
   add_text("kind", kind);
   add("id", id);
   ++counts_[std::string(kind)];
 }
 
+void MapRecordWriter::fail(const std::string& what) const {
+  throw OutputError(fmt::format("{}: {}", name_, record_), what + "; the file stays as it was");
+}
+
+void MapRecordWriter::fail(std::string_view key, double value) const {
+  fail(fmt::format("{} would hold {:g}, expected what is finite and possible", key, value));
+}
+
+void MapRecordWriter::add_number(std::string_view key, double value, const NumberRange& range) {
+  if (!range.contains(value)) fail(key, value);
+  pack_number(add_key(key), value);
+}
+
 void MapRecordWriter::add_transform(std::string_view key, const Rigid3& transform) {
+  for (const double value : transform.translation) {
+    if (!std::isfinite(value)) fail(key, value);
+  }
+  const double norm = transform.rotation.norm();
+  if (!(std::abs(norm - 1.0) <= kMaxNormError)) fail(key, norm);
   add_key(key);
   pack_map_size(body_, 2);
   pack_text(body_, "rotation");

@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 #include "waymark/base/atomic_file.h"
@@ -17,10 +18,12 @@
 namespace waymark {
 
 /// Writes the records of a map file one after the other, each a MessagePack map that ends with its
-/// checksum. Holds one record at a time. The file is borrowed.
+/// checksum. Holds one record at a time. The file is borrowed. Numbers that readers would refuse
+/// are an OutputError.
 class MapRecordWriter {
  public:
-  explicit MapRecordWriter(AtomicFile& file) : file_(file) {}
+  /// `name` begins error messages: the file.
+  MapRecordWriter(AtomicFile& file, std::string name) : file_(file), name_(std::move(name)) {}
 
   /// The first record, which has no kind.
   void write_header(int version, std::string_view producer);
@@ -31,7 +34,7 @@ class MapRecordWriter {
   void add_flag(std::string_view key, bool value) { pack_flag(add_key(key), value); }
   void add_text(std::string_view key, std::string_view value) { pack_text(add_key(key), value); }
   void add_bytes(std::string_view key, std::string_view value) { pack_bytes(add_key(key), value); }
-  void add_number(std::string_view key, double value) { pack_number(add_key(key), value); }
+  void add_number(std::string_view key, double value, const NumberRange& range);
   void add_numbers(std::string_view key, std::span<const double> values) {
     pack_numbers(add_key(key), values);
   }
@@ -42,7 +45,10 @@ class MapRecordWriter {
     id.is_valid() ? add(key, id.value) : pack_nil(add_key(key));
   }
   template <class T>
-  void add_array(std::string_view key, const std::vector<T>& values) {
+  void add_array(std::string_view key,
+                 const std::vector<T>& values,
+                 const NumberRange& range = {}) {
+    if (const auto bad = find_outside(values, range)) fail(key, bad->number);
     add_raw_array(key,
                   map_array_layout<T>(),
                   values.size(),
@@ -53,15 +59,21 @@ class MapRecordWriter {
   /// The last record: how many there are of each kind.
   void write_counts();
 
+  /// OutputError: what the current record would hold cannot be read again.
+  [[noreturn]] void fail(const std::string& what) const;
+
  private:
   /// Begins a value; what it is goes to the bytes that come back.
   std::string& add_key(std::string_view key);
+  [[noreturn]] void fail(std::string_view key, double value) const;
   void add_raw_array(std::string_view key,
                      const MapArrayLayout& layout,
                      std::size_t count,
                      std::string_view bytes);
 
   AtomicFile& file_;
+  const std::string name_;
+  std::string record_;  // For errors: its kind and id.
   std::string body_;
   std::uint32_t num_keys_ = 0;
   std::map<std::string, std::uint64_t, std::less<>> counts_;

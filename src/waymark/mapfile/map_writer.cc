@@ -6,6 +6,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/rig.h"
+#include "waymark/image/image_header.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_record_writer.h"
@@ -101,17 +102,17 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   std::vector<Eigen::Vector2f> pixels;
   for (const Keypoint& keypoint : keypoints) pixels.emplace_back(keypoint.x_px, keypoint.y_px);
   writer.add_array("pixel", pixels);
-  writer.add_array("angle_rad", column(keypoints, &Keypoint::angle_rad));
+  writer.add_array("angle_rad", column(keypoints, &Keypoint::angle_rad), kAngleRange);
   writer.add_array("response", column(keypoints, &Keypoint::response));
   writer.add_array("level", column(keypoints, &Keypoint::level));
   writer.add_array("camera", column(keypoints, &Keypoint::camera));
   writer.add_array("descriptor", features.descriptors);
   writer.add_array("bearing", features.bearings);
-  writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing);
-  writer.add_array("size_rad", features.size_rad);
+  writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing, kSlopeRange);
+  writer.add_array("size_rad", features.size_rad, kFeatureSizeRange);
   writer.add_array("partner", features.partner);
-  writer.add_array("range_m", features.range_m);
-  writer.add_array("inverse_range_sigma", features.inverse_range_sigma);
+  writer.add_array("range_m", features.range_m, kNotNegative);
+  writer.add_array("inverse_range_sigma", features.inverse_range_sigma, kNotNegative);
 }
 
 void write_keyframes(MapRecordWriter& writer, const Map& map, const RigTable& rigs) {
@@ -123,7 +124,7 @@ void write_keyframes(MapRecordWriter& writer, const Map& map, const RigTable& ri
     writer.add_id("submap", keyframe.submap);
     writer.add_id("parent", keyframe.parent);
     writer.add_transform("rig_from_world", keyframe.rig_from_world);
-    writer.add_number("applied_scale", keyframe.applied_scale);
+    writer.add_number("applied_scale", keyframe.applied_scale, kScaleRange);
     add_features(writer, *keyframe.features);
     writer.add_array("landmark", keyframe.landmarks);
     writer.end();
@@ -158,13 +159,13 @@ struct LandmarkRows {
     writer.begin("landmarks", record_id);
     writer.add_array("landmark", id);
     writer.add_array("submap", submap);
-    writer.add_array("position_in_world", position_in_world);
+    writer.add_array("position_in_world", position_in_world, kLengthRange);
     writer.add_array("reference", reference);
     writer.add_array("num_visible", num_visible);
     writer.add_array("num_found", num_found);
     writer.add_array("descriptor", descriptor);
-    writer.add_array("direction", direction);
-    writer.add_array("size_m", size_m);
+    writer.add_array("direction", direction, kDirectionRange);
+    writer.add_array("size_m", size_m, kLandmarkSizeRange);
     writer.end();
   }
 };
@@ -186,8 +187,8 @@ void write_erased_keyframes(MapRecordWriter& writer, const Map& map) {
     writer.begin("erased_keyframe", id.value);
     writer.add_id("heir", forwarding.heir);
     writer.add_transform("rig_from_heir", forwarding.rig_from_heir);
-    writer.add_number("heir_scale", forwarding.heir_scale);
-    writer.add_number("scale", forwarding.scale);
+    writer.add_number("heir_scale", forwarding.heir_scale, kScaleRange);
+    writer.add_number("scale", forwarding.scale, kScaleRange);
     writer.end();
   });
 }
@@ -219,7 +220,7 @@ void write_loop_edges(MapRecordWriter& writer, const Map& map) {
     writer.add_id("to", edge.to);
     writer.add_transform("to_from_from",
                          {edge.to_from_from.rotation, edge.to_from_from.translation});
-    writer.add_number("scale", edge.to_from_from.scale);
+    writer.add_number("scale", edge.to_from_from.scale, kScaleRange);
     writer.end();
   }
 }
@@ -227,10 +228,38 @@ void write_loop_edges(MapRecordWriter& writer, const Map& map) {
 void write_images(MapRecordWriter& writer, const StoredMap& stored) {
   for (const auto& [id, jpeg] : stored.images) {
     if (!stored.map->keyframes().contains(id)) continue;  // Erased meanwhile.
-    WAYMARK_CHECK(jpeg->size() <= kMaxArrayBytes);
     writer.begin("image", id.value);
+    const std::optional<ImageSize> size = size_in_header(*jpeg);
+    if (jpeg->size() > kMaxArrayBytes || (size && is_too_large(*size))) {
+      writer.fail(fmt::format("jpeg would be too large, expected at most {} megapixels and {} MB",
+                              kMaxMegapixels,
+                              kMaxArrayBytes >> 20));
+    }
     writer.add_bytes("jpeg", *jpeg);
     writer.end();
+  }
+}
+
+/// What readers ask of a map as a whole.
+void check_counts(const MapRecordWriter& writer, const StoredMap& stored) {
+  const Map& map = *stored.map;
+  std::size_t num_landmarks = map.landmarks().size();
+  map.landmark_forwarding().for_each(
+      [&](LandmarkId, LandmarkId survivor) { num_landmarks += survivor.is_valid(); });
+  const std::uint32_t end = map.landmarks().end_id().value;
+  if (end > max_end_landmark(num_landmarks) || map.keyframes().end_id().value > kMaxIds) {
+    writer.fail(fmt::format("would have ids of landmarks up to {}, expected at most {}",
+                            end,
+                            max_end_landmark(num_landmarks)));
+  }
+  if (map.submaps().size() > kMaxSubmaps || stored.settings.size() > kMaxTextBytes) {
+    writer.fail(
+        fmt::format("would have {} sub-maps and {} bytes of settings, expected at most {} "
+                    "and {}",
+                    map.submaps().size(),
+                    stored.settings.size(),
+                    kMaxSubmaps,
+                    kMaxTextBytes));
   }
 }
 
@@ -239,12 +268,12 @@ void write_images(MapRecordWriter& writer, const StoredMap& stored) {
 void save_map(const std::filesystem::path& path, const StoredMap& stored) {
   WAYMARK_CHECK(stored.map != nullptr);
   const Map& map = *stored.map;
-  WAYMARK_CHECK(map.landmarks().end_id().value <= kMaxIds);
   const RigTable rigs(map);
   AtomicFile file(path);
-  MapRecordWriter writer(file);
+  MapRecordWriter writer(file, path.string());
   writer.write_header(kVersion, kProducer);
   writer.begin("map", 0);
+  check_counts(writer, stored);
   writer.add("end_keyframe", map.keyframes().end_id().value);
   writer.add("end_landmark", map.landmarks().end_id().value);
   writer.add_text("settings", stored.settings);
