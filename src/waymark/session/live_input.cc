@@ -28,19 +28,19 @@ std::optional<InputFrame> PacedInput::next() {
   constexpr Clock::duration kStep = 50ms;  // A wait may be long and the user may want to end it.
   std::optional<InputFrame> frame = input_.next();
   if (!frame) return frame;
-  if (!start_) start_ = Start{Clock::now(), frame->timestamp_ns};
-  const double elapsed_s = 1e-9 * static_cast<double>(frame->timestamp_ns - start_->timestamp_ns);
-  const auto since_start = std::chrono::duration_cast<Clock::duration>(
-      std::chrono::duration<double>(elapsed_s / speed_));
+  if (!due_) due_ = Due{Clock::now(), frame->timestamp_ns};
+  const double gap_s = 1e-9 * static_cast<double>(frame->timestamp_ns - due_->timestamp_ns);
+  due_->time += std::chrono::duration_cast<Clock::duration>(
+      std::chrono::duration<double>(std::min(gap_s, kMaxGapS) / speed_));
+  due_->timestamp_ns = frame->timestamp_ns;
   for (auto now = Clock::now(); !should_stop_(); now = Clock::now()) {
     if (is_paused_()) {
       std::this_thread::sleep_for(kStep);
-      start_->time += Clock::now() - now;
+      due_->time += Clock::now() - now;
       continue;
     }
-    const Clock::time_point due = start_->time + since_start;
-    if (now >= due) break;
-    std::this_thread::sleep_for(std::min(due - now, kStep));
+    if (now >= due_->time) break;
+    std::this_thread::sleep_for(std::min(due_->time - now, kStep));
   }
   return frame;
 }

@@ -17,10 +17,14 @@
 namespace waymark {
 
 /// Another input at its own rate, as a camera would give it: each frame comes no earlier after the
-/// first than its time stamp says. Does not wait once should_stop() says so; while is_paused() says
-/// so, its clock stands still.
+/// first than its time stamp says, but for gaps between time stamps: more than kMaxGapS of them
+/// counts as that. Does not wait once should_stop() says so; while is_paused() says so, its clock
+/// stands still.
 class PacedInput : public Input {
  public:
+  /// In seconds: a wrong time stamp must not hold up everything.
+  static constexpr double kMaxGapS = 10.0;
+
   /// speed: times the input's own rate.
   PacedInput(Input& input,
              double speed,
@@ -37,7 +41,8 @@ class PacedInput : public Input {
  private:
   using Clock = std::chrono::steady_clock;
 
-  struct Start {
+  /// When a frame is due.
+  struct Due {
     Clock::time_point time;
     std::int64_t timestamp_ns = 0;
   };
@@ -46,7 +51,7 @@ class PacedInput : public Input {
   const double speed_;
   const std::function<bool()> should_stop_;
   const std::function<bool()> is_paused_;
-  std::optional<Start> start_;
+  std::optional<Due> due_;  // Of the last frame.
 };
 
 /// Another input that comes when it comes, read in a thread of its own: frames for which there is

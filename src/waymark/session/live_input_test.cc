@@ -24,6 +24,17 @@ std::vector<std::size_t> indices_of(const std::vector<InputFrame>& frames) {
   return indices;
 }
 
+TEST(PacedInput, WaitsNoLongerForAWrongTimeStamp) {
+  std::vector<InputFrame> frames = small_frames(3);
+  for (std::size_t i = 1; i < 3; ++i) {
+    frames[i].timestamp_ns +=
+        static_cast<std::int64_t>(i) * 4'000'000'000'000'000'000;  // 127 years.
+  }
+  MemoryInput input(frames);
+  PacedInput paced(input, 1000.0, never, never);
+  EXPECT_THAT(indices_of(read_all(paced)), ElementsAre(0, 1, 2));
+}
+
 TEST(LiveInput, GivesEveryFrameToWhoKeepsUp) {
   MemoryInput input(small_frames(20));
   std::counting_semaphore<> wanted(0);
