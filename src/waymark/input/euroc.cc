@@ -22,6 +22,12 @@ std::filesystem::path mav0_of(const std::filesystem::path& folder) {
   return std::filesystem::is_directory(folder / "mav0") ? folder / "mav0" : folder;
 }
 
+/// Of a data set, where a pipe or a device has no business.
+ConfigSource read_yaml(const std::filesystem::path& path) {
+  constexpr std::size_t kMaxBytes = std::size_t{1} << 20;
+  return {path.string(), read_text_file(path, "a YAML file", kMaxBytes)};
+}
+
 const ConfigNode& require(const ConfigNode& config,
                           const ConfigSource& source,
                           std::string_view key) {
@@ -50,7 +56,7 @@ CameraChain read_sensors(const std::filesystem::path& mav0, std::size_t num_came
   Rigid3 body_from_camera0;
   for (std::size_t i = 0; i < num_cameras; ++i) {
     const std::filesystem::path path = mav0 / fmt::format("cam{}", i) / "sensor.yaml";
-    const EurocSensor sensor = parse_euroc_sensor(ConfigSource::from_file(path));
+    const EurocSensor sensor = parse_euroc_sensor(read_yaml(path));
     if (i == 0) body_from_camera0 = sensor.body_from_sensor;
     const Rigid3 cam_from_rig =
         i == 0 ? Rigid3() : sensor.body_from_sensor.inverse() * body_from_camera0;
@@ -65,7 +71,7 @@ std::optional<CameraChain> read_calibration(const std::filesystem::path& mav0,
     return read_sensors(mav0, num_cameras);
   const std::filesystem::path camchain = (mav0 / ".." / "dso" / "camchain.yaml").lexically_normal();
   if (!std::filesystem::exists(camchain)) return std::nullopt;
-  return read_camchain(parse_config(ConfigSource::from_file(camchain)));
+  return read_camchain(parse_config(read_yaml(camchain)));
 }
 
 std::vector<EurocImage> read_images(const std::filesystem::path& mav0, std::size_t camera) {
@@ -166,11 +172,10 @@ Rigid3 euroc_sensor_from_camera0(const std::filesystem::path& csv_path) {
   const std::filesystem::path sensor_folder = std::filesystem::absolute(csv_path).parent_path();
   const std::filesystem::path camera_yaml = sensor_folder.parent_path() / "cam0" / "sensor.yaml";
   if (sensor_folder.filename() == "cam0" || !std::filesystem::exists(camera_yaml)) return {};
-  const Rigid3 body_from_camera0 =
-      parse_euroc_sensor(ConfigSource::from_file(camera_yaml)).body_from_sensor;
+  const Rigid3 body_from_camera0 = parse_euroc_sensor(read_yaml(camera_yaml)).body_from_sensor;
   const std::filesystem::path own_yaml = sensor_folder / "sensor.yaml";
   if (!std::filesystem::exists(own_yaml)) return body_from_camera0;
-  const ConfigSource source = ConfigSource::from_file(own_yaml);
+  const ConfigSource source = read_yaml(own_yaml);
   const ConfigNode config = parse_config(source);
   if (config.find("T_BS") == nullptr) return body_from_camera0;
   return read_body_from_sensor(config, source).inverse() * body_from_camera0;

@@ -41,7 +41,10 @@ std::string recognize(const std::filesystem::path& path) {
 std::filesystem::path video_of(const std::filesystem::path& path) {
   if (!std::filesystem::is_directory(path)) return path;
   const std::vector<std::filesystem::path> videos = list_videos(path);
-  if (videos.size() == 1) return videos.front();
+  if (videos.size() == 1) {
+    if (std::filesystem::is_regular_file(videos.front())) return videos.front();
+    throw InputError(videos.front().string(), "is no regular file, expected a video");
+  }
   throw InputError(path.string(), fmt::format("holds {} videos, expected one", videos.size()));
 }
 
