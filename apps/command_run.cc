@@ -10,6 +10,7 @@
 #include "commands.h"
 #include "input_command.h"
 #include "live_control.h"
+#include "numbers.h"
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/session/autosave.h"
@@ -186,7 +187,7 @@ void add_pace_option(CLI::App& command, RunOptions& options) {
       ->expected(0, 1)
       ->default_str("1")
       ->type_name("[X]")
-      ->check(CLI::Range(1e-3, 1e3));
+      ->check(number_between(1e-3, 1e3));
 }
 
 void add_map_options(CLI::App& command, RunOptions& options) {
@@ -200,7 +201,7 @@ void add_map_options(CLI::App& command, RunOptions& options) {
                   options.autosave_s,
                   "Save it every so many seconds while running, too; 0: at the end only [60]")
       ->needs(&map_out)
-      ->check(CLI::Range(0.0, 1e6));
+      ->check(number_between(0.0, 1e6));
   command
       .add_flag("--keep-images",
                 options.session.reading.has_jpeg,

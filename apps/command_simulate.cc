@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "numbers.h"
 #include "reporter.h"
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
@@ -176,10 +177,10 @@ void add_simulate_command(CLI::App& program, Command& command) {
       ->check(CLI::Range(1, 1000000))
       ->capture_default_str();
   simulation.add_option("--rate", spec.rate_hz, "Frames per second")
-      ->check(CLI::Range(0.1, 1000.0))
+      ->check(number_between(0.1, 1000.0))
       ->capture_default_str();
   simulation.add_option("--noise", spec.effects.noise_sigma, "Sigma of the grey values")
-      ->check(CLI::Range(0.0, 100.0))
+      ->check(number_between(0.0, 100.0))
       ->capture_default_str();
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");

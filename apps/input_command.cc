@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "numbers.h"
 #include "waymark/base/frame_state.h"
 #include "waymark/input/decode.h"
 
@@ -46,11 +47,10 @@ void add_input_options(CLI::App& command, SessionOptions& options) {
 
 void add_selection_options(CLI::App& command, InputOptions& reading) {
   command.add_option("--first", reading.first, "Index of the first frame to use [0]")
-      ->check(CLI::NonNegativeNumber);
+      ->check(whole_from(0));
   command.add_option("--frames", reading.frames, "Use at most so many frames [all]")
-      ->check(CLI::PositiveNumber);
-  command.add_option("--every", reading.every, "Use each N-th frame [1]")
-      ->check(CLI::PositiveNumber);
+      ->check(whole_from(1));
+  command.add_option("--every", reading.every, "Use each N-th frame [1]")->check(whole_from(1));
   command.add_option(
       "--mask",
       reading.mask,

@@ -10,21 +10,24 @@
 #include <algorithm>
 #include <cstdio>
 #include <exception>
+#include <filesystem>
 #include <string>
+#include <system_error>
 #include <vector>
 
 #include "commands.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
-
 namespace {
 
 /// One line, whatever the message holds.
 int fail(int status, std::string message) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  print_message("error: {}\n", message);
+  print_message("error: {}
+", message);
   return status;
 }
 
@@ -86,6 +89,8 @@ int main(int argc, char** argv) {
     return status;
   } catch (const waymark::InputError& error) {
     return waymark::fail(waymark::kBadInput, error.what());
+  } catch (const std::filesystem::filesystem_error&) {
+    return waymark::fail(waymark::kBadInput, waymark::describe_failure(std::current_exception()));
   } catch (const std::exception&) {
     return waymark::fail(waymark::kCouldNotFinish,
                          waymark::describe_failure(std::current_exception()));

@@ -11,6 +11,7 @@
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
@@ -81,7 +82,7 @@ void Reporter::progress(std::size_t num_done,
   }
   text += fmt::format(", {:.1f} frames/s, {}", frames_per_s, state);
   if (is_terminal_) {
-    print_message("\r\x1b[K{}", text);
+    write_text(stderr, "\r\x1b[K" + printable(text));
     std::fflush(stderr);
     is_bar_shown_ = true;
   } else {
@@ -91,7 +92,7 @@ void Reporter::progress(std::size_t num_done,
 
 void Reporter::finish_progress() {
   if (!is_bar_shown_) return;
-  print_message("\r\x1b[K");
+  write_text(stderr, "\r\x1b[K");
   std::fflush(stderr);
   is_bar_shown_ = false;
 }
@@ -101,7 +102,8 @@ void Reporter::check_log() const {
   throw OutputError(log_path_.string(), "messages got lost, expected enough space for --log");
 }
 
-void Reporter::write(std::string_view line, bool to_terminal) {
+void Reporter::write(std::string_view text, bool to_terminal) {
+  const std::string line = printable(text);
   if (log_.is_open()) log_ << line << '\n' << std::flush;
   if (!to_terminal) return;
   finish_progress();

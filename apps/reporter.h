@@ -43,7 +43,7 @@ class Reporter {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void write(std::string_view line, bool to_terminal);
+  void write(std::string_view text, bool to_terminal);
 
   Verbosity verbosity_;
   bool is_terminal_;

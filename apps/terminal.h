@@ -8,8 +8,11 @@
 #include <string_view>
 #include <utility>
 
+#include "waymark/base/text.h"
+
 /// The standard streams, which may be closed, full or nobody's any more: writing to them never
-/// throws, since what was computed is worth more than what is said of it.
+/// throws, since what was computed is worth more than what is said of it. Control characters in
+/// what is printed, which may hold texts of files or their names, do not reach the terminal.
 namespace waymark {
 
 /// Opens what is closed of the standard streams to nowhere, so that no file that is opened later
@@ -22,13 +25,13 @@ void write_text(std::FILE* stream, std::string_view text);
 /// Results that were asked for, to standard output.
 template <class... Arguments>
 void print_result(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-  write_text(stdout, fmt::format(format, std::forward<Arguments>(arguments)...));
+  write_text(stdout, printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
 }
 
 /// Messages, to standard error.
 template <class... Arguments>
 void print_message(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-  write_text(stderr, fmt::format(format, std::forward<Arguments>(arguments)...));
+  write_text(stderr, printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
 }
 
 /// Throws OutputError when something written to standard output got lost.

@@ -81,13 +81,41 @@ class Usage(CliTest):
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
         self.assert_fails(waymark("run", self.folder, "--every", "0"), 2, "--every")
-        self.assert_fails(waymark("run", self.folder, "--pace=0"), 2, "--pace")
+        for number in ("0", "nan", "inf", "1e9", "fast"):
+            self.assert_fails(waymark("run", self.folder, f"--pace={number}"), 2, "--pace",
+                              f"is {number}, expected a number from 0.001 to 1000")
+        self.assert_fails(waymark("run", self.folder, "--map-out", "m.wmap", "--autosave", "nan"), 2, "--autosave")
+        self.assert_fails(waymark("simulate", "room", "--rate", "nan"), 2, "--rate")
+        self.assert_fails(waymark("simulate", "room", "--noise", "nan"), 2, "--noise")
+        for number in ("0", "-1", "nan", "1.5"):
+            self.assert_fails(waymark("run", self.folder, "--frames", number), 2,
+                              f"--frames: is {number}, expected 1 or more")
         self.assert_fails(waymark("run", self.folder, "--quiet", "--verbose"), 2, "--quiet")
 
     def test_settings_are_no_map(self):
         settings = self.config("Camera: {name: a}\n")
         self.assert_fails(waymark("import", settings, "-o", self.folder / "map.wmap"), 2, "--settings")
         self.assertFalse((self.folder / "map.wmap").exists())
+
+    def test_control_characters_of_names_stay_out_of_the_terminal(self):
+        name = "\x1b]0;owned\a.wmap"
+        for arguments in (("map", "info", self.folder / name), ("run", self.folder / name),
+                          ("run", self.folder, f"--{name}"), (name,)):
+            done = waymark(*arguments)
+            self.assert_fails(done, 2, "\\x1b]0;owned\\x07")
+            self.assertNotRegex(done.stderr, "[\x00-\x09\x0b-\x1f]")
+
+    def test_what_the_system_denies_is_no_internal_failure(self):
+        done = waymark("run", 300 * "a")
+        self.assert_fails(done, 2, "a: File name too long, expected")
+        self.assertNotIn("internal", done.stderr)
+
+        def no_room_for_stacks():
+            resource.setrlimit(resource.RLIMIT_STACK, (2**47, resource.RLIM_INFINITY))
+
+        if resource.getrlimit(resource.RLIMIT_STACK)[1] == resource.RLIM_INFINITY:
+            done = self.run_on(self.sequence("stereo"), preexec_fn=no_room_for_stacks)
+            self.assert_fails(done, 1, "cannot start another thread", "expected higher limits")
 
     def test_settings_are_printed_and_checked(self):
         printed = waymark("config")
@@ -377,6 +405,26 @@ class BadInput(CliTest):
         camera = self.config("cam0: {camera_model: pinhole}\n")
         self.assert_fails(waymark("simulate", "room", "--camera", camera, "--setup", "mono", "-o",
                                   self.out), 2, camera)
+
+    def test_pipes_in_a_data_set(self):
+        for name in ("mav0/cam0/sensor.yaml", "mav0/cam0/data.csv"):
+            source = self.sequence("stereo")
+            (source / name).unlink()
+            os.mkfifo(source / name)
+            self.assert_fails(self.run_on(source), 2, name, "is no regular file, expected")
+            shutil.rmtree(source)
+        video = self.folder / "videos" / "walk.mkv"
+        video.parent.mkdir()
+        os.mkfifo(video)
+        self.assert_fails(self.run_on(video.parent), 2, "walk.mkv: is no regular file")
+
+    def test_settings_from_a_pipe(self):
+        reading, writing = os.pipe()
+        os.write(writing, b"features: {count: 900}\n")
+        os.close(writing)
+        done = waymark("config", f"/dev/fd/{reading}", pass_fds=[reading])
+        os.close(reading)
+        self.assertEqual(done.returncode, 0, done.stderr)
 
     def test_missing_config(self):
         done = self.run_on(self.sequence("stereo"), "-c", self.folder / "no.yaml")

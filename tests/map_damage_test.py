@@ -152,6 +152,14 @@ class MapDamage(CliTest):
             num_kinds += 1
         self.assertGreaterEqual(num_kinds, 40)
 
+    def test_control_characters_stay_out_of_the_terminal(self):
+        records = map_records.split(self.map.read_bytes())
+        records[0]["producer"] = "\x1b[31mred\x07\r\n\x7f\x9b"
+        self.map.write_bytes(map_records.join(records))
+        done = waymark("map", "info", self.map)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("written by \\x1b[31mred\\x07\\x0d\\x0a\\x7f\\xc2\\x9b,", done.stdout)
+
     def test_damaged_bytes(self):
         whole, rng = self.map.read_bytes(), random.Random(3)
         self.refuse("empty", b"", "is truncated")

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <exception>
+#include <filesystem>
 #include <new>
 #include <stdexcept>
 #include <string>
+#include <system_error>
 
 namespace waymark {
 
@@ -44,6 +46,15 @@ inline std::string describe_failure(const std::exception_ptr& failure) {
     return error.what();
   } catch (const std::bad_alloc&) {
     return "waymark: out of memory";
+  } catch (const std::filesystem::filesystem_error& error) {
+    const std::string path = error.path1().empty() ? "waymark" : error.path1().string();
+    return path + ": " + error.code().message() + ", expected a path that can be used";
+  } catch (const std::system_error& error) {
+    if (error.code() == std::errc::resource_unavailable_try_again) {
+      return "waymark: cannot start another thread: " + error.code().message() +
+             ", expected higher limits of threads and memory (ulimit -u, -v)";
+    }
+    return std::string("waymark: ") + error.what();
   } catch (const std::exception& error) {
     return std::string("waymark: internal failure: ") + error.what();
   }

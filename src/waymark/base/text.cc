@@ -38,6 +38,21 @@ std::optional<Integer> parse_integer(std::string_view text) {
   return value;
 }
 
+/// How many bytes at the start are one character of UTF-8 that may be shown; 0: none is.
+std::size_t printable_length(std::string_view text) {
+  const auto byte = [&](std::size_t at) { return static_cast<unsigned char>(text[at]); };
+  const unsigned char first = byte(0);
+  if (first < 0x80) return first >= 0x20 && first != 0x7F ? 1 : 0;
+  if (first < 0xC2 || first > 0xF4) return 0;
+  const std::size_t length = first < 0xE0 ? 2 : first < 0xF0 ? 3 : 4;
+  if (text.size() < length) return 0;
+  for (std::size_t i = 1; i < length; ++i) {
+    if ((byte(i) & 0xC0) != 0x80) return 0;
+  }
+  const bool is_control = first == 0xC2 && byte(1) < 0xA0;
+  return is_control ? 0 : length;
+}
+
 /// digits * 10^exponent, the sign apart.
 struct Decimal {
   std::string digits;
@@ -252,6 +267,20 @@ std::string read_text_file(const std::filesystem::path& path,
   if (!stream)
     throw InputError(path.string(), fmt::format("cannot be read, expected {}", expected));
   return content;
+}
+
+std::string printable(std::string_view text, bool has_lines) {
+  std::string result;
+  for (std::size_t at = 0; at < text.size();) {
+    const std::size_t length = printable_length(text.substr(at));
+    if (length > 0 || (has_lines && text[at] == '\n')) {
+      result += text.substr(at, std::max<std::size_t>(length, 1));
+    } else {
+      result += fmt::format("\\x{:02x}", static_cast<unsigned char>(text[at]));
+    }
+    at += std::max<std::size_t>(length, 1);
+  }
+  return result;
 }
 
 std::string quote_for_message(std::string_view text) {

@@ -82,6 +82,10 @@ std::string read_text_file(const std::filesystem::path& path,
                            std::string_view expected,
                            std::size_t max_bytes = std::size_t{256} << 20);
 
+/// Text fit for a terminal: control characters (of ASCII, and the C1 set of Unicode) and bytes that
+/// are not UTF-8 come out as \xNN; ends of lines stay where the text is to have several.
+std::string printable(std::string_view text, bool has_lines = false);
+
 /// A piece of foreign text made fit for a one-line message: quoted, shortened, printable.
 std::string quote_for_message(std::string_view text);
 

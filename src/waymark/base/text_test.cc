@@ -149,6 +149,18 @@ TEST(QuoteForMessage, StaysOneShortLine) {
   EXPECT_LT(quote_for_message(std::string(1000, 'x')).size(), 50u);
 }
 
+TEST(Printable, ShowsControlCharacters) {
+  EXPECT_EQ(printable("plain \xC3\xA4\xE2\x82\xAC\xF0\x9F\x98\x80 text"),
+            "plain \xC3\xA4\xE2\x82\xAC\xF0\x9F\x98\x80 text");
+  EXPECT_EQ(printable("\x1B]0;title\a\r\n\t\x7F"), "\\x1b]0;title\\x07\\x0d\\x0a\\x09\\x7f");
+  EXPECT_EQ(printable("\xC2\x9B"
+                      "31m"),
+            "\\xc2\\x9b31m");  // CSI as one character.
+  EXPECT_EQ(printable("\x9B\xE4\xE2\x82"), "\\x9b\\xe4\\xe2\\x82");
+  EXPECT_EQ(printable("a\nb\r\n", true), "a\nb\\x0d\n");
+  EXPECT_EQ(printable(std::string("\0", 1)), "\\x00");
+}
+
 TEST(ReadTextFile, NamesWhatIsMissing) {
   const testing::TemporaryFolder folder;
   EXPECT_THAT(testing::input_error_of([&] { read_text_file(folder / "no.txt", "a list"); }),
