@@ -170,6 +170,20 @@ class Inputs(CliTest):
                         "-c:v", "ffv1", video], check=True)
         self.assert_maps(video, "-c", self.folder / "camchain.yaml")
 
+    def test_calibration_that_folds_back_in_the_corners(self):
+        camera = self.config("cam0:\n  camera_model: pinhole\n  intrinsics: [265, 265, 187.5, 119.5]\n"
+                             "  distortion_model: radtan\n  distortion_coeffs: [-0.35, 0.05, 0, 0]\n"
+                             "  resolution: [376, 240]\n")
+        source, saved = self.folder / "folded", self.folder / "folded.wmap"
+        done = waymark("simulate", "room", "--motion", "slide", "--camera", camera, "--setup", "rgbd", "--frames", 12,
+                       "-o", source)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.run_on(source, "-c", source / "camchain.yaml", "--map-out", saved)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertRegex(done.stderr, r"camera 0: the calibration has no direction for \d+\.\d % of the pixels")
+        self.assertEqual(self.summary()["tracked"], 12)
+        self.assertEqual(waymark("map", "check", saved).returncode, 0)
+
     def test_part_of_an_input(self):
         done = self.run_on(self.sequence("stereo"), "--first", 4, "--frames", 6, "--every", 2)
         self.assertEqual(done.returncode, 0, done.stderr)

@@ -53,4 +53,19 @@ double central_pixel_angle(const Camera& camera) {
   return PixelAngles(camera).at({0.5 * camera.width_px(), 0.5 * camera.height_px()});
 }
 
+double part_without_bearing(const Camera& camera) {
+  constexpr int kNumPerAxis = 40;
+  std::vector<Eigen::Vector2d> pixels;
+  for (int i = 0; i < kNumPerAxis * kNumPerAxis; ++i) {
+    const double column = (i % kNumPerAxis + 0.5) / kNumPerAxis;
+    const double row = (i / kNumPerAxis + 0.5) / kNumPerAxis;
+    pixels.emplace_back(camera.width_px() * column - 0.5, camera.height_px() * row - 0.5);
+  }
+  std::vector<Eigen::Vector3d> bearings(pixels.size());
+  std::vector<std::uint8_t> is_valid(pixels.size());
+  camera.unproject(pixels, bearings, is_valid);
+  const auto num_invalid = std::count(is_valid.begin(), is_valid.end(), 0);
+  return static_cast<double>(num_invalid) / static_cast<double>(pixels.size());
+}
+
 }  // namespace waymark

@@ -40,4 +40,8 @@ class PixelAngles {
 /// Angle in radians that a pixel at the centre of the image subtends.
 double central_pixel_angle(const Camera& camera);
 
+/// Part of the image's pixels that have no direction: outside of an image circle, or where the
+/// calibration folds back. By a grid of pixels.
+double part_without_bearing(const Camera& camera);
+
 }  // namespace waymark

@@ -17,6 +17,7 @@
 #include "waymark/camera/equirectangular.h"
 #include "waymark/camera/fisheye.h"
 #include "waymark/camera/perspective.h"
+#include "waymark/camera/pixel_angles.h"
 #include "waymark/camera/unified.h"
 #include "waymark/camera/unknown_camera.h"
 
@@ -58,9 +59,9 @@ bool is_name(std::string_view text) {
          std::ranges::all_of(text, [](char c) { return c > 0x20 && c < 0x7F; });
 }
 
-// Part of the image that may lie beyond a field of view of less than 180 degrees: extreme corners,
-// where polynomials are least certain.
-constexpr double kMaxInvalidPart = 0.05;
+// Calibrations are least certain in the extreme corners, where polynomials of real lenses may fold
+// back; features are kept away from there. With more than this the numbers are wrong.
+constexpr double kMaxInvalidPart = 0.5;
 // Images of wider cameras have a circle with black corners, on the sensors in use often a half.
 constexpr double kMaxInvalidPartWide = 0.6;
 // 360 degree images are twice as wide as high, save for rounding.
@@ -68,23 +69,7 @@ constexpr double kMaxAspectError = 0.01;
 
 using CameraPointer = std::shared_ptr<const Camera>;
 
-/// Part of the image's pixels that have no direction.
-double invalid_part(const Camera& camera) {
-  constexpr int kNumPerAxis = 40;
-  std::vector<Eigen::Vector2d> pixels;
-  for (int i = 0; i < kNumPerAxis * kNumPerAxis; ++i) {
-    const double column = (i % kNumPerAxis + 0.5) / kNumPerAxis;
-    const double row = (i / kNumPerAxis + 0.5) / kNumPerAxis;
-    pixels.emplace_back(camera.width_px() * column - 0.5, camera.height_px() * row - 0.5);
-  }
-  std::vector<Eigen::Vector3d> bearings(pixels.size());
-  std::vector<std::uint8_t> is_valid(pixels.size());
-  camera.unproject(pixels, bearings, is_valid);
-  const auto num_invalid = std::count(is_valid.begin(), is_valid.end(), 0);
-  return static_cast<double>(num_invalid) / static_cast<double>(pixels.size());
-}
-
-/// The camera of a model, unless it folds back inside the image, which only wrong numbers do.
+/// The camera of a model, unless it folds back so far inside the image as only wrong numbers do.
 template <class Model>
 CameraPointer make_unfolded(const CameraDescription& description,
                             Model model,
@@ -93,7 +78,7 @@ CameraPointer make_unfolded(const CameraDescription& description,
   auto camera = std::make_shared<const ModelCamera<Model>>(
       std::move(model), description.width_px, description.height_px);
   const double most = end_rad < 0.5 * std::numbers::pi ? kMaxInvalidPart : kMaxInvalidPartWide;
-  const double part = invalid_part(*camera);
+  const double part = part_without_bearing(*camera);
   if (part <= most) return camera;
   const Model& made = camera->parameters();
   const double inside_rad = end_rad * (1.0 - 1e-9);

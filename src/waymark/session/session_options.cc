@@ -9,6 +9,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/camera/pixel_angles.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
@@ -33,6 +34,17 @@ std::string describe(const ChainCamera& camera, std::size_t index) {
                      description.distortion_model,
                      description.width_px,
                      description.height_px);
+}
+
+/// What is kept free of features as it has no direction; nothing if that is nothing.
+std::optional<std::string> describe_unused(const Camera& camera, std::size_t index) {
+  const double part = part_without_bearing(camera);
+  if (part == 0.0) return std::nullopt;
+  return fmt::format(
+      "camera {}: the calibration has no direction for {:.1f} % of the pixels, which "
+      "are kept free of features",
+      index,
+      100.0 * part);
 }
 
 }  // namespace
@@ -68,6 +80,9 @@ PreparedInput prepare_input(const SessionOptions& options) {
   prepared.description = info.lines;
   for (std::size_t i = 0; i < info.calibration->cameras.size(); ++i) {
     prepared.description.push_back(describe(info.calibration->cameras[i], i));
+    if (auto unused = describe_unused(*prepared.rig.cameras[i].camera, i)) {
+      prepared.description.push_back(*std::move(unused));
+    }
   }
   for (const std::string& note : info.calibration->notes) {
     prepared.description.push_back("note: " + note);
