@@ -20,9 +20,9 @@ inline CLI::Validator number_between(double low, double high) {
   const auto check = [low, high](const std::string& text) {
     const std::optional<double> number = parse_number(text);
     if (number && *number >= low && *number <= high) return std::string();
-    return fmt::format("is {}, expected a number from {:g} to {:g}", text, low, high);
+    return fmt::format("is {}, expected a number from {} to {}", text, low, high);
   };
-  return CLI::Validator(check, fmt::format("[{:g} to {:g}]", low, high));
+  return CLI::Validator(check, fmt::format("[{} to {}]", low, high));
 }
 
 /// A whole number of digits alone, from least on.

@@ -316,6 +316,10 @@ class BadInput(CliTest):
         source = self.sequence("stereo")
         truncate(self.images(source)[9])
         self.assert_skips(source, 9, "unreadable_image")
+        # The libraries that decode images have their own words for it, which are no help to anybody.
+        self.images(source)[9].write_bytes(b"P5 376 240 255\n" + bytes(100))
+        done = self.run_on(source, "--frames", 10, "--quiet")
+        self.assertRegex(done.stderr, r"\Awarning: frame 9: unreadable[^\n]*\n\Z")
 
     def test_image_of_another_size_is_skipped_and_counted(self):
         source = self.sequence("stereo")
