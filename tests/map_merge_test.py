@@ -9,6 +9,7 @@ import pathlib
 import re
 import unittest
 
+import map_records
 from cli_support import CAMERA, NUM_FRAMES, CliTest, waymark
 
 HOUSE = pathlib.Path(os.environ.get("WAYMARK_DATA", "/nowhere")) / "sim_house_rgbd"
@@ -98,6 +99,14 @@ class Merge(MapTask):
         self.assert_fails(waymark("map", "merge", self.path("a"), self.path("a")), 2, "--out")
         elsewhere = self.folder / "no" / "c.wmap"
         self.assert_fails(waymark("map", "merge", self.path("a"), self.path("a"), "-o", elsewhere), 1)
+        records = map_records.split(self.path("a").read_bytes())
+        records[1]["end_landmark"] = 2**24  # As far as any map may go, but not twice that.
+        far = map_records.join(records)
+        self.path("a").write_bytes(far)
+        self.check("a")
+        done = waymark("map", "merge", self.path("a"), self.path("a"), "-o", self.path("a"))
+        self.assert_fails(done, 1, "would have ids of landmarks up to")
+        self.assertEqual(self.path("a").read_bytes(), far)
 
 
 class Align(MapTask):
