@@ -121,10 +121,10 @@ int export_map(const ExportOptions& options) {
     export_submaps(options, stored, submaps);
   }
   print_result("{} sub-map{} of {} to {}\n",
-             submaps.size(),
-             submaps.size() == 1 ? "" : "s",
-             options.map.string(),
-             options.out.string());
+               submaps.size(),
+               submaps.size() == 1 ? "" : "s",
+               options.map.string(),
+               options.out.string());
   if (stored.images.empty() && options.format != ExportFormat::kTum &&
       options.format != ExportFormat::kKitti) {
     print_message("note: the map holds no images (run --keep-images); points are grey\n");

@@ -11,6 +11,7 @@
 #include "commands.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/merging.h"
 
@@ -59,13 +60,13 @@ void print_rigs(const Map& map) {
       const CameraDescription& camera = rigs[i]->cameras[j].description.value();
       const bool is_known = rigs[i]->cameras[j].camera->can_project();
       print_result("rig {}, camera {}: {}{}, distortion {}, {}x{} px\n",
-                 i,
-                 j,
-                 camera.camera_model,
-                 is_known ? "" : " (unknown model)",
-                 camera.distortion_model,
-                 camera.width_px,
-                 camera.height_px);
+                   i,
+                   j,
+                   camera.camera_model,
+                   is_known ? "" : " (unknown model)",
+                   camera.distortion_model,
+                   camera.width_px,
+                   camera.height_px);
     }
   }
 }
@@ -74,7 +75,10 @@ int print_info(const std::filesystem::path& path) {
   const StoredMap stored = load_map(path);
   const Map& map = *stored.map;
   const auto num_bytes = static_cast<double>(std::filesystem::file_size(path));
-  print_result("{}: written by {}, {:.1f} MB\n", path.string(), stored.producer, 1e-6 * num_bytes);
+  print_result("{}: written by {}, {:.1f} MB\n",
+               path.string(),
+               printable(stored.producer),
+               1e-6 * num_bytes);
   print_rigs(map);
   print_submaps(map);
   print_result("{} keyframes, {} landmarks, {} loop edges, {} images\n",

@@ -27,8 +27,7 @@ namespace {
 /// One line, whatever the message holds.
 int fail(int status, std::string message) {
   std::replace(message.begin(), message.end(), '\n', ' ');
-  print_message("error: {}
-", message);
+  print_message("error: {}\n", message);
   return status;
 }
 

@@ -25,13 +25,17 @@ void write_text(std::FILE* stream, std::string_view text);
 /// Results that were asked for, to standard output.
 template <class... Arguments>
 void print_result(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-  write_text(stdout, printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
+  write_text(
+      stdout,
+      printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
 }
 
 /// Messages, to standard error.
 template <class... Arguments>
 void print_message(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
-  write_text(stderr, printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
+  write_text(
+      stderr,
+      printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
 }
 
 /// Throws OutputError when something written to standard output got lost.

@@ -205,8 +205,8 @@ TEST(MapFile, RefusesToWriteWhatCouldNotBeRead) {
       HasSubstr("rig_from_world would hold nan"));
   EXPECT_THAT(error([](MapParts& p) { p.keyframes[0].keyframe.applied_scale = 1e13; }),
               HasSubstr("applied_scale would hold 1e+13"));
-  EXPECT_THAT(error([](MapParts& p) { p.end_landmark = LandmarkId{kMaxIds}; }),
-              HasSubstr("would have ids of landmarks up to 268435456, expected at most"));
+  EXPECT_THAT(error([](MapParts& p) { p.end_landmark = LandmarkId{kMaxIds + 1}; }),
+              HasSubstr("would have ids of landmarks up to 268435457, expected at most"));
   StoredMap with_image = good;
   with_image.images.begin()->second =
       std::make_shared<const std::string>("\xFF\xD8\xFF\xC0\0\x11\x08\xEA\x60\xEA\x60\3", 16);

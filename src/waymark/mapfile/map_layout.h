@@ -25,19 +25,12 @@ namespace waymark {
 inline constexpr std::size_t kMaxArrayBytes = std::size_t{64} << 20;
 inline constexpr std::size_t kMaxRecordBytes = std::size_t{256} << 20;
 inline constexpr std::size_t kMaxTextBytes = std::size_t{1} << 20;
-inline constexpr std::uint32_t kMaxIds = std::uint32_t{1} << 28;  ///< Ids are below.
+/// Ids are below. Most ids of a long session are of landmarks that are gone: it is a day or more
+/// until there are so many, and a table whose largest id is the last one takes 64 MB by that.
+inline constexpr std::uint32_t kMaxIds = std::uint32_t{1} << 28;
 inline constexpr std::size_t kMaxCamerasPerRig = 16;
 inline constexpr std::size_t kMaxSubmaps = std::size_t{1} << 20;
 inline constexpr std::size_t kLandmarksPerRecord = 4096;
-
-/// Ids of landmarks are below this in a map of so many, those merged into others counted. Most ids
-/// of a long session are of landmarks that are gone, yet memory goes by the largest one.
-constexpr std::uint32_t max_end_landmark(std::size_t num_landmarks) {
-  constexpr std::uint64_t kAnyway = std::uint64_t{1} << 24, kPerLandmark = 4096;
-  const std::uint64_t num_counted = std::min<std::uint64_t>(num_landmarks, kMaxIds);
-  return static_cast<std::uint32_t>(
-      std::min<std::uint64_t>(kMaxIds, kAnyway + kPerLandmark * num_counted));
-}
 
 /// What a number may be; NaN never is within.
 struct NumberRange {

@@ -232,14 +232,6 @@ void MapReader::check_ids() const {
     throw InputError(fmt::format("{}: merged_landmarks", name_),
                      fmt::format("landmark {} is there, too, expected it gone", merged.id.value));
   }
-  const std::size_t num_landmarks = parts_.landmarks.size() + parts_.merged_landmarks.size();
-  if (parts_.end_landmark.value > max_end_landmark(num_landmarks)) {
-    throw InputError(fmt::format("{}: map 0", name_),
-                     fmt::format("end_landmark is {}, expected at most {} for {} landmarks",
-                                 parts_.end_landmark.value,
-                                 max_end_landmark(num_landmarks),
-                                 num_landmarks));
-  }
   const std::size_t num_keyframes = parts_.keyframes.size() + parts_.erased_keyframes.size();
   if (num_keyframes != parts_.end_keyframe.value) {
     throw InputError(fmt::format("{}: map 0", name_),

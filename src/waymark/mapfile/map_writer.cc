@@ -243,14 +243,10 @@ void write_images(MapRecordWriter& writer, const StoredMap& stored) {
 /// What readers ask of a map as a whole.
 void check_counts(const MapRecordWriter& writer, const StoredMap& stored) {
   const Map& map = *stored.map;
-  std::size_t num_landmarks = map.landmarks().size();
-  map.landmark_forwarding().for_each(
-      [&](LandmarkId, LandmarkId survivor) { num_landmarks += survivor.is_valid(); });
   const std::uint32_t end = map.landmarks().end_id().value;
-  if (end > max_end_landmark(num_landmarks) || map.keyframes().end_id().value > kMaxIds) {
-    writer.fail(fmt::format("would have ids of landmarks up to {}, expected at most {}",
-                            end,
-                            max_end_landmark(num_landmarks)));
+  if (end > kMaxIds || map.keyframes().end_id().value > kMaxIds) {
+    writer.fail(
+        fmt::format("would have ids of landmarks up to {}, expected at most {}", end, kMaxIds));
   }
   if (map.submaps().size() > kMaxSubmaps || stored.settings.size() > kMaxTextBytes) {
     writer.fail(

@@ -66,9 +66,9 @@ void LandmarkLayer::add_colors(FeatureColors colors) {
 }
 
 void LandmarkLayer::color_landmarks(const Map& before, const Map& after) {
-  colors_.resize(after.landmarks().end_id().value);
   after.landmarks().for_each_difference(
       before.landmarks(), [&](LandmarkId id, const Landmark* old, const Landmark* now) {
+        if (!now) colors_.erase(id.value);
         if (old || !now) return;
         for (const Observation& observation : now->observations) {
           const Keyframe& keyframe = after.keyframes().at(observation.keyframe);
@@ -76,7 +76,7 @@ void LandmarkLayer::color_landmarks(const Map& before, const Map& after) {
           if (found == colors_of_frames_.end()) continue;
           const auto& rgb = found->second.rgb;
           if (observation.feature >= rgb.size()) continue;
-          colors_[id.value] = {rgb[observation.feature], 1};
+          colors_[id.value] = rgb[observation.feature];
           return;
         }
       });
@@ -120,9 +120,10 @@ Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) c
   for (const LandmarkId id : ids) writer.add(saturate16(num_observers(landmarks.at(id))));
   for (const LandmarkId id : ids) writer.add(saturate16(landmarks.at(id).submap.value));
   for (const LandmarkId id : ids) {
-    const Color color = id.value < colors_.size() ? colors_[id.value] : Color{};
-    for (const std::uint8_t value : color.rgb) writer.add(value);
-    writer.add(static_cast<std::uint8_t>(color.is_known ? 255 : 0));
+    const auto known = colors_.find(id.value);
+    const bool is_known = known != colors_.end();
+    for (const std::uint8_t value : is_known ? known->second : Rgb{}) writer.add(value);
+    writer.add(static_cast<std::uint8_t>(is_known ? 255 : 0));
   }
   return writer.finish();
 }

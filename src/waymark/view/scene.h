@@ -77,16 +77,13 @@ class LandmarkLayer {
   void snapshot(const Map& map, std::vector<Message>& messages) const;
 
  private:
-  struct Color {
-    std::array<std::uint8_t, 3> rgb{};
-    std::uint8_t is_known = 0;
-  };
+  using Rgb = std::array<std::uint8_t, 3>;
 
   Message encode(const Map& map, std::span<const LandmarkId> ids) const;
 
   std::unordered_map<std::uint32_t, FeatureColors>
-      colors_of_frames_;       ///< By frame; only looked up.
-  std::vector<Color> colors_;  ///< By landmark.
+      colors_of_frames_;                           ///< By frame; only looked up.
+  std::unordered_map<std::uint32_t, Rgb> colors_;  ///< By living landmark; only looked up.
 };
 
 /// Tells of the frames of a session: their poses, which move with the map, and what became of them.
