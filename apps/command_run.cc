@@ -16,6 +16,7 @@
 #include "waymark/session/autosave.h"
 #include "waymark/session/image_keeper.h"
 #include "waymark/session/live_input.h"
+#include "waymark/session/quality.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
 
@@ -47,6 +48,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                   summary.landmarks,
                   summary.submaps));
   report_reasons(reporter, results.table);
+  if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
   const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
   reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
                             format_duration(summary.wall_s),
@@ -55,41 +57,66 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             options.report.out.string()));
 }
 
-void report_focal_check(Reporter& reporter, const FocalCheck& check) {
-  const std::string found =
-      fmt::format("by the residuals the focal length is {:.1f} % (+- {:.1f} %) {} than stated",
-                  100.0 * std::abs(check.factor - 1.0),
-                  100.0 * check.sigma,
-                  check.factor < 1.0 ? "shorter" : "longer");
-  if (check.is_off()) {
-    reporter.warning("calibration: " + found);
-  } else {
-    reporter.detail(found);
+/// Tells once what the residuals say of the calibration, as soon as they do.
+class FocalReport {
+ public:
+  FocalReport(const System& system, Reporter& reporter) : system_(system), reporter_(reporter) {}
+
+  void update() {
+    const FocalCheck* check = is_told_ ? nullptr : system_.focal_check();
+    if (check == nullptr) return;
+    is_told_ = true;
+    if (check->is_off() || check->is_bent()) {
+      reporter_.warning("calibration: " + describe(*check));
+    } else {
+      reporter_.detail(describe(*check));
+    }
   }
-}
+
+ private:
+  static std::string describe(const FocalCheck& check) {
+    if (check.is_bent()) {
+      return fmt::format(
+          "by the residuals the distortion is wrong, by {:.0f} % (+- {:.0f} %) in the corners",
+          100.0 * std::abs(check.bend),
+          100.0 * check.bend_sigma);
+    }
+    return fmt::format(
+        "by the residuals the focal length is {}{:.1f} % (+- {:.1f} %) {} than stated",
+        check.is_beyond ? "at least " : "",
+        100.0 * std::abs(check.factor - 1.0),
+        100.0 * check.sigma,
+        check.factor < 1.0 ? "shorter" : "longer");
+  }
+
+  const System& system_;
+  Reporter& reporter_;
+  bool is_told_ = false;
+};
 
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
-FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
-  return
-      [&, live, report = report_frames(reporter, session.input->info()), is_focal_checked = false](
-          const FrameRecord& record) mutable {
-        report(record);
-        if (live) live->show(record);
-        if (const auto failure = autosave.update(session.system->map())) {
-          reporter.warning("autosave: " + *failure);
-        }
-        const FocalCheck* check = is_focal_checked ? nullptr : session.system->focal_check();
-        if (check == nullptr) return;
-        is_focal_checked = true;
-        report_focal_check(reporter, *check);
-      };
+FrameObserver observe(Session& session,
+                      Autosave& autosave,
+                      LiveControl* live,
+                      FocalReport& focal,
+                      Reporter& reporter) {
+  return [&, live, report = report_frames(reporter, session.input->info())](
+             const FrameRecord& record) mutable {
+    report(record);
+    if (live) live->show(record);
+    if (const auto failure = autosave.update(session.system->map())) {
+      reporter.warning("autosave: " + *failure);
+    }
+    focal.update();
+  };
 }
 
 SessionResults map_input(
     Session& session, Input& input, Autosave& autosave, LiveControl* live, Reporter& reporter) {
+  FocalReport focal(*session.system, reporter);
   SessionHooks hooks;
   hooks.should_stop = is_interrupted;
-  hooks.observer = observe(session, autosave, live, reporter);
+  hooks.observer = observe(session, autosave, live, focal, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
     hooks.on_result = [live](const FrameImages& frame, const TrackingResult& result) {
@@ -97,7 +124,9 @@ SessionResults map_input(
     };
     hooks.on_input_end = [live] { live->finishing(); };
   }
-  return run_session(input, *session.system, hooks);
+  SessionResults results = run_session(input, *session.system, hooks);
+  focal.update();
+  return results;
 }
 
 void save_final_map(const System& system,

@@ -29,6 +29,13 @@ Json to_json(const TimeStatistics& times, bool has_max) {
   return json;
 }
 
+Json to_json(const RunQuality& quality) {
+  return {{"reprojection_px", rounded(quality.reprojection_px)},
+          {"matches_kept", rounded(quality.matches_kept)},
+          {"length", rounded(quality.length)},
+          {"is_metric", quality.is_metric}};
+}
+
 void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
   json["frames"] = counts.frames;
   json["tracked"] = counts.tracked;
@@ -123,6 +130,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["submaps"] = summary.submaps;
   json["loops"] = summary.loops;
   json["relocalizations"] = summary.relocalizations;
+  if (summary.quality) json["quality"] = to_json(*summary.quality);
   json["wall_s"] = rounded(summary.wall_s);
   json["cpu_s"] = rounded(summary.cpu_s);
   json["peak_rss_mb"] = rounded(summary.peak_rss_mb);

@@ -60,6 +60,15 @@ struct FrameCounts {
 /// Counts the rows, which are in the order of the input.
 FrameCounts count_frames(std::span<const FrameRecord> frames);
 
+/// How well what a session made agrees with itself.
+struct RunQuality {
+  /// Root mean square over all observations of the map, in pixels of the level of the feature.
+  double reprojection_px = 0.0;
+  double matches_kept = 0.0;  ///< Share of the matches of tracked frames that agree on the pose.
+  double length = 0.0;        ///< Of all trajectories together.
+  bool is_metric = false;     ///< Whether the length is in metres, rather than in map units.
+};
+
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -80,6 +89,7 @@ struct RunSummary {
   std::uint64_t seed = 0;                ///< Of the settings.
   std::string version;                   ///< Of the program.
   std::optional<std::size_t> localized;  ///< Of localize only.
+  std::optional<RunQuality> quality;     ///< Of run only.
 };
 
 /// Statistics per stage over all rows, in the order of the table.

@@ -8,19 +8,27 @@
 
 namespace waymark {
 
-/// What the residuals of a map say of the focal length that it was made with.
+/// What the residuals of a map say of the calibration that it was made with.
 struct FocalCheck {
-  double factor = 1.0;  ///< The true focal length relative to the calibration's.
-  double sigma = 0.0;   ///< Standard deviation of the factor.
+  double factor = 1.0;     ///< The true focal length relative to the calibration's.
+  double sigma = 0.0;      ///< Standard deviation of the factor.
+  bool is_beyond = false;  ///< The search ended at the factor, on the way to one further off.
+  /// So much of its distance from the principal point the corner of the image should lie further
+  /// out than in the image, for the distortion that is stated: 0 where that fits.
+  double bend = 0.0;
+  double bend_sigma = 0.0;  ///< Standard deviation of the bend.
 
-  /// Whether the calibration is off by more than 2 %, beyond doubt.
+  /// Whether the focal length is off by more than 2 %, beyond doubt.
   bool is_off() const;
+  /// Whether the focal length may be right but the distortion is not, beyond doubt.
+  bool is_bent() const;
 };
 
 /// Adjusts the newest keyframe and those that share most with it for several focal lengths around
 /// that of the calibration, structure and motion anew each time, and finds the one that leaves the
-/// least cost, by parabolas through three. Nothing where the map is too small, where the motion
-/// does not tell focal lengths apart, and for cameras that have none (360 degrees).
+/// least cost, by parabolas through three; the same for images bent around the principal point.
+/// Nothing where the map is too small, where the motion does not tell focal lengths apart, and for
+/// cameras that have none (360 degrees).
 std::optional<FocalCheck> check_focal_length(const Map& map);
 
 }  // namespace waymark

@@ -12,6 +12,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/export_scene.h"
+#include "waymark/session/quality.h"
 
 namespace waymark {
 namespace {
@@ -106,6 +107,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   results.summary = summarize(system, frames);
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.table = std::move(frames.table);
+  results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
   results.failure = frames.failure;
   usage.write_to(results.summary);
   return results;

@@ -9,6 +9,7 @@
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
 #include "waymark/session/merging.h"
+#include "waymark/session/quality.h"
 #include "waymark/session/testing/memory_input.h"
 #include "waymark/simulate/sequence.h"
 
@@ -199,6 +200,39 @@ TEST(RunSession, HasRowsButNoTrajectoryWhereNothingIsSeen) {
   const testing::TemporaryFolder folder;
   write_results(folder.path(), results);
   EXPECT_EQ(read_text_file(folder / "trajectory.txt", "a trajectory"), "");
+}
+
+TEST(Assess, SaysHowWellAMapAgreesWithItself) {
+  MemoryInput input(rendered_frames());
+  System system(small_rig(), small_settings(), Timing::kInline);
+  const SessionResults results = run_session(input, system);
+  ASSERT_TRUE(results.summary.quality);
+  const RunQuality& quality = *results.summary.quality;
+  EXPECT_GT(quality.reprojection_px, 0.1);
+  EXPECT_LT(quality.reprojection_px, 1.2);
+  EXPECT_GT(quality.matches_kept, 0.7);
+  EXPECT_LE(quality.matches_kept, 1.0);
+  EXPECT_TRUE(quality.is_metric);
+  const SimulatedSequence truth(small_spec());
+  double length_m = 0.0;
+  for (int i = 1; i < truth.num_frames(); ++i) {
+    length_m +=
+        (truth.world_from_rig(i).translation - truth.world_from_rig(i - 1).translation).norm();
+  }
+  EXPECT_NEAR(quality.length, length_m, 0.05 * length_m);
+  EXPECT_THAT(describe(quality, 1),
+              ::testing::MatchesRegex(
+                  "reprojection error 0\\... px, .. % of the matches kept, 1 loop, .\\.. m long"));
+
+  Map bent = Map::thaw(*system.map());
+  std::vector<LandmarkId> ids;
+  bent.landmarks().for_each([&](LandmarkId id, const Landmark&) { ids.push_back(id); });
+  for (const LandmarkId id : ids) {
+    bent.move_landmark(id, 1.02 * bent.landmarks().at(id).position_in_world);
+  }
+  const RunQuality worse = assess(bent, results.table.frames, results.trajectories);
+  EXPECT_GT(worse.reprojection_px, 1.5 * quality.reprojection_px);
+  EXPECT_EQ(assess(Map(), {}, {}).reprojection_px, 0.0);
 }
 
 /// A map of the rendered frames, made once.

@@ -237,7 +237,8 @@ void System::Impl::add(const MapperMessage& message) {
 
 const FocalCheck* System::Impl::focal_check() const {
   // The map first: seeing it is what makes the result readable here.
-  if (!has_focal_check(*map(), memory_.first()) || !focal_check_) return nullptr;
+  if (!is_finished_ && !has_focal_check(*map(), memory_.first())) return nullptr;
+  if (!focal_check_) return nullptr;
   return &*focal_check_;
 }
 
@@ -254,6 +255,7 @@ void System::Impl::finish() {
   mapper_.finish();
   visible_ = publish();
   memory_.settle(*map());
+  if (!is_focal_checked_) focal_check_ = check_focal_length(*map());
 }
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {
