@@ -28,6 +28,7 @@ std::optional<FocalCheck> check_with(const CameraDescription& true_camera,
     system.feed(input);
     EXPECT_TRUE(frame.index >= 200 || system.focal_check() == nullptr);
   }
+  system.finish();
   const FocalCheck* check = system.focal_check();
   return check == nullptr ? std::nullopt : std::optional(*check);
 }

@@ -100,7 +100,7 @@ class Merge(MapTask):
         elsewhere = self.folder / "no" / "c.wmap"
         self.assert_fails(waymark("map", "merge", self.path("a"), self.path("a"), "-o", elsewhere), 1)
         records = map_records.split(self.path("a").read_bytes())
-        records[1]["end_landmark"] = 2**24  # As far as any map may go, but not twice that.
+        records[1]["end_landmark"] = 2**28  # As far as any map may go, but not twice that.
         far = map_records.join(records)
         self.path("a").write_bytes(far)
         self.check("a")
