@@ -70,7 +70,7 @@ namespace {
 
 /// Whether its depth image could not be used: the one bad file that takes no frame away.
 bool is_without_depth(const FrameRecord& frame) {
-  return frame.state != FrameState::kUnreadable && !frame.warning.empty();
+  return frame.state != FrameState::kUnreadable && frame.warning != nullptr;
 }
 
 }  // namespace
@@ -89,10 +89,10 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
       reporter.warning(fmt::format("frame {}: {}, skipped{}",
                                    frame.index,
                                    state,
-                                   frame.warning.empty() ? "" : " (" + frame.warning + ")"));
+                                   frame.warning ? " (" + *frame.warning + ")" : ""));
     } else if (is_without_depth(frame)) {
       reporter.warning(
-          fmt::format("frame {}: used without depth ({})", frame.index, frame.warning));
+          fmt::format("frame {}: used without depth ({})", frame.index, *frame.warning));
     }
     const int num_candidates = frame.num_candidates;
     reporter.detail(

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <span>
 #include <string>
@@ -19,13 +21,17 @@ namespace waymark {
 
 /// One row of frames.csv.
 struct FrameRecord : FrameStatus {
-  std::size_t index = 0;          ///< In the whole INPUT.
-  std::int64_t timestamp_ns = 0;  ///< Of the input.
-  bool is_keyframe = false;       ///< Whether it was sent to the map.
-  /// In the order of the table's stages; empty for a frame that was not processed.
-  std::vector<double> stage_ms;
-  /// What is wrong with a file of the frame, for people; in no file.
-  std::string warning = {};
+  std::size_t index = 0;                        ///< In the whole INPUT.
+  std::int64_t timestamp_ns = 0;                ///< Of the input.
+  bool is_keyframe = false;                     ///< Whether it was sent to the map.
+  std::uint8_t num_stages = 0;                  ///< 0 for a frame that was not processed.
+  static constexpr std::size_t kMaxStages = 8;  ///< Here, since rows stay as long as a session.
+  std::array<float, kMaxStages> stage_ms{};     ///< In the order of the table's stages.
+  /// What is wrong with a file of the frame, for people; in no file. Null: nothing.
+  std::shared_ptr<const std::string> warning = nullptr;
+
+  /// Takes the times of all stages over.
+  void set_stages(std::span<const double> times_ms);
 };
 
 /// frames.csv: a row per input frame.

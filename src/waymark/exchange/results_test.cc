@@ -42,8 +42,8 @@ FrameTable make_table() {
   table.frames[2].num_inliers = 90;
   table.frames[2].is_keyframe = true;
   table.frames[2].submap = SubmapId{3};
-  table.frames[2].stage_ms = {4.5, 0.25};
-  table.frames[6].stage_ms = {5.5, 0.75};
+  table.frames[2].set_stages(std::array{4.5, 0.25});
+  table.frames[6].set_stages(std::array{5.5, 0.75});
   return table;
 }
 
@@ -83,7 +83,7 @@ TEST(Results, FramesCsvHasARowPerFrame) {
   EXPECT_THAT(text, ::testing::HasSubstr("\n14,14000,unreadable,unreadable_image,"));
   EXPECT_THAT(text, ::testing::HasSubstr("\n18,18000,dropped,late,"));
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 10);
-  table.frames[0].stage_ms = {1.0};
+  table.frames[0].set_stages(std::array{1.0});
   EXPECT_THROW(format_frames_csv(table), CheckError);
 }
 

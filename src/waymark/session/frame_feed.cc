@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <map>
+#include <memory>
 #include <optional>
 
 namespace waymark {
@@ -24,11 +25,15 @@ rusage resources() {
   return usage;
 }
 
+std::shared_ptr<const std::string> warning_of(const InputFrame& frame) {
+  return frame.warning.empty() ? nullptr : std::make_shared<const std::string>(frame.warning);
+}
+
 FrameRecord record_of_fault(const InputFrame& frame) {
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
-  record.warning = frame.warning;
+  record.warning = warning_of(frame);
   if (frame.fault == FrameFault::kLate) {
     record.state = FrameState::kDropped;
     record.reason = FrameReason::kLate;
@@ -44,10 +49,10 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   FrameRecord record;
   record.index = frame.index;
   record.timestamp_ns = frame.timestamp_ns;
-  record.warning = frame.warning;
+  record.warning = warning_of(frame);
   static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
-  record.stage_ms.assign(result.stages.ms.begin(), result.stages.ms.end());
+  record.set_stages(result.stages.ms);
   return record;
 }
 
@@ -88,6 +93,9 @@ FedFrames feed_all(Input& input,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer) {
   FedFrames frames;
+  // Rows of all frames that there may be, rather than twice as many now and then.
+  constexpr std::size_t kMaxExpected = 1'000'000;
+  frames.table.frames.reserve(std::min(input.info().num_frames.value_or(0), kMaxExpected));
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
   try {
     while (!should_stop || !should_stop()) {

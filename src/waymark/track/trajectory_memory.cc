@@ -13,7 +13,10 @@ bool has_pose(const TrajectoryMemory::Entry& entry) {
 
 void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, const Map& map) {
   entries_.push_back({frame.timestamp_ns, outcome.state, outcome.details.pose});
-  if (!outcome.seen.empty()) unsettled_.push_back({frame.id, outcome.seen, nullptr});
+  if (outcome.message) newest_sent_ = frame.id;
+  // Long after the map has changed last it has settled, and the frame with it.
+  const bool is_settled = frame.id.value - newest_sent_.value > kMaxSinceKeyframe;
+  if (!outcome.seen.empty() && !is_settled) unsettled_.push_back({frame.id, outcome.seen, nullptr});
   if (outcome.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
   for (const FilledPose& filled : outcome.details.filled) {

@@ -14,13 +14,14 @@
 namespace waymark {
 
 /// What is remembered of every frame: its state, its pose relative to a keyframe, and, until the
-/// map around it has settled, what it saw. Of that the newest kMaxUnsettled frames at most, and of
-/// frames without a pose the newest kMaxUnposed, so that memory per frame stays small in sessions
-/// of any length.
+/// map around it has settled, what it saw. Of that the newest kMaxUnsettled frames at most, of
+/// those after one keyframe kMaxSinceKeyframe, and of frames without a pose the newest kMaxUnposed,
+/// so that memory per frame stays small in sessions of any length, and at rest.
 class TrajectoryMemory {
  public:
   static constexpr std::size_t kMaxUnsettled = 2000;
   static constexpr std::size_t kMaxUnposed = 300;
+  static constexpr std::uint32_t kMaxSinceKeyframe = 300;
 
   struct Entry {
     std::int64_t timestamp_ns = 0;
@@ -30,7 +31,7 @@ class TrajectoryMemory {
 
   /// first: the id of the first frame; those of the others follow.
   explicit TrajectoryMemory(std::shared_ptr<const Rig> rig, FrameId first = FrameId{0})
-      : first_(first), refiner_(std::move(rig)) {}
+      : first_(first), newest_sent_(first), refiner_(std::move(rig)) {}
 
   FrameId first() const { return first_; }
   /// The id of the frame after those added so far.
@@ -45,7 +46,7 @@ class TrajectoryMemory {
   void settle(const Map& map);
 
   /// In the order of the frames.
-  const std::vector<Entry>& entries() const { return entries_; }
+  const std::deque<Entry>& entries() const { return entries_; }
 
  private:
   /// What a frame without a keyframe's place in the map saw.
@@ -69,7 +70,8 @@ class TrajectoryMemory {
   std::optional<Rigid3> rig_from_world(std::int64_t index, SubmapId submap, const Map& map) const;
 
   const FrameId first_;
-  std::vector<Entry> entries_;
+  FrameId newest_sent_;        ///< To the map.
+  std::deque<Entry> entries_;  ///< Grows without copies of its own.
   std::deque<Unsettled> unsettled_;
   std::deque<Unposed> unposed_;
   PoseRefiner refiner_;

@@ -19,8 +19,9 @@ class TrajectoryMemoryTest : public ::testing::Test {
   }
 
   /// Adds a frame that was located relative to the first keyframe when the map was smaller.
-  void add_stale(std::uint32_t number) {
+  void add_stale(std::uint32_t number, bool is_keyframe = false) {
     TrackOutcome outcome;
+    if (is_keyframe) outcome.message = NewKeyframe{};
     outcome.state = FrameState::kTracked;
     outcome.details.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
     outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
@@ -102,9 +103,20 @@ TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
 
 TEST_F(TrajectoryMemoryTest, SettlesTheOldestOnceThereAreMany) {
   memory_.add(frame(1), TrackOutcome{}, scene_.map);
-  for (std::uint32_t i = 0; i <= TrajectoryMemory::kMaxUnsettled; ++i) add_stale(2 + i);
+  for (std::uint32_t i = 0; i <= TrajectoryMemory::kMaxUnsettled; ++i) {
+    add_stale(2 + i, i % TrajectoryMemory::kMaxSinceKeyframe == 0);
+  }
   EXPECT_LT(error_m(2), 0.01);
   EXPECT_GT(error_m(3), 0.03);
+}
+
+TEST_F(TrajectoryMemoryTest, KeepsNothingOfFramesLongAfterAKeyframe) {
+  constexpr std::uint32_t kLast = TrajectoryMemory::kMaxSinceKeyframe;
+  memory_.add(frame(1), TrackOutcome{}, scene_.map);
+  for (std::uint32_t i = 0; i <= kLast + 1; ++i) add_stale(2 + i, i == 0);
+  memory_.settle(scene_.map);
+  EXPECT_LT(error_m(2 + kLast), 0.01);
+  EXPECT_GT(error_m(2 + kLast + 1), 0.03);
 }
 
 }  // namespace
