@@ -117,6 +117,10 @@ class Usage(CliTest):
             done = self.run_on(self.sequence("stereo"), preexec_fn=no_room_for_stacks)
             self.assert_fails(done, 1, "cannot start another thread", "expected higher limits")
 
+    def test_too_few_features_to_start_with_are_refused(self):
+        done = waymark("config", self.config("features: {count: 79}\n"))
+        self.assert_fails(done, 2, "features.count", "79", "80")
+
     def test_settings_are_printed_and_checked(self):
         printed = waymark("config")
         self.assertEqual(printed.returncode, 0)

@@ -17,7 +17,7 @@ struct FeatureSettings {
     field("count",
           self.count,
           SettingInfo{
-              .low = 50,
+              .low = 80,  // So many landmarks begin a map.
               .high = 20000,
               .help = "Features per image; half as many again where it shows all directions."});
     field("min_contrast",

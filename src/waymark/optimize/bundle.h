@@ -56,11 +56,11 @@ struct BundleResult {
 /// there is a range (a range is robust on its own and does not make an outlier). Writes poses and
 /// points back.
 ///
-/// Gauge: the caller fixes poses; one where stereo or ranges give the scale, two in mono. With
-/// fewer the result is one of the equivalent ones, near the start, because the damping of
-/// Levenberg-Marquardt bounds motion along free directions. Points without observations stay; a
-/// point seen once moves onto its ray at about its distance. Observations that are not finite,
-/// or more than 90 degrees off, are outliers and pull nothing. Repeatable by bits.
+/// Gauge: the caller fixes poses; one where stereo or ranges give the scale, one or two in mono.
+/// With fewer than the problem has free directions the result is one of the equivalent ones, near
+/// the start, because the damping of Levenberg-Marquardt bounds motion along them. Points without
+/// observations stay; a point seen once moves onto its ray at about its distance. Observations that
+/// are not finite, or more than 90 degrees off, are outliers and pull nothing. Repeatable by bits.
 BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options);
 
 }  // namespace waymark

@@ -84,8 +84,8 @@ class System {
   /// State of every frame fed so far, including those filled in after the fact.
   std::vector<FrameState> frame_states() const;
 
-  /// What the residuals say of the calibration, once some 200 frames are mapped or the input has
-  /// ended, and where the motion tells; else null.
+  /// What the residuals say of the calibration, once some 200 frames are mapped and where the
+  /// motion tells; else null.
   const FocalCheck* focal_check() const;
 
   /// The newest finished map, immutable.
