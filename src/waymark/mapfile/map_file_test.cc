@@ -209,7 +209,7 @@ TEST(MapFile, RefusesToWriteWhatCouldNotBeRead) {
               HasSubstr("would have ids of landmarks up to 268435457, expected at most"));
   StoredMap with_image = good;
   with_image.images.begin()->second =
-      std::make_shared<const std::string>("\xFF\xD8\xFF\xC0\0\x11\x08\xEA\x60\xEA\x60\3", 16);
+      std::make_shared<const std::string>("\xFF\xD8\xFF\xC0\0\x11\x08\xEA\x60\xEA\x60\3\0\0\0", 16);
   EXPECT_THROW(save_map(folder / "a.wmap", with_image), OutputError);
   EXPECT_EQ(read_text_file(folder / "a.wmap", "a map"), before);
 }
