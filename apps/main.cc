@@ -13,13 +13,11 @@
 #include <filesystem>
 #include <iostream>
 #include <string>
-#include <system_error>
 #include <vector>
 
 #include "commands.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
-#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {

@@ -107,7 +107,7 @@ void Reporter::write(std::string_view text, bool to_terminal) {
   if (log_.is_open()) log_ << line << '\n' << std::flush;
   if (!to_terminal) return;
   finish_progress();
-  print_message("{}\n", line);
+  write_text(stderr, line + "\n");
 }
 
 }  // namespace waymark
