@@ -14,6 +14,8 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "waymark/base/check.h"
+#include "waymark/base/failure.h"
 #include "waymark/base/frame_state.h"
 #include "waymark/input/decode.h"
 

@@ -18,6 +18,7 @@
 #include "commands.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
+#include "waymark/base/failure.h"
 
 namespace waymark {
 namespace {

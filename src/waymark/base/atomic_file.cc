@@ -16,6 +16,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/failure.h"
 
 namespace waymark {
 namespace {

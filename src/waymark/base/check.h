@@ -2,12 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <exception>
-#include <filesystem>
-#include <new>
 #include <stdexcept>
 #include <string>
-#include <system_error>
 
 namespace waymark {
 
@@ -35,30 +31,6 @@ class CheckError : public std::logic_error {
  public:
   using std::logic_error::logic_error;
 };
-
-/// What is said of an exception to whoever runs the program, in one line.
-inline std::string describe_failure(const std::exception_ptr& failure) {
-  try {
-    std::rethrow_exception(failure);
-  } catch (const InputError& error) {
-    return error.what();
-  } catch (const OutputError& error) {
-    return error.what();
-  } catch (const std::bad_alloc&) {
-    return "waymark: out of memory";
-  } catch (const std::filesystem::filesystem_error& error) {
-    const std::string path = error.path1().empty() ? "waymark" : error.path1().string();
-    return path + ": " + error.code().message() + ", expected a path that can be used";
-  } catch (const std::system_error& error) {
-    if (error.code() == std::errc::resource_unavailable_try_again) {
-      return "waymark: cannot start another thread: " + error.code().message() +
-             ", expected higher limits of threads and memory (ulimit -u, -v)";
-    }
-    return std::string("waymark: ") + error.what();
-  } catch (const std::exception& error) {
-    return std::string("waymark: internal failure: ") + error.what();
-  }
-}
 
 /// Throws the CheckError of WAYMARK_CHECK.
 [[noreturn]] inline void fail_check(const char* condition, const char* file, int line) {

@@ -2,9 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/session/autosave.h"
 
+#include <exception>
 #include <utility>
 
-#include "waymark/base/check.h"
+#include "waymark/base/failure.h"
 
 namespace waymark {
 
