@@ -202,7 +202,8 @@ Parabola costs_around(const Rig& rig,
   return parabola;
 }
 
-/// The same with a smaller step where an adjustment got stuck on its way from the calibration.
+/// The same where no adjustment got stuck on its way from the calibration: where one did, the step
+/// of the unknown is shortened, for good.
 Parabola sound_costs_around(const Rig& rig,
                             Unknown& unknown,
                             double value,
@@ -246,7 +247,7 @@ Least find_least(const Rig& rig, Unknown unknown, const FocalProblem& scene) {
 bool FocalCheck::is_off() const { return std::abs(factor - 1.0) > kMaxError + kSigmas * sigma; }
 
 bool FocalCheck::is_bent() const {
-  return !is_off() && std::abs(bend) > kMaxBend + kSigmas * bend_sigma;
+  return !is_off() && bend_sigma > 0.0 && std::abs(bend) > kMaxBend + kSigmas * bend_sigma;
 }
 
 std::optional<FocalCheck> check_focal_length(const Map& map) {

@@ -16,7 +16,7 @@ struct FocalCheck {
   /// So much of its distance from the principal point the corner of the image should lie further
   /// out than in the image, for the distortion that is stated: 0 where that fits.
   double bend = 0.0;
-  double bend_sigma = 0.0;  ///< Standard deviation of the bend.
+  double bend_sigma = 0.0;  ///< Standard deviation of the bend; 0 where no least cost was in sight.
 
   /// Whether the focal length is off by more than 2 %, beyond doubt.
   bool is_off() const;
