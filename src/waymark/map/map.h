@@ -162,7 +162,8 @@ struct MapParts {
 /// at the old value: collect ids first, then edit.
 class Map {
  public:
-  /// So many frames after a merge nobody holds the id of what was merged.
+  /// So many frames after a merge nobody holds the id of what was merged: it covers the frames that
+  /// the trajectory's memory finds again, which are the longest to wait.
   static constexpr std::uint32_t kRemembersMerged = 2000;
 
   Map() = default;

@@ -5,6 +5,9 @@
 namespace waymark {
 namespace {
 
+// What a frame saw is found in the map as long as it may have been merged meanwhile.
+static_assert(Map::kRemembersMerged >= TrajectoryMemory::kMaxUnsettled);
+
 bool has_pose(const TrajectoryMemory::Entry& entry) {
   return entry.state == FrameState::kTracked || entry.state == FrameState::kFilled;
 }
