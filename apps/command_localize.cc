@@ -7,6 +7,7 @@
 
 #include "commands.h"
 #include "input_command.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/session/session.h"
 
@@ -59,9 +60,11 @@ int localize(const LocalizeOptions& options, Reporter& reporter) {
   results.summary.timing = to_string(Timing::kInline);
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
   results.summary.version = WAYMARK_VERSION;
-  write_results(options.report.out, results);
-  report_results(reporter, results, options);
-  check_finished(results);
+  save_each({[&] { write_results(options.report.out, results); },
+             [&] {
+               report_results(reporter, results, options);
+               check_finished(results);
+             }});
   return *results.summary.localized == 0 ? kNoPose : kDone;
 }
 

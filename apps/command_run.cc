@@ -188,8 +188,9 @@ int run(RunOptions options, Reporter& reporter) {
                     images);
 
   std::optional<LiveControl> live;
-  if (!options.viewer.empty())
+  if (!options.viewer.empty()) {
     start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
+  }
 
   SessionResults results = map_input(session, images, autosave, live ? &*live : nullptr, reporter);
   reporter.finish_progress();
@@ -198,13 +199,16 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
+  // What ended the session early is told together with what could not be saved.
   save_each({[&] { write_results(options.report.out, results); },
              [&] {
                if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
+             },
+             [&] {
+               if (live) live->finish();
+               report_results(reporter, results, options);
+               check_finished(results);
              }});
-  if (live) live->finish();
-  report_results(reporter, results, options);
-  check_finished(results);
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
 }
 

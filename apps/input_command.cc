@@ -20,6 +20,14 @@
 #include "waymark/input/decode.h"
 
 namespace waymark {
+namespace {
+
+/// Whether its depth image could not be used: the one bad file that takes no frame away.
+bool is_without_depth(const FrameRecord& frame) {
+  return frame.state != FrameState::kUnreadable && frame.warning != nullptr;
+}
+
+}  // namespace
 
 void add_input_options(CLI::App& command, SessionOptions& options) {
   command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
@@ -67,15 +75,6 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
   command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
   command.add_option("--log", options.log, "Write all messages to this file, too [none]");
 }
-
-namespace {
-
-/// Whether its depth image could not be used: the one bad file that takes no frame away.
-bool is_without_depth(const FrameRecord& frame) {
-  return frame.state != FrameState::kUnreadable && frame.warning != nullptr;
-}
-
-}  // namespace
 
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
   return [&reporter, total = info.num_frames, num_done = std::size_t{0}](

@@ -165,10 +165,11 @@ class Signals(Endings):
 
 
 class Memory(Endings):
-    def with_memory(self, megabytes):
+    def with_memory(self, megabytes, command=None, max_file_bytes=resource.RLIM_INFINITY):
         def limit():
             resource.setrlimit(resource.RLIMIT_AS, (megabytes << 20, megabytes << 20))
-        return subprocess.run(self.command("--verbose"), capture_output=True, text=True,
+            resource.setrlimit(resource.RLIMIT_FSIZE, (max_file_bytes, max_file_bytes))
+        return subprocess.run(command or self.command("--verbose"), capture_output=True, text=True,
                               timeout=240, preexec_fn=limit)
 
     def smallest_to_start_with(self):
@@ -189,6 +190,17 @@ class Memory(Endings):
                 self.assertEqual(sorted(path.name for path in self.out.iterdir()), RESULTS)
                 self.assertGreaterEqual(self.summary()["frames"], 2)
         self.assert_map_is_sound()
+
+    def test_what_ended_it_is_told_together_with_what_cannot_be_saved(self):
+        enough = self.smallest_to_start_with()
+        command = [PROGRAM, "run", shared_sequence("stereo"), "-o", self.out, "--verbose"]
+        for megabytes in range(enough - 60, enough, 4):
+            said = self.with_memory(megabytes, command, max_file_bytes=512).stderr
+            if "frame 1: " in said and "out of memory" in said:
+                error = said.rstrip("\n").split("\n")[-1]
+                self.assertRegex(error, r"\Aerror: .*frames\.csv: cannot be written.*; waymark: out of memory\Z")
+                return
+        self.fail("memory never ran out between two frames")
 
 
 if __name__ == "__main__":
