@@ -12,6 +12,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/input/decode.h"
+#include "waymark/mapping/associate.h"
 
 namespace waymark {
 namespace {
@@ -44,23 +45,21 @@ std::optional<double> reprojection_error(const Camera& camera,
   return error.norm();
 }
 
-/// The same by what the feature itself holds, where the camera's model is unknown.
-double error_of_feature(const Features& features,
-                        std::size_t feature,
-                        const Eigen::Vector3d& point_in_cam) {
-  const Eigen::Vector3f off = point_in_cam.normalized().cast<float>() - features.bearings[feature];
-  const Eigen::Vector2f off_px = features.level_pixel_from_bearing[feature] * off;
-  return Pyramid::scale(features.keypoints[feature].level) * double{off_px.norm()};
-}
-
+/// The same of a feature of camera 0; where the camera's model is unknown by what the feature
+/// holds.
 std::optional<double> sighting_error(const Keyframe& keyframe,
-                                     std::size_t feature,
-                                     const Eigen::Vector3d& point_in_cam) {
-  const Camera& camera = *keyframe.rig->cameras[0].camera;
-  const Features& features = *keyframe.features;
-  if (!camera.can_project()) return error_of_feature(features, feature, point_in_cam);
-  const Keypoint& keypoint = features.keypoints[feature];
-  return reprojection_error(camera, point_in_cam, {keypoint.x_px, keypoint.y_px});
+                                     std::uint32_t feature,
+                                     const Eigen::Vector3d& position_in_world) {
+  const RigCamera& camera = keyframe.rig->cameras[0];
+  const Keypoint& keypoint = keyframe.features->keypoints[feature];
+  if (camera.camera->can_project()) {
+    const Rigid3 cam_from_world = camera.cam_from_rig * keyframe.rig_from_world;
+    return reprojection_error(
+        *camera.camera, cam_from_world * position_in_world, {keypoint.x_px, keypoint.y_px});
+  }
+  const std::optional<double> squared = squared_residual(keyframe, feature, position_in_world);
+  if (!squared) return std::nullopt;
+  return Pyramid::scale(keypoint.level) * std::sqrt(*squared);
 }
 
 class SceneBuilder {
@@ -102,10 +101,8 @@ class SceneBuilder {
       const std::uint32_t view_index = view_of_.at(observation.keyframe);
       const ExportView& view = scene_.views[view_index];
       if (observation.feature >= view.pixels.size() || observation.keyframe == last) continue;
-      const std::optional<double> error =
-          sighting_error(map_.keyframes().at(observation.keyframe),
-                         observation.feature,
-                         view.cam_from_world * point.position_in_world);
+      const std::optional<double> error = sighting_error(
+          map_.keyframes().at(observation.keyframe), observation.feature, point.position_in_world);
       if (!error || *error > kMaxExportErrorPx) continue;
       point.sightings.push_back({view_index, observation.feature});
       point.error_px += *error;

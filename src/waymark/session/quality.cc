@@ -6,24 +6,11 @@
 
 #include <cmath>
 
+#include "waymark/mapping/associate.h"
 #include "waymark/optimize/residual.h"
 
 namespace waymark {
 namespace {
-
-/// Squared residual of an observation, in pixels of the feature's level.
-double squared_residual(const Keyframe& keyframe,
-                        const Eigen::Vector3d& position_in_world,
-                        std::uint32_t feature) {
-  const Features& features = *keyframe.features;
-  const RigCamera& camera = keyframe.rig->cameras.at(features.keypoints[feature].camera);
-  const InverseRangePoint point =
-      in_inverse_range(camera.cam_from_rig * (keyframe.rig_from_world * position_in_world));
-  if (!is_ahead(point, features.bearings[feature])) return kGrossSquaredResidual;
-  return bearing_residual(
-             point, features.bearings[feature], features.level_pixel_from_bearing[feature])
-      .squaredNorm();
-}
 
 double rms_reprojection_px(const Map& map) {
   double sum = 0.0;
@@ -31,7 +18,8 @@ double rms_reprojection_px(const Map& map) {
   map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
     for (const Observation& seen : landmark.observations) {
       const Keyframe& keyframe = map.keyframes().at(seen.keyframe);
-      sum += squared_residual(keyframe, landmark.position_in_world, seen.feature);
+      sum += squared_residual(keyframe, seen.feature, landmark.position_in_world)
+                 .value_or(kGrossSquaredResidual);
       ++count;
     }
   });
