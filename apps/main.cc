@@ -11,7 +11,6 @@
 #include <cstdio>
 #include <exception>
 #include <filesystem>
-#include <iostream>
 #include <string>
 #include <vector>
 
@@ -82,8 +81,7 @@ int main(int argc, char** argv) {
   // fails, and what was computed is saved.
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);
-  // Where the image library says what it thinks of bad images; the program prints by stdio.
-  std::cerr.setstate(std::ios_base::failbit);
+  waymark::silence_libraries();
   try {
     const int status = waymark::run_program({argv + 1, argv + argc});
     if (status == waymark::kDone || status == waymark::kNoPose) waymark::check_standard_output();

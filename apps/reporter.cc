@@ -82,8 +82,8 @@ void Reporter::progress(std::size_t num_done,
   }
   text += fmt::format(", {:.1f} frames/s, {}", frames_per_s, state);
   if (is_terminal_) {
-    write_text(stderr, "\r\x1b[K" + printable(text));
-    std::fflush(stderr);
+    write_text(message_stream(), "\r\x1b[K" + printable(text));
+    std::fflush(message_stream());
     is_bar_shown_ = true;
   } else {
     write(text, true);
@@ -92,8 +92,8 @@ void Reporter::progress(std::size_t num_done,
 
 void Reporter::finish_progress() {
   if (!is_bar_shown_) return;
-  write_text(stderr, "\r\x1b[K");
-  std::fflush(stderr);
+  write_text(message_stream(), "\r\x1b[K");
+  std::fflush(message_stream());
   is_bar_shown_ = false;
 }
 
@@ -107,7 +107,7 @@ void Reporter::write(std::string_view text, bool to_terminal) {
   if (log_.is_open()) log_ << line << '\n' << std::flush;
   if (!to_terminal) return;
   finish_progress();
-  write_text(stderr, line + "\n");
+  write_text(message_stream(), line + "\n");
 }
 
 }  // namespace waymark

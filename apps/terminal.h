@@ -19,7 +19,14 @@ namespace waymark {
 /// takes their place; standard output then still fails when it is written to.
 void keep_standard_streams();
 
-/// Writes to a standard stream; std::ferror() tells when that failed.
+/// Takes standard error for the program's own messages. What libraries say there of bad images,
+/// in words that help nobody and with --quiet, too, goes nowhere from now on.
+void silence_libraries();
+
+/// Where messages go: standard error.
+std::FILE* message_stream();
+
+/// Writes to a stream; std::ferror() tells when that failed.
 void write_text(std::FILE* stream, std::string_view text);
 
 /// Results that were asked for, to standard output.
@@ -34,7 +41,7 @@ void print_result(fmt::format_string<Arguments...> format, Arguments&&... argume
 template <class... Arguments>
 void print_message(fmt::format_string<Arguments...> format, Arguments&&... arguments) {
   write_text(
-      stderr,
+      message_stream(),
       printable(fmt::format(format, std::forward<Arguments>(arguments)...), /*has_lines=*/true));
 }
 

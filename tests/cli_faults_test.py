@@ -5,6 +5,7 @@
 import os
 import resource
 import shutil
+import subprocess
 import unittest
 
 from cli_support import NUM_FRAMES, CliTest, png_size, truncate, waymark, write_png
@@ -37,6 +38,19 @@ class BadInput(CliTest):
         self.images(source)[9].write_bytes(b"P5 376 240 255\n" + bytes(100))
         done = self.run_on(source, "--frames", 10, "--quiet")
         self.assertRegex(done.stderr, r"\Awarning: frame 9: unreadable[^\n]*\n\Z")
+
+    def test_libraries_do_not_speak_for_the_program(self):
+        # A byte too many is no reason to skip a JPEG, but libjpeg has to say something to it.
+        source, target = self.image_folder(), self.folder / "jpeg"
+        target.mkdir()
+        subprocess.run(["ffmpeg", "-v", "error", "-i", source / "%06d.png", "-start_number", "0", "-q:v", "2",
+                        target / "%06d.jpg"], check=True)
+        for image in target.iterdir():
+            image.write_bytes(image.read_bytes()[:-2] + bytes(9) + b"\xff\xd9")
+        shutil.copy(source / "times.txt", target)
+        done = self.run_on(target, "-c", self.folder / "camchain.yaml", "--quiet")
+        self.assertEqual((done.returncode, done.stderr), (0, ""))
+        self.assertEqual(self.summary()["unreadable"], 0)
 
     def test_image_of_another_size_is_skipped_and_counted(self):
         source = self.sequence("stereo")
