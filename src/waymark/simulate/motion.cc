@@ -10,6 +10,7 @@
 #include <array>
 #include <cmath>
 #include <numbers>
+#include <optional>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -105,24 +106,40 @@ Vector2d path_point(const Course& course, double s) {
   }
 }
 
+/// Where all walks begin, as arc length.
+double path_start(const Course& course) { return 0.4 * (course.path[1] - course.path[0]).norm(); }
+
+/// A key at arc length s. heading_deg is that of the key before, from which the new one goes on.
+MotionKey path_key(const Course& course,
+                   double s,
+                   double head_deg,
+                   double pitch_deg,
+                   std::optional<double>& heading_deg) {
+  const Vector2d ahead = path_point(course, s + course.spacing_m);
+  const Vector2d tangent = ahead - path_point(course, s - course.spacing_m);
+  const double angle = kDegPerRad * std::atan2(tangent.y(), tangent.x());
+  const double before = heading_deg.value_or(angle);
+  heading_deg = before + std::remainder(angle - before, 360.0);
+  const Vector2d point = path_point(course, s);
+  return {{point.x(), point.y(), course.height_m}, *heading_deg + head_deg, pitch_deg, 0.0};
+}
+
+double pitch_deg(const Course& course, int i) {
+  return course.look_around_deg * 0.25 * std::sin(0.9 * i);
+}
+
 /// Keys so many times around the path and a bit on. head_deg(i) turns the head at key i.
 template <class HeadTurn>
 std::vector<MotionKey> along_path(const Course& course, int num_rounds, HeadTurn head_deg) {
   const double length = path_length(course);
-  const double start = 0.4 * (course.path[1] - course.path[0]).norm();
+  const double start = path_start(course);
   const double end = start + (num_rounds + 0.06) * length + 2.0 * course.spacing_m;
   const int count = std::max(4, static_cast<int>(std::ceil((end - start) / course.spacing_m)) + 1);
   std::vector<MotionKey> keys;
-  double heading = 0.0;
+  std::optional<double> heading;
   for (int i = 0; i < count; ++i) {
     const double s = start + (end - start) * i / (count - 1);
-    const Vector2d ahead = path_point(course, s + course.spacing_m);
-    const Vector2d tangent = ahead - path_point(course, s - course.spacing_m);
-    const double angle = kDegPerRad * std::atan2(tangent.y(), tangent.x());
-    heading = i == 0 ? angle : heading + std::remainder(angle - heading, 360.0);
-    const Vector2d point = path_point(course, s);
-    const double pitch = course.look_around_deg * 0.25 * std::sin(0.9 * i);
-    keys.push_back({{point.x(), point.y(), course.height_m}, heading + head_deg(i), pitch, 0.0});
+    keys.push_back(path_key(course, s, head_deg(i), pitch_deg(course, i), heading));
   }
   return keys;
 }
@@ -172,6 +189,21 @@ std::vector<MotionKey> walk_around(const Course& course, int num_rounds) {
       course, num_rounds, [&](int i) { return course.look_around_deg * std::sin(0.55 * i); });
 }
 
+/// So many rounds of which each has the keys of the first.
+std::vector<MotionKey> repeat_round(const Course& course, int num_rounds) {
+  const double length = path_length(course);
+  const int count = static_cast<int>(std::ceil(length / course.spacing_m));
+  std::vector<MotionKey> keys;
+  std::optional<double> heading;
+  for (int i = 0; i < num_rounds * count + 3; ++i) {
+    const int step = i % count;
+    const double s = path_start(course) + length * i / count;
+    const double head = course.look_around_deg * std::sin(0.55 * step);
+    keys.push_back(path_key(course, s, head, pitch_deg(course, step), heading));
+  }
+  return keys;
+}
+
 std::vector<MotionKey> turn_fast(const Course& course) {
   return along_path(course, 1, [](int i) {
     constexpr std::array<double, 8> kTurnDeg = {0.0, 0.0, 0.0, 75.0, 75.0, 0.0, 0.0, -75.0};
@@ -185,9 +217,10 @@ struct NamedMotion {
   bool sways;
 };
 
-constexpr std::array<NamedMotion, 8> kMotions = {{
+constexpr std::array<NamedMotion, 9> kMotions = {{
     {"loop", [](const Course& course) { return walk_around(course, 1); }, true},
     {"rounds", [](const Course& course) { return walk_around(course, 3); }, true},
+    {"thirty_rounds", [](const Course& course) { return repeat_round(course, 30); }, true},
     {"fast_turn", turn_fast, true},
     {"inspect", [](const Course& course) { return about_start(course, inspect_offset); }, true},
     {"slide", [](const Course& course) { return about_start(course, slide_offset); }, false},

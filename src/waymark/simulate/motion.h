@@ -62,6 +62,7 @@ class Motion {
 /// Names that make_motion() knows:
 ///   loop       once around the path of the world and a bit on, looking along it and around
 ///   rounds     three times around and a bit on, over the same ground
+///   thirty_rounds  thirty times around, each time looking at the same
 ///   fast_turn  the path of one loop, with quick turns of the head
 ///   inspect    hand-held, around the starting place
 ///   slide      to the side and back

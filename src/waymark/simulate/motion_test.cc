@@ -35,11 +35,13 @@ struct Bounds {
   double turn_deg_per_s = 0.0;
 };
 
+/// Of the first minute.
 Bounds measure(const Motion& motion) {
   constexpr double kStep = 1e-3;
+  const double end = std::min(motion.duration_s(), 60.0) - kStep;
   Bounds bounds;
   Vector3d last_acceleration = Vector3d::Zero();
-  for (double t = kStep; t < motion.duration_s() - kStep; t += kStep) {
+  for (double t = kStep; t < end; t += kStep) {
     const Rigid3 before = motion.world_from_rig(t - kStep);
     const Rigid3 now = motion.world_from_rig(t);
     const Rigid3 after = motion.world_from_rig(t + kStep);
@@ -60,7 +62,7 @@ Bounds measure(const Motion& motion) {
 /// Enough for a walk, or a drive in the street, at a usual speed.
 double usual_duration_s(const std::string& world, const std::string& motion) {
   const double once_s = world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
-  return motion == "rounds" ? 3.0 * once_s : once_s;
+  return motion == "rounds" ? 3.0 * once_s : motion == "thirty_rounds" ? 30.0 * once_s : once_s;
 }
 
 TEST(Motion, IsSmooth) {
@@ -130,6 +132,19 @@ TEST(Motion, RoundsPassThreeTimes) {
       was_near = is_near;
     }
     EXPECT_EQ(passes_s.size(), 3u) << world;
+  }
+}
+
+TEST(Motion, ThirtyRoundsAreTheSameButForTheSway) {
+  for (const std::string& world : world_names()) {
+    constexpr double kRoundS = 20.0;
+    const Motion motion = make_motion(world, "thirty_rounds", 30.0 * kRoundS);
+    for (double t = 0.0; t < kRoundS; t += 0.5) {
+      const Rigid3 first = motion.world_from_rig(t);
+      const Rigid3 last = motion.world_from_rig(t + 29.0 * kRoundS);
+      EXPECT_LT((first.translation - last.translation).norm(), 0.2) << world;
+      EXPECT_LT(first.rotation.angularDistance(last.rotation), 0.1) << world;
+    }
   }
 }
 
