@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <iterator>
 #include <map>
 #include <memory>
 #include <optional>
@@ -95,7 +96,10 @@ FedFrames feed_all(Input& input,
   FedFrames frames;
   // Rows of all frames that there may be, rather than twice as many now and then.
   constexpr std::size_t kMaxExpected = 1'000'000;
-  frames.table.frames.reserve(std::min(input.info().num_frames.value_or(0), kMaxExpected));
+  const std::size_t num_expected = std::min(input.info().num_frames.value_or(0), kMaxExpected);
+  frames.table.frames.reserve(num_expected);
+  frames.fed.reserve(num_expected);
+  frames.tracking_ms.reserve(num_expected);
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
   try {
     while (!should_stop || !should_stop()) {
@@ -113,9 +117,13 @@ FedFrames feed_all(Input& input,
 
 std::vector<SubmapTrajectory> split_by_submap(
     const std::vector<std::pair<SubmapId, StampedPose>>& frames) {
+  std::map<SubmapId, std::size_t> counts;
+  for (const auto& [submap, pose] : frames) ++counts[submap];
   std::map<SubmapId, std::vector<StampedPose>> by_submap;
+  for (const auto& [submap, count] : counts) by_submap[submap].reserve(count);
   for (const auto& [submap, pose] : frames) by_submap[submap].push_back(pose);
-  std::vector<SubmapTrajectory> parts(by_submap.begin(), by_submap.end());
+  std::vector<SubmapTrajectory> parts(std::make_move_iterator(by_submap.begin()),
+                                      std::make_move_iterator(by_submap.end()));
   std::stable_sort(parts.begin(), parts.end(), [](const auto& a, const auto& b) {
     return a.second.size() > b.second.size();
   });

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/session/session.h"
 
+#include <malloc.h>
 #include <sys/mman.h>
 
 #include <algorithm>
@@ -35,7 +36,7 @@ class MemoryReserve {
   void* start_;  ///< MAP_FAILED: there is none.
 };
 
-/// What became of the frames after the fact: filled in, moved to another sub-map.
+/// What became of the frames after the fact: some are filled in.
 void update_states(const System& system, FedFrames& frames) {
   const std::vector<FrameState> states = system.frame_states();
   if (states.empty()) forget_session(frames);  // There was a reset since the last frame.
@@ -45,10 +46,6 @@ void update_states(const System& system, FedFrames& frames) {
     FrameRecord& record = frames.table.frames[frames.fed[i]];
     record.state = states[i];
     if (states[i] == FrameState::kFilled) record.reason = FrameReason::kNone;
-  }
-  for (const TrajectoryFrame& frame : system.trajectory()) {
-    if (frame.frame.value >= frames.fed.size()) break;
-    frames.table.frames[frames.fed[frame.frame.value]].submap = frame.submap;
   }
 }
 
@@ -77,12 +74,13 @@ void finish(System& system, const SessionHooks& hooks, FedFrames& frames) {
   }
 }
 
-/// Of the frames that have a row.
-std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system,
-                                                         const FedFrames& frames) {
+/// The poses of the frames that have a row, which gets the sub-map that they are in by now.
+std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system, FedFrames& frames) {
   std::vector<std::pair<SubmapId, StampedPose>> poses;
+  poses.reserve(frames.fed.size());
   for (const TrajectoryFrame& frame : system.trajectory()) {
     if (frame.frame.value >= frames.fed.size()) break;
+    frames.table.frames[frames.fed[frame.frame.value]].submap = frame.submap;
     poses.push_back({frame.submap, {frame.timestamp_ns, frame.world_from_rig}});
   }
   return poses;
@@ -101,6 +99,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   FedFrames frames = feed_all(input, feed, hooks.should_stop, hooks.observer);
   finish(system, hooks, frames);
   reserve.release();
+  malloc_trim(0);  // What frames saw is settled and gone: lists of results take its place.
   update_states(system, frames);
 
   SessionResults results;

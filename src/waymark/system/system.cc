@@ -265,6 +265,7 @@ void System::Impl::finish() {
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {
   std::vector<TrajectoryFrame> frames;
+  frames.reserve(memory_.entries().size());
   for (std::uint32_t i = 0; i < memory_.entries().size(); ++i) {
     const TrajectoryMemory::Entry& memory = memory_.entries()[i];
     const KeyframeId reference = memory.pose.reference;

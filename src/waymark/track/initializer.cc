@@ -274,7 +274,7 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
 void Initializer::fill(const Reference& reference, Initialization& start) {
   const LandmarkSet landmarks = landmark_set(start.submap);
   start.filled.push_back(
-      {reference.frame.id, {KeyframeId{0}, Rigid3{}, 1.0}, reference.frame.features});
+      {reference.frame.id, {KeyframeId{0}, 1.0, Rigid3{}}, reference.frame.features});
   // Each pose is the guess for the next one, from the reference outwards. Where the frames next to
   // the reference were dropped, the way goes back from the end of the pair.
   const bool reaches_reference = passed_.front().id <= reference.frame.id;
@@ -288,7 +288,7 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
     const std::optional<Rigid3> rig_from_world = locate(passed, guess, landmarks);
     if (!rig_from_world) return;
     guess = *rig_from_world;
-    start.filled.push_back({passed.id, {KeyframeId{0}, *rig_from_world, 1.0}, passed.features});
+    start.filled.push_back({passed.id, {KeyframeId{0}, 1.0, *rig_from_world}, passed.features});
   };
   Rigid3 guess;
   for (auto it = middle; it != passed_.end(); ++it) {

@@ -32,7 +32,7 @@ void LastFrame::forget_missing(const Map& before, const Map& after, KeyframeId o
   pose_ = RelativePose{};
   if (!other.is_valid()) return;
   const Keyframe& reference = after.keyframes().at(other);
-  pose_ = {other, rig_from_world * reference.rig_from_world.inverse(), reference.applied_scale};
+  pose_ = {other, reference.applied_scale, rig_from_world * reference.rig_from_world.inverse()};
 }
 
 const LandmarkSet& LastFrame::landmarks(const Map& map) {

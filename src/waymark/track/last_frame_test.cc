@@ -23,7 +23,7 @@ class LastFrameTest : public ::testing::Test {
     const Rigid3 rig_from_world = world_from_rig.inverse();
     const Keyframe& reference = scene_.map.keyframes().at(KeyframeId{1});
     last_.set({FrameId{number}, std::int64_t{number} * 100, view.features},
-              {KeyframeId{1}, rig_from_world * reference.rig_from_world.inverse(), 1.0},
+              {KeyframeId{1}, 1.0, rig_from_world * reference.rig_from_world.inverse()},
               rig_from_world,
               scene_.true_associations(view));
   }
@@ -69,7 +69,7 @@ TEST_F(LastFrameTest, GivesItsOwnDescriptorsOfLandmarksThatLive) {
 
 TEST_F(LastFrameTest, AFrameThatBeganASubmapSeesWhatItsKeyframeSees) {
   last_.set({FrameId{3}, 300, scene_.seen[1].features},
-            {KeyframeId{1}, Rigid3{}, 1.0},
+            {KeyframeId{1}, 1.0, Rigid3{}},
             scene_.map.keyframes().at(KeyframeId{1}).rig_from_world,
             {});
   last_.carry_over(scene_.map);

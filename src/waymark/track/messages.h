@@ -16,8 +16,8 @@ namespace waymark {
 /// A pose by reference: moves when the map is corrected. Read it with Map::rig_from_world.
 struct RelativePose {
   KeyframeId reference;          ///< The keyframe that it moves with.
-  Rigid3 rig_from_reference;     ///< The rig from that of the reference, lengths as they were then.
   double reference_scale = 1.0;  ///< applied_scale of the reference when this was stored.
+  Rigid3 rig_from_reference;     ///< The rig from that of the reference, lengths as they were then.
 };
 
 /// A frame that got its pose after the fact.

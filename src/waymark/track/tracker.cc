@@ -189,8 +189,8 @@ TrackOutcome Tracker::accept(const Frame& frame, LocatedFrame located, StageTime
   count_sightings(*frame.features, located);
   const Keyframe& reference = map_->keyframes().at(local_.reference);
   const RelativePose pose{local_.reference,
-                          located.rig_from_world * reference.rig_from_world.inverse(),
-                          reference.applied_scale};
+                          reference.applied_scale,
+                          located.rig_from_world * reference.rig_from_world.inverse()};
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
   outcome.num_matches = located.num_matches;
@@ -205,7 +205,7 @@ TrackOutcome Tracker::accept(const Frame& frame, LocatedFrame located, StageTime
     outcome.message = NewKeyframe{
         frame.id, frame.timestamp_ns, pose, frame.features, located.landmarks, sightings_.take()};
     // A keyframe is its own reference, so that it moves as the map moves it.
-    outcome.details.pose = {ids_.add_keyframe(), Rigid3{}, pose.reference_scale};
+    outcome.details.pose = {ids_.add_keyframe(), pose.reference_scale, Rigid3{}};
     last_keyframe_frame_ = frame.id;
   }
   last_.set(frame, pose, located.rig_from_world, located.landmarks);
@@ -258,7 +258,7 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame, StageTimes
   outcome.num_matches = outcome.num_inliers = static_cast<int>(start->submap.landmarks.size());
   outcome.submap = ids_.add_submap(start->submap.keyframes.size());
   outcome.world_from_rig = start->rig_from_world.inverse();
-  const RelativePose pose{ids_.newest_keyframe(), Rigid3{}, 1.0};
+  const RelativePose pose{ids_.newest_keyframe(), 1.0, Rigid3{}};
   outcome.details = {frame.id, frame.features, {}, pose, std::move(start->filled)};
   for (FilledPose& filled : outcome.details.filled) {
     filled.pose.reference.value += ids_.submap_start().value;

@@ -54,7 +54,7 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
           ? refiner_.refine(map, refiner_.find(map, living, *unsettled.features, guess), guess)
           : refiner_.refine(map, unsettled.seen, guess);
   if (!refined) return;
-  pose = {living, *refined * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
+  pose = {living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()};
 }
 
 void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
@@ -74,7 +74,7 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
   const auto found = refiner_.refine(map, seen, guess);
   if (!found) return;
   entry.state = FrameState::kFilled;
-  entry.pose = {living, *found * keyframe.rig_from_world.inverse(), keyframe.applied_scale};
+  entry.pose = {living, keyframe.applied_scale, *found * keyframe.rig_from_world.inverse()};
 }
 
 std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t index,

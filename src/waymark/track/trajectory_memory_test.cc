@@ -23,7 +23,7 @@ class TrajectoryMemoryTest : public ::testing::Test {
     TrackOutcome outcome;
     if (is_keyframe) outcome.message = NewKeyframe{};
     outcome.state = FrameState::kTracked;
-    outcome.details.pose = RelativePose{KeyframeId{0}, stale(), 1.0};
+    outcome.details.pose = RelativePose{KeyframeId{0}, 1.0, stale()};
     outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
     memory_.add(frame(number), outcome, scene_.map);
   }
@@ -64,8 +64,8 @@ TEST_F(TrajectoryMemoryTest, SettlesFilledFramesByWhatTheirFeaturesShow) {
   memory_.add(frame(2), TrackOutcome{}, scene_.map);
   TrackOutcome start;
   start.state = FrameState::kTracked;
-  start.details.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
-  start.details.filled = {{FrameId{2}, {KeyframeId{0}, stale(), 1.0}, view_.features}};
+  start.details.pose = RelativePose{KeyframeId{1}, 1.0, Rigid3{}};
+  start.details.filled = {{FrameId{2}, {KeyframeId{0}, 1.0, stale()}, view_.features}};
   memory_.add(frame(3), start, scene_.map);
   EXPECT_EQ(memory_.entries()[2].state, FrameState::kFilled);
   memory_.settle(scene_.map);
@@ -93,7 +93,7 @@ TEST_F(TrajectoryMemoryTest, FillsGapsFromBothSides) {
 TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
-  outcome.details.pose = RelativePose{KeyframeId{1}, Rigid3{}, 1.0};
+  outcome.details.pose = RelativePose{KeyframeId{1}, 1.0, Rigid3{}};
   outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
   memory_.add(frame(1), outcome, scene_.map);  // The second keyframe was made from frame 1.
   memory_.settle(scene_.map);

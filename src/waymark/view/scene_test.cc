@@ -129,7 +129,7 @@ class ChangingSession {
   RelativePose some_pose() {
     const KeyframeId living = pick(ids_of(map_.keyframes()));
     return {
-        living, Rigid3({1, 0, 0, 0}, {0.1, 0.2, 0.3}), map_.keyframes().at(living).applied_scale};
+        living, map_.keyframes().at(living).applied_scale, Rigid3({1, 0, 0, 0}, {0.1, 0.2, 0.3})};
   }
 
   testing::RandomMap start_;
