@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <numbers>
 #include <optional>
 #include <string>
 #include <thread>
@@ -46,6 +47,17 @@ Rigid3 default_cam1_from_cam0() {
   Vector6d motion;
   motion << -0.11, 0.002, -0.001, 0.008, -0.01, 0.005;
   return Rigid3::exp(motion);
+}
+
+/// Turns the second of a pair, where there is one, about its own axes.
+void turn_camera1(const std::vector<double>& degrees, CameraChain& chain) {
+  if (degrees.empty()) return;
+  if (chain.cameras.size() < 2) {
+    throw InputError("--turn", "there is one camera, expected a pair (--setup stereo)");
+  }
+  const double mrad_per_degree = 1e3 * std::numbers::pi / 180.0;
+  const Eigen::Vector3d turn_mrad = mrad_per_degree * Eigen::Vector3d(degrees.data());
+  chain = told_chain(std::move(chain), {.turn_mrad = turn_mrad});
 }
 
 CameraChain make_chain(Setup setup,
@@ -95,6 +107,10 @@ struct SimulateOptions {
   std::string camera;  ///< Camchain file or name; empty: the default.
   Setup setup = Setup::kStereo;
   SequenceSpec spec;
+  double readout_ms = 0.0;
+  double depth_lag_ms = 0.0;
+  std::vector<double> turn_deg;   ///< Of camera 1; empty: none.
+  std::vector<std::string> told;  ///< KEY=VALUE each.
   bool is_list = false;
   bool is_quiet = false;
 };
@@ -108,7 +124,7 @@ CameraChain chain_of(const SimulateOptions& options) {
   return read_camera_chain(options.camera, options.setup);
 }
 
-SequenceSpec spec_of(const SimulateOptions& options) {
+SequenceSpec plain_spec_of(const SimulateOptions& options) {
   const std::vector<std::string> worlds = world_names();
   if (std::find(worlds.begin(), worlds.end(), options.name) == worlds.end()) {
     for (SuiteEntry& entry : simulated_suite()) {
@@ -120,6 +136,18 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   SequenceSpec spec = options.spec;
   spec.name = spec.world = options.name;
   spec.chain = chain_of(options);
+  return spec;
+}
+
+/// With what goes for worlds and for sequences of the suite alike.
+SequenceSpec spec_of(const SimulateOptions& options) {
+  SequenceSpec spec = plain_spec_of(options);
+  spec.readout_s = 1e-3 * options.readout_ms;
+  spec.depth_lag_s = 1e-3 * options.depth_lag_ms;
+  turn_camera1(options.turn_deg, spec.chain);
+  spec.told = parse_calibration_error(options.told);
+  make_rig(
+      told_chain(spec.chain, spec.told));  // What cannot be told fails before anything is written.
   return spec;
 }
 
@@ -149,6 +177,33 @@ int simulate(const SimulateOptions& options) {
   reporter.info(
       fmt::format("{} frames of {} in {}", num_frames, options.name, options.out.string()));
   return kDone;
+}
+
+void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
+  simulation
+      .add_option("--readout",
+                  options.readout_ms,
+                  "Milliseconds from the first row to the last: a rolling shutter [0]")
+      ->check(number_between(0.0, 1000.0));
+  simulation
+      .add_option("--depth-lag",
+                  options.depth_lag_ms,
+                  "Milliseconds that depth images are taken after the others [0]")
+      ->check(number_between(0.0, 1000.0));
+  simulation
+      .add_option("--turn",
+                  options.turn_deg,
+                  "X,Y,Z: degrees that camera 1 of a pair is turned about its own axes [0,0,0]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(number_between(-180.0, 180.0));
+  simulation
+      .add_option("--told",
+                  options.told,
+                  "KEY=VALUE,...: write a calibration that is off; factors focal, distortion, "
+                  "baseline, depth; centre in px; turn_x, turn_y, turn_z of camera 1 in mrad [the "
+                  "true one]")
+      ->delimiter(',');
 }
 
 }  // namespace
@@ -183,6 +238,7 @@ void add_simulate_command(CLI::App& program, Command& command) {
       ->check(number_between(0.0, 100.0))
       ->capture_default_str();
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
+  add_flaw_options(simulation, *options);
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");
   simulation.add_flag("--quiet", options->is_quiet, "Errors only");
   simulation.callback([options, &command] { command = [options] { return simulate(*options); }; });

@@ -151,6 +151,8 @@ class BadInput(CliTest):
     def test_worlds_that_cannot_be_simulated(self):
         self.assert_fails(waymark("simulate", "moon", "-o", self.out), 2, "moon", "--list")
         self.assert_fails(waymark("simulate", "room"), 2, "--out")
+        self.assert_fails(waymark("simulate", "room", "--told", "fokal=1", "-o", self.out), 2, "fokal=1", "focal")
+        self.assert_fails(waymark("simulate", "room", "--setup", "mono", "--turn", "1,0,0", "-o", self.out), 2, "--turn")
         camera = self.config("cam0: {camera_model: pinhole}\n")
         self.assert_fails(waymark("simulate", "room", "--camera", camera, "--setup", "mono", "-o",
                                   self.out), 2, camera)

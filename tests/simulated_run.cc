@@ -93,11 +93,12 @@ SequenceSpec small_sequence(Setup setup, int num_frames) {
 Recording simulate(const SequenceSpec& spec) {
   SimulatedSequence sequence(spec, std::thread::hardware_concurrency());
   Recording recording;
-  recording.rig = sequence.rig();
+  const CameraChain told = told_chain(spec.chain, spec.told);
+  recording.rig = make_rig(told);
   recording.setup = spec.chain.depth_factor         ? Setup::kRgbd
                     : spec.chain.cameras.size() > 1 ? Setup::kStereo
                                                     : Setup::kMono;
-  if (spec.chain.depth_factor) recording.settings.depth.factor = *spec.chain.depth_factor;
+  if (told.depth_factor) recording.settings.depth.factor = *told.depth_factor;
   for (int i = 0; i < sequence.num_frames(); ++i) {
     SimulatedFrame simulated = sequence.frame(i);
     InputFrame frame;

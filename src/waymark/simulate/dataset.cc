@@ -76,7 +76,10 @@ void write_png(const fs::path& path, const BasicImage<T>& image, int type) {
 class Writer {
  public:
   Writer(const SequenceSpec& spec, fs::path folder)
-      : spec_(spec), folder_(std::move(folder)), layout_(layout_of(spec.chain)) {
+      : spec_(spec),
+        told_(told_chain(spec.chain, spec.told)),
+        folder_(std::move(folder)),
+        layout_(layout_of(spec.chain)) {
     for (const fs::path& sub : image_folders()) make_output_folder(folder_ / sub);
     if (layout_ == Layout::kTumRgbd) make_output_folder(folder_ / "depth");
   }
@@ -90,9 +93,10 @@ class Writer {
       write_png(folder_ / folders[i] / name, frame.images[i], CV_8UC1);
     }
     if (layout_ == Layout::kTumRgbd) {
-      write_png(folder_ / "depth" / name, frame.depth, CV_16UC1);
+      const std::string depth_seconds = format_seconds(frame.depth_timestamp_ns);
+      write_png(folder_ / "depth" / (depth_seconds + ".png"), frame.depth, CV_16UC1);
       list_ += fmt::format("{} rgb/{}\n", seconds, name);
-      depth_list_ += fmt::format("{} depth/{}\n", seconds, name);
+      depth_list_ += fmt::format("{0} depth/{0}.png\n", depth_seconds);
     } else {
       list_ += is_csv ? fmt::format("{},{}\n", frame.timestamp_ns, name) : seconds + "\n";
     }
@@ -114,9 +118,12 @@ class Writer {
     }
     if (layout_ == Layout::kTumVi) {
       make_output_folder(folder_ / "dso");
-      write_file_atomically(folder_ / "dso" / "camchain.yaml", format_camchain(spec_.chain));
+      write_file_atomically(folder_ / "dso" / "camchain.yaml", format_camchain(told_));
     }
-    write_file_atomically(folder_ / "camchain.yaml", format_camchain(spec_.chain));
+    const std::string told = format_camchain(told_);
+    const std::string truth = format_camchain(spec_.chain);
+    write_file_atomically(folder_ / "camchain.yaml", told);
+    if (told != truth) write_file_atomically(folder_ / "calibration_true.yaml", truth);
     write_trajectory(folder_ / "groundtruth.txt", truth_, TrajectoryFormat::kTum);
   }
 
@@ -136,12 +143,12 @@ class Writer {
       const fs::path sensor = folder_ / "mav0" / fmt::format("cam{}", i);
       write_file_atomically(sensor / "data.csv", "#timestamp [ns],filename\n" + list_);
       if (layout_ != Layout::kEuroc) continue;
-      write_file_atomically(sensor / "sensor.yaml",
-                            format_sensor(spec_.chain.cameras[i], spec_.rate_hz));
+      write_file_atomically(sensor / "sensor.yaml", format_sensor(told_.cameras[i], spec_.rate_hz));
     }
   }
 
   const SequenceSpec& spec_;
+  CameraChain told_;
   fs::path folder_;
   Layout layout_;
   std::string list_;

@@ -16,8 +16,9 @@ namespace waymark {
 ///   stereo          EuRoC: mav0/cam0, mav0/cam1 with sensor.yaml (T_BS; the body is the rig); for
 ///                   cameras that sensor.yaml cannot describe as TUM-VI: dso/camchain.yaml instead
 ///   mono            EuRoC for perspective cameras, else images/ and times.txt
-/// With each: groundtruth.txt (TUM format, world_from_camera0) and camchain.yaml (Kalibr). Calls
-/// done(frame) after each frame, if given. Throws OutputError.
+/// With each: groundtruth.txt (TUM format, world_from_camera0) and camchain.yaml (Kalibr); where
+/// the spec tells a wrong calibration the right one is in calibration_true.yaml. Calls done(frame)
+/// after each frame, if given. Throws OutputError, and InputError for what cannot be told wrong.
 void write_dataset(SimulatedSequence& sequence,
                    const std::filesystem::path& folder,
                    const std::function<void(int frame)>& done = {});

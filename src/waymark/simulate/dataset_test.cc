@@ -149,6 +149,39 @@ TEST(Dataset, RgbdIsTum) {
       std::equal(mat.begin<std::uint16_t>(), mat.end<std::uint16_t>(), frame.depth.values.begin()));
 }
 
+TEST(Dataset, TellsAWrongCalibrationAndKeepsTheTrueOne) {
+  const testing::TemporaryFolder folder;
+  SequenceSpec spec = small_spec(stereo_chain(small_camera(0.0), small_camera(3.0), kCam1FromCam0));
+  SimulatedSequence truth(spec);
+  write_dataset(truth, folder / "truth");
+  EXPECT_FALSE(fs::exists(folder / "truth" / "calibration_true.yaml"));
+  spec.told = {.focal = 1.05, .turn_mrad = {0.0, 2.0, 0.0}};
+  SimulatedSequence sequence(spec);
+  write_dataset(sequence, folder / "told");
+  const fs::path told = folder / "told";
+  EXPECT_DOUBLE_EQ(YAML::LoadFile(told / "camchain.yaml")["cam0"]["intrinsics"][0].as<double>(),
+                   94.5);
+  EXPECT_EQ(YAML::LoadFile(told / "calibration_true.yaml")["cam0"]["intrinsics"][0].as<double>(),
+            90.0);
+  const YAML::Node sensor = YAML::LoadFile(told / "mav0" / "cam1" / "sensor.yaml");
+  EXPECT_DOUBLE_EQ(sensor["intrinsics"][0].as<double>(), 1.05 * 93.0);
+  const Eigen::Matrix4d body_from_sensor = matrix_of(sensor["T_BS"]["data"]);
+  const Eigen::Matrix3d turn = (body_from_sensor * kCam1FromCam0.matrix()).topLeftCorner<3, 3>();
+  EXPECT_NEAR(std::acos(0.5 * (turn.trace() - 1.0)), 2e-3, 1e-6);
+  expect_image(told / "mav0" / "cam1" / "data" / "1000000000.png", truth.frame(0).images[1]);
+}
+
+TEST(Dataset, DepthHasTimesOfItsOwn) {
+  const testing::TemporaryFolder folder;
+  SequenceSpec spec = small_spec(rgbd_chain(small_camera(0.0), 5000.0));
+  spec.depth_lag_s = 0.006;
+  SimulatedSequence sequence(spec);
+  write_dataset(sequence, folder.path());
+  EXPECT_EQ(rows_of(folder / "rgb.txt")[2][0], "1.100000000");
+  EXPECT_EQ(rows_of(folder / "depth.txt")[2][0], "1.106000000");
+  EXPECT_TRUE(fs::exists(folder / rows_of(folder / "depth.txt")[2][1]));
+}
+
 TEST(Dataset, UnwritableFoldersAreNamed) {
   const testing::TemporaryFolder folder;
   const fs::path file = folder.write("file", "x");

@@ -225,15 +225,15 @@ double Renderer::pixel_rad() const {
 }
 
 template <class Body>
-void Renderer::for_tiles(ThreadPool& pool, Body body) const {
+void Renderer::for_tiles(ThreadPool& pool, int tile_height, Body body) const {
   const int width = camera_->width_px();
   const int height = camera_->height_px();
-  const int rows = (height + kTileHeight - 1) / kTileHeight;
+  const int rows = (height + tile_height - 1) / tile_height;
   pool.for_chunks(static_cast<std::size_t>(rows), 1, [&](std::size_t begin, std::size_t end) {
     for (std::size_t row = begin; row < end; ++row) {
-      const int y0 = static_cast<int>(row) * kTileHeight;
+      const int y0 = static_cast<int>(row) * tile_height;
       for (int x0 = 0; x0 < width; x0 += kTileWidth) {
-        body(Tile{x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + kTileHeight, height)});
+        body(Tile{x0, y0, std::min(x0 + kTileWidth, width), std::min(y0 + tile_height, height)});
       }
     }
   });
@@ -242,7 +242,18 @@ void Renderer::for_tiles(ThreadPool& pool, Body body) const {
 Image Renderer::image(const Rigid3& world_from_cam, ThreadPool& pool) const {
   Image result(camera_->width_px(), camera_->height_px());
   const View view(*world_, world_from_cam);
-  for_tiles(pool, [&](const Tile& tile) { shade_tile(view, tile, result); });
+  for_tiles(pool, kTileHeight, [&](const Tile& tile) { shade_tile(view, tile, result); });
+  return result;
+}
+
+Image Renderer::rolling_image(const std::function<Rigid3(int row)>& world_from_cam,
+                              ThreadPool& pool) const {
+  Image result(camera_->width_px(), camera_->height_px());
+  std::vector<View> views;
+  for (int row = 0; row < result.height_px; ++row) views.emplace_back(*world_, world_from_cam(row));
+  for_tiles(pool, 1, [&](const Tile& tile) {
+    shade_tile(views[static_cast<std::size_t>(tile.y0)], tile, result);
+  });
   return result;
 }
 
@@ -252,7 +263,7 @@ DepthImage Renderer::depth(const Rigid3& world_from_cam,
   DepthImage result(camera_->width_px(), camera_->height_px());
   View view(*world_, world_from_cam);
   view.units_per_metre = units_per_metre;
-  for_tiles(pool, [&](const Tile& tile) { measure_tile(view, tile, result); });
+  for_tiles(pool, kTileHeight, [&](const Tile& tile) { measure_tile(view, tile, result); });
   return result;
 }
 

@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <vector>
 
@@ -47,6 +48,9 @@ class Renderer {
   /// What the camera sees.
   Image image(const Rigid3& world_from_cam, ThreadPool& pool) const;
 
+  /// The same with a rolling shutter: each row is seen from a pose of its own.
+  Image rolling_image(const std::function<Rigid3(int row)>& world_from_cam, ThreadPool& pool) const;
+
   /// Depth along the camera's z axis, exact at the pixel's centre, in units of 1/units_per_metre,
   /// rounded; 0 where there is none, or it is behind the camera or above 65535.
   DepthImage depth(const Rigid3& world_from_cam, double units_per_metre, ThreadPool& pool) const;
@@ -61,7 +65,7 @@ class Renderer {
   void shade_tile(const View& view, const Tile& tile, Image& result) const;
   void measure_tile(const View& view, const Tile& tile, DepthImage& result) const;
   template <class Body>
-  void for_tiles(ThreadPool& pool, Body body) const;
+  void for_tiles(ThreadPool& pool, int tile_height, Body body) const;
 
   std::shared_ptr<const World> world_;
   std::shared_ptr<const Camera> camera_;

@@ -60,6 +60,7 @@ SimulatedSequence::SimulatedSequence(SequenceSpec spec,
       motion_(make_motion(spec_.world, spec_.motion, spec_.num_frames / spec_.rate_hz)),
       pool_(std::make_unique<ThreadPool>(num_threads)) {
   WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
+  WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0);
   WAYMARK_CHECK(!rig_.cameras.empty() && rig_.cameras.size() < kDepthStream);
   for (const RigCamera& camera : rig_.cameras) renderers_.emplace_back(world_, camera.camera);
 }
@@ -79,20 +80,31 @@ const ImageEffects& SimulatedSequence::effects_of(int index) const {
   return spec_.effects;
 }
 
-Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
-  const Renderer& renderer = renderers_[camera];
+Image SimulatedSequence::render(std::size_t camera, double time_s) {
   const Rigid3 rig_from_cam = rig_.cameras[camera].cam_from_rig.inverse();
+  const Renderer& renderer = renderers_[camera];
+  if (spec_.readout_s == 0.0) {
+    return renderer.image(motion_.world_from_rig(time_s) * rig_from_cam, *pool_);
+  }
+  const int height_px = rig_.cameras[camera].camera->height_px();
+  const auto pose_of_row = [&](int row) {
+    const double share = height_px > 1 ? static_cast<double>(row) / (height_px - 1) - 0.5 : 0.0;
+    return motion_.world_from_rig(time_s + share * spec_.readout_s) * rig_from_cam;
+  };
+  return renderer.rolling_image(pose_of_row, *pool_);
+}
+
+Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
   const double middle = seconds(index);
   const double half = 0.5 * effects.exposure_s;
   const int count = num_sub_exposures(motion_.world_from_rig(middle - half),
                                       motion_.world_from_rig(middle + half),
-                                      renderer.pixel_rad());
-  if (count == 1) return renderer.image(world_from_rig(index) * rig_from_cam, *pool_);
+                                      renderers_[camera].pixel_rad());
+  if (count == 1) return render(camera, middle);
   std::vector<int> sums;
   Image image;
   for (int k = 0; k < count; ++k) {
-    const double time = middle + effects.exposure_s * ((k + 0.5) / count - 0.5);
-    image = renderer.image(motion_.world_from_rig(time) * rig_from_cam, *pool_);
+    image = render(camera, middle + effects.exposure_s * ((k + 0.5) / count - 0.5));
     sums.resize(image.values.size(), 0);
     for (std::size_t i = 0; i < sums.size(); ++i) sums[i] += image.values[i];
   }
@@ -115,7 +127,10 @@ SimulatedFrame SimulatedSequence::frame(int index) {
     frame.images.push_back(std::move(image));
   }
   if (spec_.chain.depth_factor) {
-    const Rigid3 world_from_cam = frame.world_from_rig * rig_.cameras[0].cam_from_rig.inverse();
+    const double time_s = seconds(index) + spec_.depth_lag_s;
+    const Rigid3 world_from_cam =
+        motion_.world_from_rig(time_s) * rig_.cameras[0].cam_from_rig.inverse();
+    frame.depth_timestamp_ns = frame.timestamp_ns + std::llround(1e9 * spec_.depth_lag_s);
     frame.depth = renderers_[0].depth(world_from_cam, *spec_.chain.depth_factor, *pool_);
     Rng rng(spec_.seed, stream_of(index, kDepthStream));
     apply_depth_noise(effects, *spec_.chain.depth_factor, rng, frame.depth);

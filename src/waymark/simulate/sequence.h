@@ -11,6 +11,7 @@
 
 #include "waymark/base/thread_pool.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/simulate/calibration_error.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
 
@@ -35,6 +36,12 @@ struct SequenceSpec {
   int num_frames = 200;           ///< Which also say how long the motion takes.
   ImageEffects effects;           ///< Of the frames that no span holds.
   std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
+  /// Rolling shutter: time from the first row to the last. A frame's time is that of its middle
+  /// row; each row is as long exposed as a whole image otherwise.
+  double readout_s = 0.0;
+  /// Depth images are taken so much later than the other images, as their own times say.
+  double depth_lag_s = 0.0;
+  CalibrationError told;  ///< Of the calibration that data sets come with.
 };
 
 /// Chains of cameras for sequences.
@@ -48,10 +55,11 @@ CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor);
 
 /// A rendered frame and where the rig was.
 struct SimulatedFrame {
-  std::int64_t timestamp_ns = 0;  ///< Frames are 1 / rate_hz apart.
-  std::vector<Image> images;      ///< One per camera of the rig.
-  DepthImage depth;               ///< Registered to camera 0; empty without depth.
-  Rigid3 world_from_rig;          ///< Truth at the middle of the exposure.
+  std::int64_t timestamp_ns = 0;        ///< Frames are 1 / rate_hz apart.
+  std::int64_t depth_timestamp_ns = 0;  ///< When the depth image was taken.
+  std::vector<Image> images;            ///< One per camera of the rig.
+  DepthImage depth;                     ///< Registered to camera 0; empty without depth.
+  Rigid3 world_from_rig;                ///< Truth at the middle of the exposure and of the rows.
 };
 
 /// Renders the frames of a spec, each from (seed, index) alone: in any order, with the same bits
@@ -81,6 +89,7 @@ class SimulatedSequence {
 
  private:
   double seconds(int index) const { return index / spec_.rate_hz; }
+  Image render(std::size_t camera, double time_s);
   const ImageEffects& effects_of(int index) const;
   Image expose(std::size_t camera, int index, const ImageEffects& effects);
 

@@ -107,6 +107,44 @@ TEST(Sequence, MotionBlursAndStandingStillDoesNot) {
   }
 }
 
+TEST(Sequence, RowsOfARollingShutterAreSeenOneAfterTheOther) {
+  SequenceSpec spec = small_spec();
+  spec.motion = "fast_turn";
+  spec.rate_hz = 1000.0;
+  spec.readout_s = 0.008;
+  SimulatedSequence rolling(spec, 2);
+  spec.readout_s = 0.0;
+  SimulatedSequence global(spec);
+  const Image image = rolling.frame(10).images[0];
+  const int last_row = image.height_px - 1;
+  for (const auto& [row, frame] : {std::pair(0, 6), std::pair(last_row, 14)}) {
+    const Image expected = global.frame(frame).images[0];
+    const Image other = global.frame(10).images[0];
+    const auto is_row_of = [&, r = row](const Image& whole) {
+      return std::equal(image.row(r), image.row(r) + image.width_px, whole.row(r));
+    };
+    EXPECT_TRUE(is_row_of(expected)) << row;
+    EXPECT_FALSE(is_row_of(other)) << row;
+  }
+  spec.motion = "still";
+  spec.readout_s = 0.008;
+  EXPECT_EQ(SimulatedSequence(spec).frame(3).images[0].values,
+            SimulatedSequence(spec).frame(9).images[0].values);
+}
+
+TEST(Sequence, DepthLags) {
+  SequenceSpec spec = small_spec();
+  spec.chain = rgbd_chain(small_camera(), 5000.0);
+  SimulatedSequence prompt(spec);
+  spec.depth_lag_s = 0.1;
+  SimulatedSequence late(spec);
+  const SimulatedFrame frame = late.frame(4);
+  EXPECT_EQ(frame.images[0].values, prompt.frame(4).images[0].values);
+  EXPECT_EQ(frame.depth.values, prompt.frame(6).depth.values);
+  EXPECT_EQ(frame.depth_timestamp_ns, prompt.frame(6).timestamp_ns);
+  EXPECT_NE(frame.depth.values, prompt.frame(4).depth.values);
+}
+
 TEST(Sequence, SecondCameraSeesFromItsPlace) {
   SequenceSpec spec = small_spec();
   const Rigid3 cam1_from_cam0(Eigen::Quaterniond(Eigen::AngleAxisd(0.1, Eigen::Vector3d::UnitY())),
