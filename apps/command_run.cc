@@ -14,6 +14,7 @@
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/session/autosave.h"
+#include "waymark/session/calibration_advice.h"
 #include "waymark/session/image_keeper.h"
 #include "waymark/session/live_input.h"
 #include "waymark/session/quality.h"
@@ -57,49 +58,8 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             options.report.out.string()));
 }
 
-/// Tells once what the residuals say of the calibration, as soon as they do.
-class FocalReport {
- public:
-  FocalReport(const System& system, Reporter& reporter) : system_(system), reporter_(reporter) {}
-
-  void update() {
-    const FocalCheck* check = is_told_ ? nullptr : system_.focal_check();
-    if (check == nullptr) return;
-    is_told_ = true;
-    if (check->is_off() || check->is_bent()) {
-      reporter_.warning("calibration: " + describe(*check));
-    } else {
-      reporter_.detail(describe(*check));
-    }
-  }
-
- private:
-  static std::string describe(const FocalCheck& check) {
-    if (check.is_bent()) {
-      return fmt::format(
-          "by the residuals the distortion is wrong, by {:.0f} % (+- {:.0f} %) in the corners",
-          100.0 * std::abs(check.bend),
-          100.0 * check.bend_sigma);
-    }
-    return fmt::format(
-        "by the residuals the focal length is {}{:.1f} % (+- {:.1f} %) {} than stated",
-        check.is_beyond ? "at least " : "",
-        100.0 * std::abs(check.factor - 1.0),
-        100.0 * check.sigma,
-        check.factor < 1.0 ? "shorter" : "longer");
-  }
-
-  const System& system_;
-  Reporter& reporter_;
-  bool is_told_ = false;
-};
-
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
-FrameObserver observe(Session& session,
-                      Autosave& autosave,
-                      LiveControl* live,
-                      FocalReport& focal,
-                      Reporter& reporter) {
+FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
   return [&, live, report = report_frames(reporter, session.input->info())](
              const FrameRecord& record) mutable {
     report(record);
@@ -107,16 +67,17 @@ FrameObserver observe(Session& session,
     if (const auto failure = autosave.update(session.system->map())) {
       reporter.warning("autosave: " + *failure);
     }
-    focal.update();
   };
 }
 
 SessionResults map_input(
     Session& session, Input& input, Autosave& autosave, LiveControl* live, Reporter& reporter) {
-  FocalReport focal(*session.system, reporter);
+  CalibrationWatch watch(session,
+                         [&reporter](const std::string& mistake) { reporter.warning(mistake); });
   SessionHooks hooks;
+  hooks.watch = &watch;
   hooks.should_stop = is_interrupted;
-  hooks.observer = observe(session, autosave, live, focal, reporter);
+  hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
     hooks.on_result = [live](const FrameImages& frame, const TrackingResult& result) {
@@ -125,7 +86,7 @@ SessionResults map_input(
     hooks.on_input_end = [live] { live->finishing(); };
   }
   SessionResults results = run_session(input, *session.system, hooks);
-  focal.update();
+  if (const FocalCheck* check = session.system->focal_check()) reporter.detail(describe(*check));
   return results;
 }
 

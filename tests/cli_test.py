@@ -144,10 +144,29 @@ class Inputs(CliTest):
     def test_euroc_needs_no_calibration(self):
         summary = self.assert_maps(self.sequence("stereo"))
         self.assertEqual(summary["setup"], "stereo")
+        self.assertEqual(summary["mistakes"], [])
 
     def test_one_camera_of_a_pair(self):
         summary = self.assert_maps(self.sequence("stereo"), "--setup", "mono")
         self.assertEqual(summary["setup"], "mono")
+
+    def test_usual_mistakes_are_named(self):
+        source = self.sequence("stereo")
+        mav0 = source / "mav0"
+        (mav0 / "cam0" / "data").rename(mav0 / "other")
+        (mav0 / "cam1" / "data").rename(mav0 / "cam0" / "data")
+        (mav0 / "other").rename(mav0 / "cam1" / "data")
+        for sensor in ("cam0", "cam1"):
+            listed = mav0 / sensor / "data.csv"
+            rows = [row.split(",") for row in listed.read_text().splitlines()[1:]]
+            listed.write_text("".join(f"{int(time) // 10**6},{name}\n" for time, name in rows))
+        done = self.run_on(source)
+        for text in ("time stamps in milliseconds? Expected nanoseconds", "left and right images are swapped"):
+            self.assertIn(text, done.stderr)
+        mistakes = self.summary()["mistakes"]
+        self.assertEqual(len(mistakes), 2, mistakes)
+        for mistake in mistakes:
+            self.assertIn(f"warning: {mistake}\n", done.stderr)
 
     def test_tum(self):
         source = self.sequence("rgbd")

@@ -138,6 +138,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["loops"] = summary.loops;
   json["relocalizations"] = summary.relocalizations;
   if (summary.quality) json["quality"] = to_json(*summary.quality);
+  if (summary.mistakes) json["mistakes"] = *summary.mistakes;
   json["wall_s"] = rounded(summary.wall_s);
   json["cpu_s"] = rounded(summary.cpu_s);
   json["peak_rss_mb"] = rounded(summary.peak_rss_mb);

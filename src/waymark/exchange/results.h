@@ -96,6 +96,8 @@ struct RunSummary {
   std::string version;                   ///< Of the program.
   std::optional<std::size_t> localized;  ///< Of localize only.
   std::optional<RunQuality> quality;     ///< Of run only.
+  /// Of run only: what seems to be wrong with the calibration and the time stamps, in words.
+  std::optional<std::vector<std::string>> mistakes = std::nullopt;
 };
 
 /// Statistics per stage over all rows, in the order of the table.

@@ -269,8 +269,10 @@ std::optional<FocalCheck> check_focal_length(const Map& map) {
   check.is_beyond = !focal_length.is_found;
   if (check.is_off()) return check;
   const Least bend = find_least(rig, kBend, scene);
-  check.bend = bend.value;
-  check.bend_sigma = bend.sigma;
+  if (bend.is_found) {  // Else rows that lag, or motion that does not tell, lead out of all bounds.
+    check.bend = bend.value;
+    check.bend_sigma = bend.sigma;
+  }
   return check;
 }
 

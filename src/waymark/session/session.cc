@@ -94,10 +94,16 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   const auto feed = [&](const FrameImages& frame) {
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
+    if (hooks.watch) hooks.watch->add(frame, system);
     return result;
   };
-  FedFrames frames = feed_all(input, feed, hooks.should_stop, hooks.observer);
+  const auto observe = [&](const FrameRecord& record) {
+    if (hooks.watch) hooks.watch->add_time(record.index, record.timestamp_ns);
+    if (hooks.observer) hooks.observer(record);
+  };
+  FedFrames frames = feed_all(input, feed, hooks.should_stop, observe);
   finish(system, hooks, frames);
+  if (hooks.watch) hooks.watch->finish(system);
   reserve.release();
   malloc_trim(0);  // What frames saw is settled and gone: lists of results take its place.
   update_states(system, frames);
@@ -107,6 +113,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.table = std::move(frames.table);
   results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
+  if (hooks.watch) results.summary.mistakes = hooks.watch->mistakes();
   results.failure = frames.failure;
   usage.write_to(results.summary);
   return results;

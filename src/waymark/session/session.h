@@ -14,6 +14,7 @@
 #include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
 #include "waymark/map/map.h"
+#include "waymark/session/calibration_watch.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/system/localizer.h"
 #include "waymark/system/system.h"
@@ -31,13 +32,14 @@ struct SessionResults {
   std::exception_ptr failure;
 };
 
-/// Who takes part in a session while it runs; any may be empty.
+/// Who takes part in a session while it runs; any may be empty or null.
 struct SessionHooks {
   std::function<bool()> should_stop;  ///< Asked before each frame.
   FrameObserver observer;
   /// Hears of each frame that was fed.
   std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
+  CalibrationWatch* watch = nullptr;  ///< Its mistakes become part of the summary.
 };
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and

@@ -1,0 +1,98 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/calibration_watch.h"
+
+#include "waymark/base/median.h"
+#include "waymark/session/calibration_advice.h"
+
+namespace waymark {
+namespace {
+
+/// Images are looked at now and then, so that some show more than the first.
+constexpr int kPairEvery = 5;
+constexpr int kNumPairs = 3;
+constexpr int kDepthEvery = 10;
+constexpr int kNumDepths = 15;
+constexpr std::size_t kNumIntervals = 10;
+
+}  // namespace
+
+CalibrationWatch::CalibrationWatch(const PreparedInput& input, Listener listener)
+    : listener_(std::move(listener)), units_per_metre_(input.settings.depth.factor) {
+  const InputInfo& info = input.input->info();
+  if (info.calibration) {
+    camera0_ = info.calibration->cameras.at(0).description;
+    for (const std::string& line : advise_on_numbers(*info.calibration)) report(line);
+  }
+  const Settings& settings = input.settings;
+  if (info.setup == Setup::kStereo) {
+    pair_.emplace(input.rig,
+                  FrameSettings{settings.features, settings.stereo, settings.depth, settings.view});
+  }
+  if (info.setup == Setup::kRgbd) depth_.emplace();
+}
+
+void CalibrationWatch::report(const std::optional<std::string>& mistake) {
+  if (!mistake) return;
+  mistakes_.push_back("calibration: " + *mistake);
+  if (listener_) listener_(mistakes_.back());
+}
+
+void CalibrationWatch::add_time(std::size_t index, std::int64_t timestamp_ns) {
+  if (are_times_known_) return;
+  if (last_time_ && index > last_time_->first) {
+    intervals_ns_.push_back(static_cast<double>(timestamp_ns - last_time_->second) /
+                            static_cast<double>(index - last_time_->first));
+  }
+  last_time_ = {index, timestamp_ns};
+  if (intervals_ns_.size() == kNumIntervals) decide_on_times();
+}
+
+void CalibrationWatch::add(const FrameImages& images, const System& system) {
+  const int at = num_fed_++;
+  const Features* features = system.details().features.get();
+  if (pair_ && features && !images.image1.is_empty() && at % kPairEvery == 0) {
+    pair_->add(images, *features);
+    if (pair_->num_images() == kNumPairs) decide_on_pair();
+  }
+  if (depth_ && !images.depth.is_empty() && at % kDepthEvery == 0) {
+    depth_->add(images.image0, images.depth);
+    if (depth_->num_images() == kNumDepths) decide_on_depth();
+  }
+  decide_on_residuals(system);
+}
+
+void CalibrationWatch::finish(const System& system) {
+  decide_on_times();
+  decide_on_pair();
+  decide_on_depth();
+  decide_on_residuals(system);
+}
+
+void CalibrationWatch::decide_on_times() {
+  if (are_times_known_ || intervals_ns_.empty()) return;
+  are_times_known_ = true;
+  report(advise_on_times(median(intervals_ns_)));
+}
+
+void CalibrationWatch::decide_on_pair() {
+  if (!pair_) return;
+  report(pair_->advise());
+  pair_.reset();
+}
+
+void CalibrationWatch::decide_on_depth() {
+  if (!depth_) return;
+  report(depth_->advise_on_units(units_per_metre_));
+  report(depth_->advise_on_registration());
+  depth_.reset();
+}
+
+void CalibrationWatch::decide_on_residuals(const System& system) {
+  const FocalCheck* check = are_residuals_known_ ? nullptr : system.focal_check();
+  if (check == nullptr) return;
+  are_residuals_known_ = true;
+  report(advise_on_residuals(*check, camera0_));
+}
+
+}  // namespace waymark

@@ -1,0 +1,60 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "waymark/session/depth_check.h"
+#include "waymark/session/pair_check.h"
+#include "waymark/session/session_options.h"
+#include "waymark/system/system.h"
+
+namespace waymark {
+
+/// Looks for usual mistakes in the calibration while a session runs, and names each once, with its
+/// cure: see calibration_advice.h, PairCheck and DepthCheck. Takes no part in the session.
+class CalibrationWatch {
+ public:
+  /// Hears of each mistake when it is found, in one line.
+  using Listener = std::function<void(const std::string&)>;
+
+  /// Names what the numbers alone tell.
+  CalibrationWatch(const PreparedInput& input, Listener listener);
+
+  /// Of each frame of the input, in order.
+  void add_time(std::size_t index, std::int64_t timestamp_ns);
+  /// Of each frame that was just fed to the system.
+  void add(const FrameImages& images, const System& system);
+  /// After the last frame; the system is finished.
+  void finish(const System& system);
+
+  /// In the order they were found.
+  const std::vector<std::string>& mistakes() const { return mistakes_; }
+
+ private:
+  void report(const std::optional<std::string>& mistake);
+  void decide_on_times();
+  void decide_on_pair();
+  void decide_on_depth();
+  void decide_on_residuals(const System& system);
+
+  Listener listener_;
+  std::vector<std::string> mistakes_;
+  CameraDescription camera0_;
+  double units_per_metre_;
+  int num_fed_ = 0;
+  std::optional<std::pair<std::size_t, std::int64_t>> last_time_;
+  std::vector<double> intervals_ns_;
+  // Nothing once they have decided.
+  std::optional<PairCheck> pair_;
+  std::optional<DepthCheck> depth_;
+  bool are_times_known_ = false;
+  bool are_residuals_known_ = false;
+};
+
+}  // namespace waymark
