@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -74,6 +75,9 @@ struct TwoViewModels {
   std::optional<TwoViewFit> essential, homography, rotation;
   TwoViewModel best = TwoViewModel::kScene;
   std::size_t num_inliers = 0;  ///< Of the best.
+  /// GRIC of the best, in squared standard deviations; infinite where there is none. Comparable
+  /// between different bearings of the same matches.
+  double cost = std::numeric_limits<double>::infinity();
 };
 
 /// The first step of it: fits the three models by ransac() and chooses between them by GRIC (Torr

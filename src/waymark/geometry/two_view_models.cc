@@ -171,6 +171,7 @@ TwoViewModels fit_two_view_models(const BearingMatches& matches, RansacOptions o
   const double scene_cost = gric(essential, models.essential, {3, 5});
   const double plane_cost = gric(homography, models.homography, {2, 8});
   const double rotation_cost = gric(rotation, models.rotation, {2, 3});
+  models.cost = std::min({scene_cost, plane_cost, rotation_cost});
   const std::optional<TwoViewFit>* best = &models.essential;
   if (plane_cost < scene_cost) {
     models.best = TwoViewModel::kPlane;
