@@ -4,6 +4,7 @@ cmake_minimum_required(VERSION 3.25)
 set(roots
   base/check.h # InputError, which every reader throws
   base/config.h # settings files
+  calibrate/calibrate.h # cameras that nobody knows
   camera/camchain.h
   camera/camera.h
   camera/model_camera.h # own camera models

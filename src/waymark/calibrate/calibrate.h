@@ -1,0 +1,57 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <functional>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "waymark/calibrate/lens.h"
+#include "waymark/camera/camchain.h"
+#include "waymark/input/input.h"
+
+namespace waymark {
+
+struct CalibrateOptions {
+  std::optional<double> fov_deg;      ///< Horizontal field of view, if it is roughly known.
+  int seed = 0;                       ///< Of all random numbers.
+  std::function<bool()> should_stop;  ///< Asked per frame; ends the search early. May be empty.
+  /// Hears what is being done, for people. May be empty.
+  std::function<void(const std::string&)> on_progress;
+};
+
+/// What images tell of the camera that took them.
+struct EstimatedCalibration {
+  LensModel model = LensModel::kPerspective;
+  CameraDescription camera;                ///< Of the images as they are.
+  LensChange sigmas = LensChange::Zero();  ///< Standard deviations of its numbers.
+  double fov_deg = 0.0;                    ///< Horizontal, distortion included.
+  bool is_sure = false;        ///< Whether the motion told the focal length, within some percent.
+  std::string reason;          ///< What decided, in words.
+  std::size_t num_frames = 0;  ///< That were looked at.
+  std::size_t num_keyframes = 0;  ///< Of the map that the numbers are from; 0: there was none.
+  double reprojection_px = 0.0;   ///< Root mean square in that map, px of the features' levels.
+
+  /// As for -c.
+  CameraChain chain() const;
+};
+
+/// The result in one line.
+std::string describe(const EstimatedCalibration& calibration);
+/// The same with all numbers, a line each.
+std::vector<std::string> report(const EstimatedCalibration& calibration);
+
+/// Finds the model and the numbers of the camera of an input from its images alone.
+///
+/// 360 degree images are known by their borders, fisheye lenses by the circle they light or by
+/// their field of view. Fields of view and distortions compete in how well pairs of images, matched
+/// by pixels, agree with any motion; from the best, map and bundle adjustment with free calibration
+/// take turns until they agree. That is tried on stretches of 300 frames, the first that tells
+/// being the last; a camera has one. Where the motion does not tell, the likeliest is taken and
+/// is_sure is false. Takes its frames from the input; only camera 0 counts. Throws InputError where
+/// there is no image. Repeatable by bits.
+EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options);
+
+}  // namespace waymark

@@ -1,0 +1,102 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/calibrate/calibrate.h"
+
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <vector>
+
+#include "waymark/base/testing/errors.h"
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::Contains;
+using ::testing::HasSubstr;
+using ::testing::StartsWith;
+
+/// A camera that is moved through the room, of which nobody says what it is.
+class RenderedInput : public Input {
+ public:
+  RenderedInput(const CameraDescription& camera, const std::string& motion, int num_frames)
+      : sequence_(spec_of(camera, motion, num_frames)) {}
+
+  const InputInfo& info() const override { return info_; }
+  std::optional<InputFrame> next() override {
+    if (next_ == sequence_.num_frames()) return std::nullopt;
+    SimulatedFrame rendered = sequence_.frame(next_);
+    InputFrame frame;
+    frame.index = static_cast<std::size_t>(next_++);
+    frame.timestamp_ns = rendered.timestamp_ns;
+    frame.images = std::move(rendered.images);
+    return frame;
+  }
+
+ private:
+  static SequenceSpec spec_of(const CameraDescription& camera,
+                              const std::string& motion,
+                              int num_frames) {
+    SequenceSpec spec;
+    spec.motion = motion;
+    spec.chain = mono_chain(camera);
+    spec.num_frames = num_frames;
+    return spec;
+  }
+
+  SimulatedSequence sequence_;
+  InputInfo info_;
+  int next_ = 0;
+};
+
+CameraDescription wide_lens() {
+  const double focal_px = focal_length_of(LensModel::kPerspective, 70.0 * kRadiansPerDegree, 400);
+  CameraDescription lens = make_lens(LensModel::kPerspective, focal_px, 400, 300);
+  lens.distortion_coeffs = {-0.12, 0.02, 0.0, 0.0};
+  return lens;
+}
+
+TEST(Calibrate, FindsALensThatNobodyKnows) {
+  RenderedInput input(wide_lens(), "inspect", 70);
+  const EstimatedCalibration found = calibrate(input, {});
+  EXPECT_EQ(found.model, LensModel::kPerspective);
+  EXPECT_TRUE(found.is_sure) << describe(found);
+  const std::vector<double>& numbers = found.camera.intrinsics;
+  EXPECT_NEAR(numbers[0] / wide_lens().intrinsics[0], 1.0, 0.02) << describe(found);
+  EXPECT_NEAR(numbers[2], 199.5, 4.0);
+  EXPECT_NEAR(found.camera.distortion_coeffs[0], -0.12, 0.03);
+  EXPECT_EQ(found.camera.width_px, 400);
+  EXPECT_THAT(report(found), Contains(StartsWith("focal length: ")));
+  EXPECT_EQ(make_rig(found.chain()).cameras.size(), 1u);
+}
+
+TEST(Calibrate, SaysWhereNothingTells) {
+  RenderedInput input(wide_lens(), "still", 12);
+  const EstimatedCalibration found = calibrate(input, {});
+  EXPECT_FALSE(found.is_sure);
+  EXPECT_THAT(describe(found), HasSubstr("the motion does not tell"));
+  EXPECT_NEAR(found.fov_deg, 65.0, 10.0);
+  RenderedInput again(wide_lens(), "still", 12);
+  CalibrateOptions options;
+  options.fov_deg = 80.0;
+  EXPECT_NEAR(calibrate(again, options).fov_deg, 80.0, 0.5);
+}
+
+TEST(Calibrate, SeesAllDirections) {
+  RenderedInput input(make_lens(LensModel::kEquirectangular, 0.0, 320, 160), "inspect", 3);
+  const EstimatedCalibration found = calibrate(input, {});
+  EXPECT_EQ(found.model, LensModel::kEquirectangular);
+  EXPECT_TRUE(found.is_sure);
+  EXPECT_EQ(found.camera.camera_model, "equirectangular");
+}
+
+TEST(Calibrate, WantsImages) {
+  RenderedInput input(wide_lens(), "still", 1);
+  input.next();
+  EXPECT_THAT(testing::input_error_of([&] { calibrate(input, {}); }),
+              HasSubstr("there is no image, expected some"));
+}
+
+}  // namespace
+}  // namespace waymark
