@@ -20,12 +20,14 @@
 #include "waymark/session/quality.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
+#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {
 
 struct RunOptions {
   SessionOptions session;
+  CalibrateOptions calibrate;
   ReportOptions report;
   std::filesystem::path map_out;  ///< Empty: the map is not saved.
   double autosave_s = 60.0;
@@ -124,11 +126,34 @@ void start_viewer(const RunOptions& options,
   reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
+EstimatedCalibrationSummary summarize(const EstimatedCalibration& calibration) {
+  EstimatedCalibrationSummary summary;
+  summary.model = to_string(calibration.model);
+  if (!calibration.camera.intrinsics.empty()) {
+    summary.focal_px = calibration.camera.intrinsics[0];
+    summary.focal_sigma_px = calibration.sigmas[0] * summary.focal_px;
+  }
+  summary.fov_deg = calibration.fov_deg;
+  summary.is_sure = calibration.is_sure;
+  return summary;
+}
+
+/// Nothing where it was given.
+void write_calibration(const std::optional<EstimatedCalibration>& estimated,
+                       const std::filesystem::path& folder) {
+  if (!estimated) return;
+  write_file_atomically(folder / "calibration.yaml", format_camchain(estimated->chain()));
+}
+
 int run(RunOptions options, Reporter& reporter) {
   const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
   options.session.timing = options.timing.value_or(suitable);
+  options.session.calibrate = reported(options.calibrate, reporter);
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
+  if (session.estimated && !session.estimated->is_sure) {
+    reporter.warning("calibration: " + session.estimated->reason + "; expect a bent map");
+  }
   prepare_results(options.report.out);
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) {
@@ -160,8 +185,10 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
+  if (session.estimated) results.summary.calibration = summarize(*session.estimated);
   // What ended the session early is told together with what could not be saved.
   save_each({[&] { write_results(options.report.out, results); },
+             [&] { write_calibration(session.estimated, options.report.out); },
              [&] {
                if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
              },
@@ -210,6 +237,7 @@ void add_run_command(CLI::App& program, Command& command) {
   CLI::App& run_command = *program.add_subcommand("run", "Map INPUT; write results to --out");
   add_input_options(run_command, options->session);
   add_selection_options(run_command, options->session.reading);
+  add_fov_option(run_command, options->calibrate);
   add_pace_option(run_command, *options);
   add_choice<std::optional<Timing>>(
       run_command,

@@ -67,6 +67,21 @@ void add_selection_options(CLI::App& command, InputOptions& reading) {
       "Mask image, or a folder with one per frame by name; black is not used [none]");
 }
 
+void add_fov_option(CLI::App& command, CalibrateOptions& options) {
+  command
+      .add_option("--fov",
+                  options.fov_deg,
+                  "Horizontal field of view in degrees, roughly, of an INPUT without calibration "
+                  "[estimated]")
+      ->check(number_between(5.0, 240.0));
+}
+
+CalibrateOptions reported(CalibrateOptions options, Reporter& reporter) {
+  options.should_stop = is_interrupted;
+  options.on_progress = [&reporter](const std::string& text) { reporter.info(text); };
+  return options;
+}
+
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed) {
   command.add_option("-o,--out", options.out, "Folder for the results [waymark-out]");
   command.add_option("--seed", seed, "Seed of all random numbers [0]")

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "reporter.h"
+#include "waymark/calibrate/calibrate.h"
 #include "waymark/exchange/results.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/session/session.h"
@@ -34,8 +35,13 @@ struct ReportOptions {
 void add_input_options(CLI::App& command, SessionOptions& options);
 /// Which part of the input and of the images.
 void add_selection_options(CLI::App& command, InputOptions& reading);
+/// --fov, of inputs that carry no calibration.
+void add_fov_option(CLI::App& command, CalibrateOptions& options);
 /// Where results and messages go, and the seed.
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed);
+
+/// Lets a calibration tell what it does, and be interrupted.
+CalibrateOptions reported(CalibrateOptions options, Reporter& reporter);
 
 /// Tells of every frame.
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info);

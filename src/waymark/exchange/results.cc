@@ -36,6 +36,15 @@ Json to_json(const RunQuality& quality) {
           {"is_metric", quality.is_metric}};
 }
 
+Json to_json(const EstimatedCalibrationSummary& calibration) {
+  return {{"source", "estimated"},
+          {"model", calibration.model},
+          {"focal_px", rounded(calibration.focal_px)},
+          {"focal_sigma_px", rounded(calibration.focal_sigma_px)},
+          {"fov_deg", rounded(calibration.fov_deg)},
+          {"is_sure", calibration.is_sure}};
+}
+
 void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
   json["frames"] = counts.frames;
   json["tracked"] = counts.tracked;
@@ -139,6 +148,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["relocalizations"] = summary.relocalizations;
   if (summary.quality) json["quality"] = to_json(*summary.quality);
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
+  if (summary.calibration) json["calibration"] = to_json(*summary.calibration);
   json["wall_s"] = rounded(summary.wall_s);
   json["cpu_s"] = rounded(summary.cpu_s);
   json["peak_rss_mb"] = rounded(summary.peak_rss_mb);

@@ -75,6 +75,15 @@ struct RunQuality {
   bool is_metric = false;     ///< Whether the length is in metres, rather than in map units.
 };
 
+/// A calibration that was estimated from the images, since the input carries none.
+struct EstimatedCalibrationSummary {
+  std::string model;            ///< "perspective", "fisheye" or "equirectangular".
+  double focal_px = 0.0;        ///< Horizontally; 0 for 360 degree images.
+  double focal_sigma_px = 0.0;  ///< Its standard deviation.
+  double fov_deg = 0.0;         ///< Horizontal field of view.
+  bool is_sure = false;         ///< Whether the motion told it.
+};
+
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -98,6 +107,7 @@ struct RunSummary {
   std::optional<RunQuality> quality;     ///< Of run only.
   /// Of run only: what seems to be wrong with the calibration and the time stamps, in words.
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
+  std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
 };
 
 /// Statistics per stage over all rows, in the order of the table.

@@ -47,6 +47,22 @@ std::optional<std::string> describe_unused(const Camera& camera, std::size_t ind
       100.0 * part);
 }
 
+/// Calibrates from the images of an input that carries no calibration.
+EstimatedCalibration estimate(const SessionOptions& options, int seed, Input& input) {
+  if (!options.calibrate) {
+    throw InputError(options.input.string(),
+                     "carries no calibration, expected its cameras in a file given with -c");
+  }
+  if (input.info().setup == Setup::kStereo) {
+    throw InputError(options.input.string(),
+                     "carries no calibration, expected its two cameras in a file given with -c, or "
+                     "--setup mono");
+  }
+  CalibrateOptions calibrate_options = *options.calibrate;
+  calibrate_options.seed = seed;
+  return calibrate(input, calibrate_options);
+}
+
 }  // namespace
 
 std::string describe(const Map& map, const std::filesystem::path& path) {
@@ -67,17 +83,24 @@ PreparedInput prepare_input(const SessionOptions& options) {
   reading.calibration = read_camchain(config);
   prepared.input = open_input(options.input, reading);
 
-  const InputInfo& info = prepared.input->info();
-  if (!info.calibration) {
-    throw InputError(options.input.string(),
-                     "carries no calibration, expected its cameras in a file given with -c");
+  if (!prepared.input->info().calibration) {
+    prepared.estimated = estimate(options, prepared.settings.seed, *prepared.input);
+    reading.calibration = prepared.estimated->chain();
+    prepared.input.reset();  // A camera is open once at a time.
+    prepared.input = open_input(options.input, reading);
   }
+  const InputInfo& info = prepared.input->info();
   if (info.calibration->depth_factor) {
     prepared.settings.depth.factor = *info.calibration->depth_factor;
   }
   prepared.rig = make_rig(*info.calibration);
 
   prepared.description = info.lines;
+  if (prepared.estimated) {
+    std::erase_if(prepared.description,
+                  [](const auto& line) { return line.starts_with("calibration from"); });
+    prepared.description.push_back("calibration estimated: " + describe(*prepared.estimated));
+  }
   for (std::size_t i = 0; i < info.calibration->cameras.size(); ++i) {
     prepared.description.push_back(describe(info.calibration->cameras[i], i));
     if (auto unused = describe_unused(*prepared.rig.cameras[i].camera, i)) {

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "waymark/base/timing.h"
+#include "waymark/calibrate/calibrate.h"
 #include "waymark/input/input.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/system/settings.h"
@@ -25,6 +26,9 @@ struct SessionOptions {
   InputOptions reading;                        ///< The calibration is filled in.
   Timing timing = Timing::kLockstep;
   std::optional<int> seed;  ///< Overrides the settings.
+  /// How to calibrate from the images of an input that carries no calibration, its seed aside;
+  /// nothing: such an input is an error.
+  std::optional<CalibrateOptions> calibrate;
 };
 
 /// An input with its cameras and the settings to use it with.
@@ -32,7 +36,8 @@ struct PreparedInput {
   std::unique_ptr<Input> input;
   Settings settings;
   Rig rig;
-  std::vector<std::string> description;  ///< What was understood, in words.
+  std::optional<EstimatedCalibration> estimated;  ///< Where the input carried no calibration.
+  std::vector<std::string> description;           ///< What was understood, in words.
 };
 
 /// An input and the system to feed it to.

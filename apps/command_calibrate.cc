@@ -1,0 +1,65 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <filesystem>
+#include <memory>
+#include <string>
+
+#include "commands.h"
+#include "input_command.h"
+#include "numbers.h"
+#include "reporter.h"
+#include "terminal.h"
+#include "waymark/base/atomic_file.h"
+#include "waymark/calibrate/calibrate.h"
+#include "waymark/simulate/dataset.h"
+
+namespace waymark {
+namespace {
+
+struct CalibrateCommand {
+  std::filesystem::path input;
+  InputOptions reading;
+  CalibrateOptions calibrate;
+  std::filesystem::path out;  ///< Empty: the calibration is printed only.
+  ReportOptions report;
+};
+
+int calibrate_input(CalibrateCommand options, Reporter& reporter) {
+  options.reading.setup = Setup::kMono;
+  if (!options.out.empty()) AtomicFile{options.out};  // Fails now rather than in the end.
+  const std::unique_ptr<Input> input = open_input(options.input, options.reading);
+  const EstimatedCalibration calibration = calibrate(*input, reported(options.calibrate, reporter));
+  for (const std::string& line : report(calibration)) print_result("{}\n", line);
+  if (!calibration.is_sure) reporter.warning("calibration: " + calibration.reason);
+  if (!options.out.empty())
+    write_file_atomically(options.out, format_camchain(calibration.chain()));
+  return kDone;
+}
+
+}  // namespace
+
+void add_calibrate_command(CLI::App& program, Command& command) {
+  const auto options = std::make_shared<CalibrateCommand>();
+  CLI::App& calibrate_command = *program.add_subcommand(
+      "calibrate", "Find the camera model and calibration of INPUT from its images");
+  calibrate_command
+      .add_option("INPUT", options->input, "Data set folder, folder of images, or video file")
+      ->required();
+  calibrate_command.add_option(
+      "-o,--out", options->out, "Write the calibration to this file, for -c [not written]");
+  add_fov_option(calibrate_command, options->calibrate);
+  add_selection_options(calibrate_command, options->reading);
+  calibrate_command.add_option("--seed", options->calibrate.seed, "Seed of all random numbers [0]")
+      ->check(CLI::Range(0, 1000000000));
+  calibrate_command.add_flag("--quiet", options->report.is_quiet, "No messages but errors [off]");
+  calibrate_command.callback([options, &command] {
+    command = [options] {
+      return run_and_log(options->report,
+                         [&](Reporter& reporter) { return calibrate_input(*options, reporter); });
+    };
+  });
+}
+
+}  // namespace waymark
