@@ -66,6 +66,7 @@ PYBIND11_MODULE(_waymark, module) {
   waymark::silence_image_library();
   python::bind_errors(module);
   python::bind_camera(module);
+  python::bind_calibrate(module);
   python::bind_images(module);
   python::bind_features(module);
   python::bind_map(module);
