@@ -256,6 +256,11 @@ EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
   std::optional<EstimatedCalibration> best;
   const int num_stretches = input.info().is_live ? 1 : kMaxStretches;
   for (int i = 0; i < num_stretches && !is_stopped(options); ++i) {
+    if (options.on_progress) {
+      options.on_progress(fmt::format("calibration: not known yet, looking at {} frames{}",
+                                      kStretchFrames,
+                                      i == 0 ? "" : " more"));
+    }
     const Stretch stretch = read_stretch(input, options);
     if (stretch.images.empty() || (best && stretch.images.size() < kMinFrames)) break;
     EstimatedCalibration next = calibrate_stretch(stretch, options);
