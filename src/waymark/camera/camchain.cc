@@ -170,9 +170,13 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
 Rig make_rig(const CameraChain& chain, const CameraRegistry& registry) {
   WAYMARK_CHECK(!chain.cameras.empty());
   Rig rig;
+  const auto models = std::make_shared<const CameraRegistry>(registry);
   for (const ChainCamera& camera : chain.cameras) {
     rig.cameras.push_back(
-        {registry.make_camera(camera.description), camera.cam_from_rig, camera.description});
+        {registry.make_camera(camera.description),
+         camera.cam_from_rig,
+         camera.description,
+         [models](const CameraDescription& other) { return models->make_camera(other); }});
   }
   return rig;
 }

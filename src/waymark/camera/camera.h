@@ -4,6 +4,7 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -88,6 +89,10 @@ struct CameraDescription {
   /// InputError at `where`, for factories.
   [[noreturn]] void fail(const std::string& what) const;
 };
+
+/// Makes the camera that was described, or throws InputError (description.fail()) that says what is
+/// wrong and what was expected.
+using CameraFactory = std::function<std::shared_ptr<const Camera>(const CameraDescription&)>;
 
 /// What one feature measures of the point that it shows.
 struct Measurement {

@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <functional>
 #include <map>
 #include <memory>
 #include <string>
@@ -11,10 +10,6 @@
 #include "waymark/camera/camera.h"
 
 namespace waymark {
-
-/// Makes the camera that was described, or throws InputError (description.fail()) that says what is
-/// wrong and what was expected.
-using CameraFactory = std::function<std::shared_ptr<const Camera>(const CameraDescription&)>;
 
 /// The camera models that descriptions may name. A value: extend a copy and hand it on.
 class CameraRegistry {

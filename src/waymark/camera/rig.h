@@ -20,6 +20,9 @@ struct RigCamera {
   /// What make_rig() made the camera of; map files hold it. A map whose cameras lack it cannot be
   /// saved.
   std::optional<CameraDescription> description = std::nullopt;
+  /// Makes the camera of another description, as the registry did that make_rig() was given. Where
+  /// it is missing the camera is taken as it is.
+  CameraFactory remake = nullptr;
 };
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.

@@ -1,0 +1,232 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/camera/calibration.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+#include <string_view>
+#include <utility>
+
+#include "waymark/base/check.h"
+
+namespace waymark {
+namespace {
+
+/// Numbers of at least this size are lengths in pixels: focal lengths and principal points.
+constexpr double kMinPixels = 10.0;
+/// Calibrations are that good, of another day, lens setting or temperature.
+constexpr double kPixelsSigma = 0.002;  // Relative to the length.
+constexpr double kAspectSigma = 0.002;  // Pixels are square.
+constexpr double kShapeSigma = 0.005;   // xi, alpha, beta, ...
+constexpr double kRadialSigma = 0.01;
+constexpr double kTangentialSigma = 5e-4;
+constexpr double kTurnSigma = 5e-4;  // rad
+/// A camera that turns and a sensor that shifts look nearly the same; cameras of a rig turn.
+constexpr double kSensorSigma = 0.05;  // px
+/// Models with more numbers are taken as they are.
+constexpr std::size_t kMaxIntrinsics = 27;
+
+/// What is held may change by this part of its standard deviation.
+constexpr double kHeld = 1e-4;
+
+/// Differences are taken over this part of a standard deviation to either side.
+constexpr double kStep = 0.01;
+
+constexpr std::array<const char*, 4> kPlaneNames = {"fu", "fv", "pu", "pv"};
+constexpr std::array<const char*, 5> kTurnNames = {
+    "turn_x", "turn_y", "turn_z", "baseline_a", "baseline_b"};
+
+std::string distortion_name(const CameraDescription& description, std::size_t i) {
+  if (description.distortion_model != "radtan") return fmt::format("k{}", i + 1);
+  constexpr std::array<const char*, 8> kNames = {"k1", "k2", "p1", "p2", "k3", "k4", "k5", "k6"};
+  return i < kNames.size() ? kNames[i] : fmt::format("distortion{}", i);
+}
+
+/// What images may tell of a camera, in the numbers of its model.
+CameraDescription described_fully(CameraDescription description) {
+  if (description.camera_model == "pinhole" && description.distortion_model == "none") {
+    description.distortion_model = "radtan";
+    description.distortion_coeffs.assign(4, 0.0);
+  }
+  return description;
+}
+
+}  // namespace
+
+CalibrationParameters::CalibrationParameters(const Rig& given) : given_(given) {
+  for (std::size_t c = 0; c < given_.cameras.size(); ++c) {
+    blocks_.push_back({list_.size(), 0, false});
+    add_intrinsics(c);
+    if (c > 0 && given_.cameras[c].cam_from_rig.translation.norm() > 0.0) add_extrinsics(c);
+  }
+  const auto count = static_cast<Eigen::Index>(list_.size());
+  ties_.setZero(count, count);
+  for (const std::size_t fu : find(".fu")) {
+    const double ratio = list_[fu].given / list_[fu + 1].given;
+    tie(fu, fu + 1, ratio, kAspectSigma * list_[fu].given);
+  }
+  for (const char* name : {".pu", ".pv"}) {
+    const std::vector<std::size_t> of_cameras = find(name);
+    for (std::size_t i = 1; i < of_cameras.size(); ++i) {
+      tie(of_cameras[0], of_cameras[i], 1.0, kSensorSigma);
+    }
+  }
+}
+
+Eigen::MatrixXd CalibrationParameters::prior_information(
+    const Eigen::VectorXd& change, const std::vector<std::uint8_t>& is_free) const {
+  Eigen::MatrixXd information = ties_;
+  for (Eigen::Index i = 0; i < change.size(); ++i) {
+    const double sigma = list_[static_cast<std::size_t>(i)].prior_sigma;
+    const double held = kHeld * sigma;
+    information(i, i) += is_free[static_cast<std::size_t>(i)]
+                             ? 1.0 / (sigma * sigma + change[i] * change[i])
+                             : 1.0 / (held * held);
+  }
+  return information;
+}
+
+std::vector<std::size_t> CalibrationParameters::find(std::string_view ending) const {
+  std::vector<std::size_t> found;
+  for (std::size_t i = 0; i < list_.size(); ++i) {
+    if (list_[i].name.ends_with(ending)) found.push_back(i);
+  }
+  return found;
+}
+
+/// Change a is `ratio` times change b, up to a standard deviation.
+void CalibrationParameters::tie(std::size_t a, std::size_t b, double ratio, double sigma) {
+  Eigen::VectorXd difference = Eigen::VectorXd::Zero(ties_.rows());
+  difference[static_cast<Eigen::Index>(a)] = 1.0 / sigma;
+  difference[static_cast<Eigen::Index>(b)] = -ratio / sigma;
+  ties_ += difference * difference.transpose();
+}
+
+void CalibrationParameters::add_intrinsics(std::size_t camera) {
+  RigCamera& calibrated = given_.cameras[camera];
+  if (!calibrated.description || !calibrated.remake) return;
+  calibrated.description = described_fully(*calibrated.description);
+  const CameraDescription& description = *calibrated.description;
+  if (description.intrinsics.size() + description.distortion_coeffs.size() > kMaxIntrinsics) return;
+  const std::vector<double>& intrinsics = description.intrinsics;
+  const std::size_t num_shape = intrinsics.size() < 4 ? intrinsics.size() : intrinsics.size() - 4;
+  const std::string prefix = fmt::format("cam{}.", camera);
+  for (std::size_t i = 0; i < intrinsics.size(); ++i) {
+    const double pixels_sigma = kPixelsSigma * std::abs(intrinsics[i]);
+    if (i < num_shape) {
+      const bool is_length = std::abs(intrinsics[i]) >= kMinPixels;
+      list_.push_back({prefix + fmt::format("shape{}", i + 1),
+                       intrinsics[i],
+                       CalibrationGroup::kRadial,
+                       is_length ? pixels_sigma : kShapeSigma});
+    } else {
+      const std::size_t of_plane = i - num_shape;
+      list_.push_back({prefix + kPlaneNames[of_plane],
+                       intrinsics[i],
+                       of_plane < 2 ? CalibrationGroup::kFocalLength : CalibrationGroup::kCentre,
+                       pixels_sigma});
+    }
+  }
+  for (std::size_t i = 0; i < description.distortion_coeffs.size(); ++i) {
+    const bool is_tangential = description.distortion_model == "radtan" && (i == 2 || i == 3);
+    list_.push_back({prefix + distortion_name(description, i),
+                     description.distortion_coeffs[i],
+                     is_tangential ? CalibrationGroup::kTangential : CalibrationGroup::kRadial,
+                     is_tangential ? kTangentialSigma : kRadialSigma});
+  }
+  blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
+}
+
+void CalibrationParameters::add_extrinsics(std::size_t camera) {
+  blocks_[camera].has_extrinsics = true;
+  for (const char* name : kTurnNames) {
+    list_.push_back(
+        {fmt::format("cam{}.{}", camera, name), 0.0, CalibrationGroup::kExtrinsics, kTurnSigma});
+  }
+}
+
+CameraDescription CalibrationParameters::description_at(std::size_t camera,
+                                                        const Eigen::VectorXd& change) const {
+  CameraDescription description = *given_.cameras[camera].description;
+  auto at = static_cast<Eigen::Index>(blocks_[camera].first);
+  for (double& value : description.intrinsics) value += change[at++];
+  for (double& value : description.distortion_coeffs) value += change[at++];
+  return description;
+}
+
+std::optional<Rig> CalibrationParameters::rig_at(const Eigen::VectorXd& change) const {
+  WAYMARK_CHECK(change.size() == static_cast<Eigen::Index>(size()));
+  Rig rig = given_;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    RigCamera& camera = rig.cameras[c];
+    if (blocks_[c].num_intrinsics > 0) {
+      camera.description = description_at(c, change);
+      try {
+        camera.camera = camera.remake(*camera.description);
+      } catch (const InputError&) {
+        return std::nullopt;  // No such camera: the step was too long.
+      }
+    }
+    if (blocks_[c].has_extrinsics) {
+      const std::size_t first = blocks_[c].first + blocks_[c].num_intrinsics;
+      camera.cam_from_rig =
+          turned(camera.cam_from_rig, change.segment<5>(static_cast<Eigen::Index>(first)));
+    }
+  }
+  return rig;
+}
+
+std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
+    std::size_t camera,
+    const Eigen::VectorXd& change,
+    std::span<const Eigen::Vector3d> bearings) const {
+  const Block& block = blocks_[camera];
+  std::vector<double> derivatives(2 * block.num_intrinsics * bearings.size(), 0.0);
+  std::vector<Eigen::Vector2d> above(bearings.size()), below(bearings.size());
+  std::vector<std::uint8_t> is_above(bearings.size()), is_below(bearings.size());
+  const auto project = [&](std::size_t parameter, double step, auto& pixels, auto& is_visible) {
+    Eigen::VectorXd stepped = change;
+    stepped[static_cast<Eigen::Index>(parameter)] += step;
+    given_.cameras[camera]
+        .remake(description_at(camera, stepped))
+        ->project(bearings, pixels, is_visible);
+  };
+  for (std::size_t p = 0; p < block.num_intrinsics; ++p) {
+    const std::size_t parameter = block.first + p;
+    const double step = kStep * list_[parameter].prior_sigma;
+    try {
+      project(parameter, step, above, is_above);
+      project(parameter, -step, below, is_below);
+    } catch (const InputError&) {
+      return std::nullopt;
+    }
+    for (std::size_t i = 0; i < bearings.size(); ++i) {
+      if (!is_above[i] || !is_below[i]) continue;
+      double* const derivative = derivatives.data() + 2 * (block.num_intrinsics * i + p);
+      Eigen::Map<Eigen::Vector2d>{derivative} = (above[i] - below[i]) / (2.0 * step);
+    }
+  }
+  return derivatives;
+}
+
+Eigen::Matrix<double, 3, 2> across_baseline(const Eigen::Vector3d& baseline) {
+  const Eigen::Vector3d along = baseline.normalized();
+  const Eigen::Vector3d side =
+      std::abs(along.y()) < 0.7 ? Eigen::Vector3d::UnitY() : Eigen::Vector3d::UnitX();
+  Eigen::Matrix<double, 3, 2> across;
+  across.col(0) = along.cross(side).normalized();
+  across.col(1) = along.cross(across.col(0));
+  return across;
+}
+
+Rigid3 turned(const Rigid3& cam_from_rig, const Eigen::Matrix<double, 5, 1>& turns) {
+  const double length = cam_from_rig.translation.norm();
+  const Eigen::Vector3d direction = cam_from_rig.translation / length +
+                                    across_baseline(cam_from_rig.translation) * turns.tail<2>();
+  const Rigid3 rebased(cam_from_rig.rotation, length * direction.normalized());
+  return Rigid3(so3_exp(turns.head<3>()), Eigen::Vector3d::Zero()) * rebased;
+}
+
+}  // namespace waymark

@@ -1,0 +1,109 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/camera/rig.h"
+
+namespace waymark {
+
+/// What a number of a calibration is about.
+enum class CalibrationGroup {
+  kFocalLength,
+  kCentre,      ///< The principal point.
+  kRadial,      ///< Distortion along the radius, and the shape of wide models.
+  kTangential,  ///< Distortion across it.
+  kExtrinsics,  ///< Turns of a camera and of its baseline.
+};
+
+/// One number of a calibration that images can tell more of.
+struct CalibrationParameter {
+  std::string name;    ///< For example "cam0.fu", "cam1.turn_y".
+  double given = 0.0;  ///< As the calibration says; 0 for turns, which count from it.
+  CalibrationGroup group = CalibrationGroup::kFocalLength;  ///< What it is about.
+  double prior_sigma = 0.0;  ///< How far the truth may lie from that, in its unit (px, rad, 1).
+};
+
+/// What the images told of one number of a calibration.
+struct CalibrationEstimate {
+  std::string name;          ///< For example "cam0.k1", "cam1.turn_y".
+  double given = 0.0;        ///< As the calibration says, px, rad or 1.
+  double change = 0.0;       ///< Of the value in use from the one given.
+  double given_sigma = 0.0;  ///< Standard deviation that was assumed of what was given.
+  double sigma = 0.0;        ///< The same of the value in use.
+};
+
+/// The numbers of a rig as one vector: per camera the intrinsics and the distortion; of each camera
+/// but the first then its turn about its own centre (3, rad) and that of the baseline across itself
+/// (2, rad), whose length is the unit of all lengths and cannot be told. Cameras that cannot be
+/// made anew (RigCamera::remake) and those of 360 degree images have only the latter.
+class CalibrationParameters {
+ public:
+  /// Where the parameters of a camera are.
+  struct Block {
+    std::size_t first = 0;           ///< Its index in list().
+    std::size_t num_intrinsics = 0;  ///< Of the projection, distortion included.
+    bool has_extrinsics = false;     ///< Whether five more follow.
+    /// How many there are.
+    std::size_t size() const { return num_intrinsics + (has_extrinsics ? 5 : 0); }
+  };
+
+  /// given: the rig as calibrated, from which all changes count. A pinhole camera without
+  /// distortion gets that of radtan, at zero.
+  explicit CalibrationParameters(const Rig& given);
+
+  /// All of them, in order.
+  const std::vector<CalibrationParameter>& list() const { return list_; }
+  /// How many there are.
+  std::size_t size() const { return list_.size(); }
+  /// Per camera.
+  const std::vector<Block>& blocks() const { return blocks_; }
+  /// Inverse covariance of the change from what was given, as it counts for a change of about this:
+  /// calibrations are good, or wrong by anything, so that the prior has the tails of Cauchy's
+  /// distribution, by reweighting.
+  /// is_free: per parameter; those that are not are held as given.
+  Eigen::MatrixXd prior_information(const Eigen::VectorXd& change,
+                                    const std::vector<std::uint8_t>& is_free) const;
+
+  /// The rig whose parameters differ by `change` from what was given; nothing where there is no
+  /// such camera.
+  std::optional<Rig> rig_at(const Eigen::VectorXd& change) const;
+
+  /// Derivatives of the pixels of unit bearings in one camera by its intrinsics, at `change`; px
+  /// per unit of each parameter. By central differences, of any model. Per bearing 2 x
+  /// num_intrinsics, column by column; zero where it does not project. Nothing where there is no
+  /// such camera.
+  std::optional<std::vector<double>> pixel_by_intrinsics(
+      std::size_t camera,
+      const Eigen::VectorXd& change,
+      std::span<const Eigen::Vector3d> bearings) const;
+
+ private:
+  void add_intrinsics(std::size_t camera);
+  void add_extrinsics(std::size_t camera);
+  std::vector<std::size_t> find(std::string_view ending) const;
+  void tie(std::size_t a, std::size_t b, double ratio, double sigma);
+  CameraDescription description_at(std::size_t camera, const Eigen::VectorXd& change) const;
+
+  Rig given_;
+  std::vector<CalibrationParameter> list_;
+  std::vector<Block> blocks_;
+  Eigen::MatrixXd ties_;  ///< What is known of differences between parameters, as information.
+};
+
+/// Two unit vectors across a baseline, as columns: the directions in which it may turn.
+Eigen::Matrix<double, 3, 2> across_baseline(const Eigen::Vector3d& baseline);
+
+/// cam_from_rig of a camera that was turned about its centre, left of it, and whose baseline was
+/// turned by small angles along the columns of across_baseline(). `turns` has 5 entries, in rad.
+Rigid3 turned(const Rigid3& cam_from_rig, const Eigen::Matrix<double, 5, 1>& turns);
+
+}  // namespace waymark
