@@ -23,6 +23,9 @@ constexpr double kMinNoisePx = 0.15;
 void check(const BundleProblem& problem) {
   WAYMARK_CHECK(problem.rigs.size() == problem.rig_from_world.size());
   WAYMARK_CHECK(problem.is_pose_fixed.size() == problem.rig_from_world.size());
+  if (problem.calibration) {
+    WAYMARK_CHECK(problem.calibration->first_derivative.size() == problem.observations.size());
+  }
   std::uint32_t last_point = 0;
   for (const BundleObservation& observation : problem.observations) {
     WAYMARK_CHECK(observation.pose < problem.rig_from_world.size());
@@ -34,15 +37,22 @@ void check(const BundleProblem& problem) {
 }
 
 /// Squared length of the residual of the bearing, px^2; not finite where an input is not.
-double squared_residual(const BundleProblem& problem, const BundleObservation& observation) {
-  const Rigid3& cam_from_rig =
-      problem.rigs[observation.pose]->cameras[observation.camera].cam_from_rig;
+double squared_residual(const BundleProblem& problem, std::size_t index) {
+  const BundleObservation& observation = problem.observations[index];
+  const Rig& rig = *problem.rigs[observation.pose];
+  const BundleCalibration* const calibration = problem.calibration_of(observation.pose);
+  const Rigid3 cam_from_rig =
+      calibration ? calibration->cam_from_rig(observation.camera, calibration->change)
+                  : rig.cameras[observation.camera].cam_from_rig;
   const Rigid3& rig_from_world = problem.rig_from_world[observation.pose];
   const InverseRangePoint seen =
       in_inverse_range(cam_from_rig * (rig_from_world * problem.points[observation.point]));
-  const double squared =
-      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing)
-          .squaredNorm();
+  Eigen::Vector2d residual =
+      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing);
+  if (calibration) {
+    residual += calibration->pixel_shift(index, observation.camera, calibration->change);
+  }
+  const double squared = residual.squaredNorm();
   if (!std::isfinite(squared)) return squared;
   return is_ahead(seen, observation.bearing) ? squared : kGrossSquaredResidual;
 }
@@ -54,7 +64,7 @@ std::optional<double> measured_noise_px(const BundleProblem& problem,
                                         const std::vector<std::uint8_t>& is_used) {
   std::vector<double> squared;
   for (std::size_t i = 0; i < is_used.size(); ++i) {
-    if (is_used[i]) squared.push_back(squared_residual(problem, problem.observations[i]));
+    if (is_used[i]) squared.push_back(squared_residual(problem, i));
   }
   if (squared.empty()) return std::nullopt;
   return std::sqrt(median(squared)) / 1.177;
@@ -80,6 +90,29 @@ bool has_usable_range(const BundleObservation& observation) {
 
 }  // namespace
 
+Eigen::Map<const Eigen::Matrix2Xf> BundleCalibration::by_intrinsics(std::size_t observation,
+                                                                    std::uint8_t camera) const {
+  return {level_pixel_by_intrinsics.data() + first_derivative[observation],
+          2,
+          static_cast<Eigen::Index>(blocks[camera].num_intrinsics)};
+}
+
+Eigen::Vector2d BundleCalibration::pixel_shift(std::size_t observation,
+                                               std::uint8_t camera,
+                                               const Eigen::VectorXd& change) const {
+  const auto derivative = by_intrinsics(observation, camera);
+  const auto first = static_cast<Eigen::Index>(blocks[camera].first);
+  return derivative.cast<double>() * change.segment(first, derivative.cols());
+}
+
+Rigid3 BundleCalibration::cam_from_rig(std::size_t camera, const Eigen::VectorXd& change) const {
+  const CalibrationParameters::Block& block = blocks[camera];
+  const Rigid3& before = rig->cameras[camera].cam_from_rig;
+  if (!block.has_extrinsics) return before;
+  const auto first = static_cast<Eigen::Index>(block.first + block.num_intrinsics);
+  return turned(before, change.segment<5>(first));
+}
+
 BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options) {
   check(problem);
   const std::size_t num_observations = problem.observations.size();
@@ -87,20 +120,22 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   const auto judge = [&](double max_squared_residual) {
     for (std::size_t i = 0; i < num_observations; ++i) {
       const BundleObservation& observation = problem.observations[i];
-      is_used[i] = squared_residual(problem, observation) <= max_squared_residual &&
-                   has_usable_range(observation);
+      is_used[i] =
+          squared_residual(problem, i) <= max_squared_residual && has_usable_range(observation);
     }
   };
   judge(std::numeric_limits<double>::max());
   BundleResult result;
   for (int round = 0; round < options.num_rounds; ++round) {
-    const BundleOptions round_options = narrowed(options, problem, is_used);
+    BundleOptions round_options = narrowed(options, problem, is_used);
+    round_options.with_evidence = round + 1 == options.num_rounds;
     const BundleRound done = minimize_with_schur(problem, is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;
     judge(options.gate_px * options.gate_px);
   }
+  result.noise_px = measured_noise_px(problem, is_used).value_or(0.0);
   result.is_outlier.resize(num_observations);
   for (std::size_t i = 0; i < num_observations; ++i) result.is_outlier[i] = !is_used[i];
   return result;

@@ -4,8 +4,10 @@
 
 #include <Eigen/Core>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
+#include "waymark/camera/calibration.h"
 #include "waymark/camera/camera.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
@@ -18,6 +20,45 @@ struct BundleObservation : Measurement {
   std::uint32_t point = 0;  ///< Index in BundleProblem::points.
 };
 
+/// What a bundle adjustment tells of a calibration where it ended, all else free to follow.
+struct CalibrationEvidence {
+  /// Of residuals, as if each were an independent pixel's, and prior together; empty where the
+  /// equations have no solution.
+  Eigen::MatrixXd information;
+  /// Covariance of the pull of the residuals, as the parts of the way show it that differ in what
+  /// they pull to: the "meat" of a sandwich estimate with time as clusters (White 1980; Liang and
+  /// Zeger 1986). Equal to the information of the residuals where they are independent with 1 px.
+  Eigen::MatrixXd scatter;
+};
+
+/// The calibration of one rig as unknowns of the adjustment, by how much it differs from what the
+/// observations were measured with. Intrinsics act linearly, by derivatives that the caller takes:
+/// measure anew after large changes.
+struct BundleCalibration {
+  const Rig* rig = nullptr;                          ///< Poses of other rigs know nothing of it.
+  std::vector<CalibrationParameters::Block> blocks;  ///< Per camera of the rig.
+  /// Per observation of `rig`, where the derivatives of its level's pixel by the intrinsics of its
+  /// camera begin: 2 x num_intrinsics, column by column.
+  std::vector<std::size_t> first_derivative;
+  std::vector<float> level_pixel_by_intrinsics;
+  /// The prior: half of (change - prior_change)^T prior_information (change - prior_change), in the
+  /// units of the cost of residuals.
+  Eigen::MatrixXd prior_information;
+  Eigen::VectorXd prior_change;
+  Eigen::VectorXd change;        ///< Where to begin, and the result.
+  CalibrationEvidence evidence;  ///< The result.
+
+  /// Derivative of the pixel of an observation's level by the intrinsics of its camera.
+  Eigen::Map<const Eigen::Matrix2Xf> by_intrinsics(std::size_t observation,
+                                                   std::uint8_t camera) const;
+  /// What a change of the intrinsics moves that pixel by.
+  Eigen::Vector2d pixel_shift(std::size_t observation,
+                              std::uint8_t camera,
+                              const Eigen::VectorXd& change) const;
+  /// cam_from_rig with a change of its turns.
+  Rigid3 cam_from_rig(std::size_t camera, const Eigen::VectorXd& change) const;
+};
+
 /// Poses and points in contiguous arrays, in the order of their ids, and what ties them.
 struct BundleProblem {
   std::vector<Rigid3> rig_from_world;
@@ -25,6 +66,12 @@ struct BundleProblem {
   std::vector<std::uint8_t> is_pose_fixed;      ///< Per pose.
   std::vector<Eigen::Vector3d> points;          ///< In the world.
   std::vector<BundleObservation> observations;  ///< Sorted by point.
+  std::optional<BundleCalibration> calibration = std::nullopt;  ///< Where it is unknown.
+
+  /// The same for a pose of the rig whose calibration is unknown, else null.
+  const BundleCalibration* calibration_of(std::uint32_t pose) const {
+    return calibration && calibration->rig == rigs[pose] ? &*calibration : nullptr;
+  }
 };
 
 struct BundleOptions {
@@ -41,6 +88,7 @@ struct BundleOptions {
   double gate_px = 2.45;     ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
   /// A round ends early when an iteration lowers the cost by less than this part of it.
   double relative_cost_tolerance = 1e-5;
+  bool with_evidence = true;  ///< Of the calibration, where that is unknown; of the last round.
 };
 
 struct BundleResult {
@@ -48,13 +96,14 @@ struct BundleResult {
   double initial_cost = 0.0;  ///< Half the robust sum over all observations before the first round.
   double final_cost = 0.0;    ///< That of the last round over its observations, after it.
   int num_iterations = 0;     ///< Of all rounds.
+  double noise_px = 0.0;  ///< Standard deviation of a residual's component, of what is no outlier.
 };
 
 /// Bundle adjustment: moves the free poses and all points to minimise the robust sum of
 /// |W * (normalize(cam_from_rig * rig_from_world * point) - bearing)|^2, in pixels of each
 /// feature's level, and of ((1 / |point_in_cam| - inverse_range) / inverse_range_sigma)^2 where
-/// there is a range (a range is robust on its own and does not make an outlier). Writes poses and
-/// points back.
+/// there is a range (a range is robust on its own and does not make an outlier). Writes poses,
+/// points and the calibration, where that is unknown, back.
 ///
 /// Gauge: the caller fixes poses; one where stereo or ranges give the scale, one or two in mono.
 /// With fewer than the problem has free directions the result is one of the equivalent ones, near

@@ -1,0 +1,109 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <span>
+
+#include "waymark/optimize/block_cholesky.h"
+#include "waymark/optimize/bundle.h"
+
+namespace waymark {
+
+/// Derivative of the residual rows of an observation by the parameters of its camera.
+using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 32>;
+
+/// The unknown calibration in the normal equations of bundle adjustment: few rows and columns in
+/// which every pose and point takes part, hence a dense border around the sparse reduced system
+/// (Triggs et al. 2000, 6.1 and 6.3).
+class CalibrationBorder {
+ public:
+  CalibrationBorder(std::size_t num_parameters, std::size_t num_slots, std::size_t num_points);
+
+  /// Begins the equations with the prior alone.
+  void begin(const BundleCalibration& calibration, const Eigen::VectorXd& change);
+
+  /// Adds the rows of an observation, all times the root of their weight. first_parameter: of its
+  /// camera.
+  template <class Residual, class ByPoint>
+  void add(std::size_t first_parameter,
+           const ByCalibration& by_calibration,
+           const Residual& residual,
+           std::size_t point,
+           const ByPoint& by_point) {
+    const auto first = static_cast<Eigen::Index>(first_parameter);
+    const Eigen::Index count = by_calibration.cols();
+    information_.block(first, first, count, count).noalias() +=
+        by_calibration.transpose() * by_calibration;
+    gradient_.segment(first, count).noalias() += by_calibration.transpose() * residual;
+    points_.middleCols(column(point) + first, count).noalias() +=
+        by_point.transpose() * by_calibration;
+  }
+  template <class ByPose>
+  void add_pose(std::size_t first_parameter,
+                const ByCalibration& by_calibration,
+                std::size_t slot,
+                const ByPose& by_pose) {
+    poses_
+        .block(static_cast<Eigen::Index>(6 * slot),
+               static_cast<Eigen::Index>(first_parameter),
+               6,
+               by_calibration.cols())
+        .noalias() += by_pose.transpose() * by_calibration;
+  }
+
+  /// Copies the equations for elimination, damped.
+  void begin_elimination(double damping);
+  /// Eliminates a point. half: M with M^T * M the inverse of its damped block; gradient: M * that
+  /// of the point.
+  void eliminate_point(std::size_t point,
+                       const Eigen::Matrix3d& half,
+                       const Eigen::Vector3d& gradient);
+  /// The same for what the point has to do with a pose: link * M^T.
+  void eliminate_link(std::size_t slot, const Eigen::Matrix<double, 6, 3>& eliminated);
+
+  /// Solves the whole: gradient, of the poses, becomes their solution. False if the equations have
+  /// none.
+  bool solve(const BlockCholesky& poses, Eigen::VectorXd& gradient);
+
+  const Eigen::VectorXd& solution() const { return solution_; }
+  const Eigen::VectorXd& gradient() const { return gradient_; }
+  auto diagonal() const { return information_.diagonal(); }
+  /// What the solution takes from the gradient of a point.
+  Eigen::Vector3d share_of_point(std::size_t point) const;
+
+  // After solve():
+  /// What a point has to do with the calibration: second derivative of the cost.
+  auto of_point(std::size_t point) const {
+    return points_.middleCols(column(point), gradient_.size());
+  }
+  /// How a pose follows the calibration, negated.
+  auto solved(std::size_t slot) const {
+    return solved_.middleRows<6>(static_cast<Eigen::Index>(6 * slot));
+  }
+  /// Adds the pull of an observation at a pose of so many, in the order of time.
+  void add_score(std::size_t pose, std::size_t num_poses, const Eigen::VectorXd& score);
+  CalibrationEvidence evidence() const;
+
+ private:
+  Eigen::Index column(std::size_t point) const {
+    return static_cast<Eigen::Index>(point) * gradient_.size();
+  }
+
+  Eigen::MatrixXd information_;
+  Eigen::VectorXd gradient_;
+  Eigen::MatrixXd poses_;    // 6 rows per slot.
+  Eigen::Matrix3Xd points_;  // As many columns as parameters per point.
+  // The same, on the way of elimination.
+  Eigen::MatrixXd reduced_information_;
+  Eigen::VectorXd reduced_gradient_;
+  Eigen::MatrixXd reduced_poses_;
+  Eigen::Matrix3Xd eliminated_;  // Of the point at hand.
+  Eigen::VectorXd solution_;
+  Eigen::MatrixXd solved_;  // The reduced poses, times the inverse of their own equations.
+  Eigen::MatrixXd scores_;  // A column per part of the way.
+};
+
+}  // namespace waymark

@@ -1,0 +1,124 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <utility>
+
+#include "waymark/optimize/schur_equations.h"
+
+namespace waymark {
+
+void SchurSolver::list_cameras() {
+  std::vector<std::pair<const Rig*, std::size_t>> listed;
+  for (const Rig* rig : problem_.rigs) {
+    auto at = std::find_if(
+        listed.begin(), listed.end(), [&](const auto& entry) { return entry.first == rig; });
+    if (at == listed.end()) {
+      at = listed.insert(at, {rig, state_.cameras.size()});
+      for (const RigCamera& camera : rig->cameras)
+        state_.cameras.push_back(matrix_of(camera.cam_from_rig));
+    }
+    first_camera_.push_back(at->second);
+  }
+}
+
+Eigen::Vector2d SchurSolver::residual_of(std::size_t i,
+                                         const InverseRangePoint& seen,
+                                         const BundleState& state) const {
+  const BundleObservation& observation = problem_.observations[i];
+  Eigen::Vector2d residual =
+      bearing_residual(seen, observation.bearing, observation.level_pixel_from_bearing);
+  if (const BundleCalibration* calibration = problem_.calibration_of(observation.pose)) {
+    residual += calibration->pixel_shift(i, observation.camera, state.calibration);
+  }
+  return residual;
+}
+
+double SchurSolver::cost(const BundleState& state) const {
+  double sum = 0.0;
+  for (const std::uint32_t i : plan_.observations) {
+    const BundleObservation& observation = problem_.observations[i];
+    const Eigen::Vector3d point_in_rig =
+        apply(state.matrices[observation.pose], state.points[observation.point]);
+    const InverseRangePoint seen =
+        in_inverse_range(apply(camera_of(observation, state), point_in_rig));
+    if (!is_ahead(seen, observation.bearing)) {
+      sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
+      continue;
+    }
+    sum += huber(residual_of(i, seen, state).squaredNorm(), options_.huber_px).loss;
+    if (observation.inverse_range_sigma > 0.0f) {
+      const double range =
+          range_residual(seen, observation.inverse_range, observation.inverse_range_sigma);
+      sum += huber(range * range, options_.range_huber).loss;
+    }
+  }
+  if (border_) {
+    const Eigen::VectorXd off = state.calibration - problem_.calibration->prior_change;
+    sum += off.dot(problem_.calibration->prior_information * off);
+  }
+  return 0.5 * sum;
+}
+
+/// Of the rows of observation i.
+template <int kRows>
+ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
+                                          std::size_t i,
+                                          const Eigen::Vector3d& point_in_rig) const {
+  const BundleObservation& observation = problem_.observations[i];
+  const BundleCalibration& calibration = *problem_.calibration;
+  const CalibrationParameters::Block& block = calibration.blocks[observation.camera];
+  ByCalibration by(kRows, static_cast<Eigen::Index>(block.size()));
+  by.setZero();
+  const auto by_intrinsics = calibration.by_intrinsics(i, observation.camera);
+  by.topLeftCorner(2, by_intrinsics.cols()) =
+      rows.bearing_root * by_intrinsics.template cast<double>();
+  if (!block.has_extrinsics) return by;
+  const Eigen::Vector3d& baseline =
+      calibration.rig->cameras[observation.camera].cam_from_rig.translation;
+  const Eigen::Vector3d point_in_cam = apply(camera_of(observation, state_), point_in_rig);
+  for (int row = 0; row < kRows; ++row) {
+    const Eigen::Vector3d gradient = rows.by_point_in_cam.row(row).transpose();
+    by.block(row, by_intrinsics.cols(), 1, 3) = point_in_cam.cross(gradient).transpose();
+  }
+  by.rightCols(2) = rows.by_point_in_cam * (baseline.norm() * across_baseline(baseline));
+  return by;
+}
+
+template <int kRows>
+void SchurSolver::accumulate(const ResidualRows<kRows>& rows,
+                             std::size_t entry,
+                             std::size_t k,
+                             const Eigen::Vector3d& point_in_rig) {
+  const BundleObservation& observation = problem_.observations[plan_.observations[k]];
+  const Jacobians<kRows> by = jacobians(rows, plan_.observations[k], point_in_rig);
+  blocks_.points[entry].noalias() += by.by_point.transpose() * by.by_point;
+  blocks_.point_gradient[entry].noalias() += by.by_point.transpose() * rows.residual;
+  const BundleCalibration* const calibration = problem_.calibration_of(observation.pose);
+  const std::size_t first = calibration ? calibration->blocks[observation.camera].first : 0;
+  if (calibration) border_->add(first, by.by_calibration, rows.residual, entry, by.by_point);
+  const std::uint32_t link = plan_.link_of_observation[k];
+  if (link == kNoSlot) return;
+  const std::uint32_t slot = plan_.slot_of_link[link];
+  blocks_.poses[slot].noalias() += by.by_pose.transpose() * by.by_pose;
+  blocks_.pose_gradient[slot].noalias() += by.by_pose.transpose() * rows.residual;
+  blocks_.links[link].noalias() += by.by_pose.transpose() * by.by_point;
+  if (calibration) border_->add_pose(first, by.by_calibration, slot, by.by_pose);
+}
+
+void SchurSolver::linearize() {
+  for (Matrix6d& block : blocks_.poses) block.setZero();
+  for (Vector6d& gradient : blocks_.pose_gradient) gradient.setZero();
+  for (Matrix63d& link : blocks_.links) link.setZero();
+  if (border_) border_->begin(*problem_.calibration, state_.calibration);
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
+    blocks_.points[entry].setZero();
+    blocks_.point_gradient[entry].setZero();
+    for (std::size_t k = plan_.first_observation[entry]; k < plan_.first_observation[entry + 1];
+         ++k) {
+      visit_rows(plan_.observations[k], [&](const auto& rows, const Eigen::Vector3d& point_in_rig) {
+        accumulate(rows, entry, k, point_in_rig);
+      });
+    }
+  }
+}
+
+}  // namespace waymark
