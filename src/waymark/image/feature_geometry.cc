@@ -6,6 +6,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/tangent.h"
+#include "waymark/geometry/triangulation.h"
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
@@ -44,6 +45,33 @@ void derive_of_camera(std::size_t index,
   }
 }
 
+/// Below this disparity, in pixels of the level, a feature may as well be infinitely far away.
+constexpr double kMinStereoDisparityPx = 0.5;
+
+/// Range of a primary feature from its partner in camera 1; 0 where that is unknown.
+float stereo_range_m(const Rig& rig, const Features& features, std::uint32_t feature) {
+  const Rigid3 cam0_from_cam1 = rig.cameras[0].cam_from_rig * rig.cameras[1].cam_from_rig.inverse();
+  const auto point = triangulate(features.bearings[feature].cast<double>(),
+                                 features.bearings[features.partner[feature]].cast<double>(),
+                                 cam0_from_cam1,
+                                 kMinStereoDisparityPx * features.size_rad[feature]);
+  return point ? static_cast<float>(point->norm()) : 0.0f;
+}
+
+/// before: the same with the bearings that the ranges were measured along.
+void derive_ranges(const Rig& rig, const Features& before, Features& features) {
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    if (features.partner[i] != kNoFeature) {
+      features.range_m[i] = stereo_range_m(rig, features, i);
+    } else if (features.inverse_range_sigma[i] > 0.0f) {
+      // What is measured is the depth along z.
+      const float factor = before.bearings[i].z() / features.bearings[i].z();
+      features.range_m[i] *= factor;
+      features.inverse_range_sigma[i] /= factor;
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features) {
@@ -69,6 +97,19 @@ std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features) {
                     return std::pair(features.keypoints[i].x_px, features.keypoints[i].y_px);
                   });
   return is_valid;
+}
+
+std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig) {
+  auto anew = std::make_shared<Features>(features);
+  const std::vector<std::uint8_t> is_valid = derive_geometry(rig, *anew);
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (is_valid[i]) continue;
+    anew->bearings[i] = features.bearings[i];
+    anew->level_pixel_from_bearing[i] = features.level_pixel_from_bearing[i];
+    anew->size_rad[i] = features.size_rad[i];
+  }
+  derive_ranges(rig, features, *anew);
+  return anew;
 }
 
 }  // namespace waymark

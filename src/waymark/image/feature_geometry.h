@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <vector>
 
 #include "waymark/camera/rig.h"
@@ -17,5 +18,10 @@ namespace waymark {
 /// there, and the cameras of the keypoints in the rig. Gives per keypoint whether its pixel has a
 /// bearing; where it has none, what was filled in is unspecified.
 std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features);
+
+/// The same features as a rig of the same cameras measures them that is calibrated otherwise:
+/// bearings, level_pixel_from_bearing, sizes and ranges anew. Where a pixel has no bearing any more
+/// all of that stays as it was.
+std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig);
 
 }  // namespace waymark

@@ -92,6 +92,11 @@ FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
   if (rig_.cameras.size() == 2) stereo_.emplace(rig_, settings.stereo);
 }
 
+void FrameBuilder::look_with(const Rig& rig) {
+  rig_ = rig;
+  if (stereo_) stereo_.emplace(rig_, settings_.stereo);
+}
+
 void check_sizes(const FrameImages& images, const Rig& rig) {
   check_size(images.image0, *rig.cameras[0].camera, "image");
   if (!images.image1.is_empty()) {

@@ -70,6 +70,9 @@ class FrameBuilder {
 
   const FrameTimes& times() const { return times_; }
 
+  /// From now on the images are of the same cameras calibrated otherwise.
+  void look_with(const Rig& rig);
+
  private:
   void extract_primary(const FrameImages& images, Features& features);
   void extract_keypoints(const FrameImages& images);
