@@ -17,6 +17,9 @@ constexpr std::size_t kNumConsolidatedPerKeyframe = 2;
 /// apart ORB features change too much.
 constexpr BesideOptions kBeside = {.num_known_steps = 5, .distance = 0.8, .angle_rad = 0.7};
 
+/// Keyframes when the calibration is looked at first, then at twice as many and so on.
+constexpr std::size_t kFirstCalibration = 30;
+
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
 
@@ -25,8 +28,15 @@ constexpr int kMaxPasses = 4;
 GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            const MappingSettings& mapping,
                            const LoopSettings& loop,
+                           const CalibrationSettings& calibration,
                            std::uint64_t seed)
-    : settings_(loop), mapper_(rig, mapping), verifier_(rig, seed), projection_(rig) {}
+    : settings_(loop),
+      is_calibrating_(calibration.is_refined() && CalibrationParameters(*rig).size() > 0),
+      seed_(seed),
+      next_calibration_(kFirstCalibration),
+      mapper_(rig, mapping, calibration),
+      verifier_(rig, seed),
+      projection_(rig) {}
 
 void GlobalMapper::take_over(const MapSnapshot& before) {
   mapper_.take_over(*before.map);
@@ -88,22 +98,53 @@ void GlobalMapper::consolidate_some(std::size_t max_count) {
   }
 }
 
+GlobalAdjustment AdjustmentTask::adjust() const {
+  GlobalAdjustment adjustment =
+      adjust_globally(*map, submap, calibration ? &*calibration : nullptr);
+  return is_for_calibration && !adjustment.calibration ? GlobalAdjustment{} : adjustment;
+}
+
 std::optional<AdjustmentTask> GlobalMapper::take_task() {
-  if (!unadjusted_.is_valid()) return std::nullopt;
-  const SubmapId submap = mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
-  return AdjustmentTask{mapper_.freeze(), submap, num_closures_};
+  const bool is_calibration_due =
+      is_calibrating_ && mapper_.map().keyframes().size() >= next_calibration_;
+  if (!unadjusted_.is_valid() && !is_calibration_due) return std::nullopt;
+  AdjustmentTask task;
+  task.is_for_calibration = !unadjusted_.is_valid();
+  task.submap = task.is_for_calibration
+                    ? submaps_by_size(mapper_.map()).front()
+                    : mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
+  task.num_closures = num_closures_;
+  if (is_calibrating_) {
+    task.calibration = mapper_.calibration();
+    if (is_calibration_due) next_calibration_ *= 2;
+  }
+  task.map = mapper_.freeze();
+  return task;
 }
 
 void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment) {
   if (task.num_closures != num_closures_) return;
-  mapper_.change(
-      [&](Map& map, DirtyLandmarks& dirty) { apply_adjustment(map, adjustment, dirty); });
+  const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
+  mapper_.apply(adjustment);
+  look_with_calibration(before);
+}
+
+void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& before) {
+  const std::shared_ptr<const Rig>& rig = mapper_.calibration().rig;
+  if (rig != before) verifier_ = RevisitVerifier(rig, seed_);
+}
+
+void GlobalMapper::refine_globally(bool with_calibration) {
+  const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
+  mapper_.refine_globally(with_calibration && is_calibrating_ &&
+                          mapper_.map().keyframes().size() >= kFirstCalibration);
+  look_with_calibration(before);
 }
 
 void GlobalMapper::finish() {
   const std::uint32_t end = mapper_.map().keyframes().end_id().value;
   if (!settings_.enabled || end == 0) {
-    mapper_.refine_globally();
+    refine_globally(true);
     return;
   }
   if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_alike(KeyframeId{end - 1});
@@ -112,10 +153,10 @@ void GlobalMapper::finish() {
 }
 
 void GlobalMapper::consolidate() {
-  mapper_.refine_globally();
+  refine_globally(true);
   consolidate_some(unconsolidated_.size());
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
-  mapper_.refine_globally();
+  refine_globally(false);
 }
 
 MapSnapshot GlobalMapper::snapshot() {
@@ -129,7 +170,7 @@ MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
     if (id >= a.keyframes().end_id()) of_b.push_back(id);
   });
   if (of_b.empty()) return {both.freeze()};
-  GlobalMapper mapper(both.keyframes().at(of_b.front()).rig, {}, {}, seed);
+  GlobalMapper mapper(both.keyframes().at(of_b.front()).rig, {}, {}, {.refine = "off"}, seed);
   // Only what is indexed is found: b looks for its places in a.
   mapper.take_over(index_map(both.freeze(), of_b.front()));
   for (int pass = 0; pass < kMaxPasses; ++pass) {

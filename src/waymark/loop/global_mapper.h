@@ -21,6 +21,12 @@ struct AdjustmentTask {
   std::shared_ptr<const Map> map;
   SubmapId submap;
   std::uint32_t num_closures = 0;  ///< Loops closed and sub-maps joined before.
+  /// What is to be adjusted along, if anything.
+  std::optional<KnownCalibration> calibration = std::nullopt;
+  bool is_for_calibration = false;  ///< Without a new calibration nothing is to change.
+
+  /// Does it.
+  GlobalAdjustment adjust() const;
 };
 
 /// The mapper with all that reaches beyond the surroundings of the newest keyframe: finds places
@@ -31,14 +37,18 @@ class GlobalMapper {
   GlobalMapper(std::shared_ptr<const Rig> rig,
                const MappingSettings& mapping,
                const LoopSettings& loop,
+               const CalibrationSettings& calibration,
                std::uint64_t seed);
 
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const MapSnapshot& before);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
-  /// The adjustment that a loop made necessary, once for each; nothing where there is none.
+  /// The adjustment that a loop made necessary, once for each, or that may tell the calibration;
+  /// nothing where there is none.
   std::optional<AdjustmentTask> take_task();
+  /// Whether there is one that a loop made necessary.
+  bool has_loop_task() const { return unadjusted_.is_valid(); }
   /// Takes in what a task gave, unless a loop was closed meanwhile: then a new task follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
   /// The end: looks for loops a last time and consolidates.
@@ -51,6 +61,7 @@ class GlobalMapper {
   void consolidate();
 
   const Map& map() const { return mapper_.map(); }
+  const KnownCalibration& calibration() const { return mapper_.calibration(); }
   MapSnapshot snapshot();
   int num_loops() const { return num_loops_; }
   int num_joins() const { return static_cast<int>(num_closures_) - num_loops_; }
@@ -61,8 +72,13 @@ class GlobalMapper {
   bool close(const std::optional<Revisit>& revisit);
   void consolidate_some(std::size_t max_count);
   std::vector<KeyframeId> all_keyframes() const;
+  void look_with_calibration(const std::shared_ptr<const Rig>& before);
+  void refine_globally(bool with_calibration);
 
   const LoopSettings settings_;
+  const bool is_calibrating_;
+  const std::uint64_t seed_;
+  std::size_t next_calibration_;  ///< Keyframes of the map when the calibration is due again.
   Mapper mapper_;
   PlaceIndex places_;
   RevisitVerifier verifier_;

@@ -66,7 +66,8 @@ class GlobalMapperTest : public ::testing::Test {
   /// Goes on with a round that is all but closed.
   void take_over_round(bool is_enabled = true) {
     round_ = walk({{0, kRound}});
-    mapper_.emplace(round_.rig, MappingSettings{}, LoopSettings{is_enabled}, 1);
+    mapper_.emplace(
+        round_.rig, MappingSettings{}, LoopSettings{is_enabled}, CalibrationSettings{}, 1);
     mapper_->take_over(snapshot_of(round_));
   }
 
@@ -87,7 +88,7 @@ TEST_F(GlobalMapperTest, GoesOnInAMapMadeBeforeAndClosesItsLoop) {
   // What it hands on has the keyframe, too.
   const MapSnapshot snapshot = mapper_->snapshot();
   EXPECT_TRUE(snapshot.places->contains(KeyframeId{kRound}));
-  GlobalMapper next(round_.rig, {}, {}, 1);
+  GlobalMapper next(round_.rig, {}, {}, {}, 1);
   next.take_over(snapshot);
   EXPECT_TRUE(are_same(poses_of(next.map()), poses_of(mapper_->map())));
   EXPECT_FALSE(next.take_task()) << "tasks stay with those whose loops they follow";
@@ -112,7 +113,7 @@ TEST_F(GlobalMapperTest, HandsOutEachAdjustmentOnceAndTakesItIn) {
 
 TEST_F(GlobalMapperTest, DiscardsAnAdjustmentIfSomethingWasClosedMeanwhile) {
   LoopScene both = walk({{0, kRound}, {10, 16}});
-  GlobalMapper mapper(both.rig, {}, {}, 1);
+  GlobalMapper mapper(both.rig, {}, {}, {}, 1);
   mapper.take_over(snapshot_of(both));
   NewKeyframe of_first = last_of(walk({{0, kRound + 1}}));
   mapper.add(of_first);
@@ -135,7 +136,7 @@ TEST_F(GlobalMapperTest, DiscardsAnAdjustmentIfSomethingWasClosedMeanwhile) {
 TEST_F(GlobalMapperTest, ConsolidatesAtTheEnd) {
   // The way goes on beside its beginning. Closed at its last keyframe, it hangs loose elsewhere.
   LoopScene scene = walk({{0, kRound + 8}});
-  GlobalMapper mapper(scene.rig, {}, {}, 1);
+  GlobalMapper mapper(scene.rig, {}, {}, {}, 1);
   mapper.take_over(snapshot_of(scene));
   mapper.finish();
   EXPECT_GE(mapper.num_loops(), 1);
@@ -161,7 +162,7 @@ TEST_F(GlobalMapperTest, LeavesLoopsOpenIfAskedTo) {
 }
 
 TEST_F(GlobalMapperTest, FinishesWithoutAnything) {
-  GlobalMapper mapper(round_.rig, {}, {}, 1);
+  GlobalMapper mapper(round_.rig, {}, {}, {}, 1);
   mapper.finish();
   EXPECT_TRUE(mapper.map().submaps().empty());
 }

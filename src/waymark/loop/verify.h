@@ -38,7 +38,7 @@ class RevisitVerifier {
  private:
   std::optional<Revisit> compare_beside(const Map& map, KeyframeId query, KeyframeId match);
 
-  const std::shared_ptr<const Rig> rig_;
+  std::shared_ptr<const Rig> rig_;
   EvidenceCollector evidence_;
   PlaceLocator locator_;
 };

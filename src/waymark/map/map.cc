@@ -223,6 +223,15 @@ void Map::move_keyframe(KeyframeId id, const Rigid3& rig_from_world) {
   keyframes_.edit(id).rig_from_world = rig_from_world;
 }
 
+void Map::measure_keyframe(KeyframeId id,
+                           std::shared_ptr<const Rig> rig,
+                           std::shared_ptr<const Features> features) {
+  WAYMARK_CHECK(rig && features && features->size() == keyframes_.at(id).features->size());
+  Keyframe& keyframe = keyframes_.edit(id);
+  keyframe.rig = std::move(rig);
+  keyframe.features = std::move(features);
+}
+
 void Map::rescale_keyframe(KeyframeId id, double factor) {
   WAYMARK_CHECK(factor > 0.0);
   keyframes_.edit(id).applied_scale *= factor;

@@ -243,6 +243,10 @@ class Map {
   void erase_keyframe(KeyframeId id);
   /// Sets the pose of a keyframe; the landmarks stay where they are.
   void move_keyframe(KeyframeId id, const Rigid3& rig_from_world);
+  /// Takes the features of a keyframe as measured by a rig that is calibrated otherwise.
+  void measure_keyframe(KeyframeId id,
+                        std::shared_ptr<const Rig> rig,
+                        std::shared_ptr<const Features> features);
   /// Notes that lengths around a keyframe were multiplied by a factor.
   void rescale_keyframe(KeyframeId id, double factor);
   /// Adds an edge between two living keyframes, measured in the units of now.

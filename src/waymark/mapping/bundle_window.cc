@@ -3,6 +3,7 @@
 #include "waymark/mapping/bundle_window.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "waymark/base/check.h"
 
@@ -161,10 +162,15 @@ bool is_supported(const Map& map, const Landmark& landmark) {
 
 WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
-                                    const BundleOptions& options) {
+                                    const BundleOptions& options,
+                                    const KnownCalibration* known) {
   WindowProblem window_problem = make_problem(map, window);
+  std::optional<KnownCalibration> calibration;
+  if (known) {
+    calibration = recalibrate(map, window_problem.observations, *known, window_problem.problem);
+  }
   const BundleResult result = adjust_bundle(window_problem.problem, options);
-  WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}};
+  WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};
   for (std::size_t i = 0; i < window_problem.observations.size(); ++i) {
     if (result.is_outlier[i]) adjustment.outliers.push_back(window_problem.observations[i]);
   }

@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "waymark/map/correction.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/calibrate.h"
 #include "waymark/optimize/bundle.h"
 
 namespace waymark {
@@ -30,12 +32,15 @@ BundleWindow whole_submap(const Map& map, SubmapId submap);
 struct WindowAdjustment {
   MapCorrection correction;           ///< Of all that moves, without scales.
   std::vector<Observation> outliers;  ///< Ascending by landmark.
+  std::optional<KnownCalibration> calibration = std::nullopt;  ///< Where it changed.
 };
 
-/// Adjusts a window and leaves the map as it is.
+/// Adjusts a window and leaves the map as it is. known: the calibration that is to be adjusted
+/// along, or null.
 WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
-                                    const BundleOptions& options);
+                                    const BundleOptions& options,
+                                    const KnownCalibration* known = nullptr);
 
 /// Removes observations, where they still exist, and of the landmarks those without support.
 /// Returns the erased landmarks.

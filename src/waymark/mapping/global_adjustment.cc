@@ -34,12 +34,15 @@ double scale_around(const Map& map,
 
 }  // namespace
 
-GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap) {
+GlobalAdjustment adjust_globally(const Map& frozen,
+                                 SubmapId submap,
+                                 const KnownCalibration* known) {
   const BundleWindow window = whole_submap(frozen, submap);
   GlobalAdjustment adjustment;
   if (window.moving.empty() || window.landmarks.empty()) return adjustment;
   WindowAdjustment found =
-      compute_adjustment(frozen, window, {.num_rounds = 2, .max_iterations_per_round = 20});
+      compute_adjustment(frozen, window, {.num_rounds = 2, .max_iterations_per_round = 20}, known);
+  adjustment.calibration = std::move(found.calibration);
   adjustment.correction = std::move(found.correction);
   adjustment.outliers = std::move(found.outliers);
   adjustment.landmarks = window.landmarks;

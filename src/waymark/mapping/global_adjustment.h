@@ -12,15 +12,19 @@ namespace waymark {
 struct GlobalAdjustment {
   MapCorrection correction;
   std::vector<Observation> outliers;
-  std::vector<LandmarkId> landmarks;  ///< That were adjusted, ascending.
+  std::vector<LandmarkId> landmarks;                           ///< That were adjusted, ascending.
+  std::optional<KnownCalibration> calibration = std::nullopt;  ///< Where it changed.
 };
 
 /// Bundle adjustment over all of a sub-map; its root stays. In mono the scale around each keyframe
 /// is how much further away the landmarks that it sees are than before, in the median. Any thread;
-/// nothing is shared.
-GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
+/// nothing is shared. known: the calibration that is to be adjusted along, or null.
+GlobalAdjustment adjust_globally(const Map& frozen,
+                                 SubmapId submap,
+                                 const KnownCalibration* known = nullptr);
 
-/// Takes in what was found: moves what was known, lets what is younger follow, drops outliers.
+/// Takes in what was found but the calibration: moves what was known, lets what is younger follow,
+/// drops outliers.
 void apply_adjustment(Map& map, const GlobalAdjustment& adjustment, DirtyLandmarks& dirty);
 
 }  // namespace waymark

@@ -5,16 +5,20 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"
-#include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/triangulate.h"
 
 namespace waymark {
 
-Mapper::Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings)
-    : rig_(rig), settings_(settings), projection_(rig) {}
+Mapper::Mapper(std::shared_ptr<const Rig> rig,
+               const MappingSettings& settings,
+               const CalibrationSettings& calibration)
+    : settings_(settings),
+      calibration_(KnownCalibration::as_given(rig, calibration.refine == "on")),
+      projection_(std::move(rig)) {}
 
 Mapper::Changes Mapper::add(const NewSubmap& message) {
   const SubmapId submap = map_.add_submap(message.is_metric);
@@ -25,8 +29,8 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
     keyframe.timestamp_ns = initial.timestamp_ns;
     keyframe.submap = submap;
     keyframe.rig_from_world = initial.rig_from_world;
-    keyframe.rig = rig_;
-    keyframe.features = initial.features;
+    keyframe.rig = calibration_.rig;
+    keyframe.features = measured(initial.features, message.rig);
     if (!ids.empty()) keyframe.parent = ids.back();
     ids.push_back(map_.add_keyframe(std::move(keyframe)));
   }
@@ -77,8 +81,8 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
   keyframe.applied_scale = map_.keyframes().at(keyframe.parent).applied_scale;
   keyframe.rig_from_world = map_.rig_from_world(
       message.pose.reference, message.pose.rig_from_reference, message.pose.reference_scale);
-  keyframe.rig = rig_;
-  keyframe.features = message.features;
+  keyframe.rig = calibration_.rig;
+  keyframe.features = measured(message.features, message.rig);
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
   for (std::uint32_t i = 0; i < message.features->num_primary; ++i) {
     const LandmarkId landmark = map_.resolve(message.landmarks[i]);
@@ -92,6 +96,34 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
   return id;
 }
 
+/// Features as the calibration of now measures them.
+std::shared_ptr<const Features> Mapper::measured(const std::shared_ptr<const Features>& features,
+                                                 const std::shared_ptr<const Rig>& rig) const {
+  if (!rig || rig == calibration_.rig) return features;
+  return measure_anew(*features, *calibration_.rig);
+}
+
+void Mapper::look_with(const KnownCalibration& calibration) {
+  std::vector<KeyframeId> seen_so;
+  map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.rig == calibration_.rig) seen_so.push_back(id);
+  });
+  for (const KeyframeId id : seen_so) {
+    const Keyframe& keyframe = map_.keyframes().at(id);
+    map_.measure_keyframe(id, calibration.rig, measure_anew(*keyframe.features, *calibration.rig));
+    for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
+      if (landmark.is_valid()) dirty_.insert(landmark);
+    }
+  }
+  calibration_ = calibration;
+}
+
+void Mapper::apply(const GlobalAdjustment& adjustment) {
+  if (adjustment.calibration) look_with(*adjustment.calibration);
+  apply_adjustment(map_, adjustment, dirty_);
+  refresh_appearances();
+}
+
 void Mapper::refresh_appearances() {
   for (LandmarkId id : dirty_) {
     if (map_.landmarks().contains(id)) map_.set_appearance(id, describe_landmark(map_, id));
@@ -99,12 +131,12 @@ void Mapper::refresh_appearances() {
   dirty_.clear();
 }
 
-void Mapper::refine_globally() {
-  for (std::uint32_t value = 0; value < map_.submaps().size(); ++value) {
-    if (map_.submaps()[value].joined_into.is_valid()) continue;
-    apply_adjustment(map_, adjust_globally(map_, SubmapId{value}), dirty_);
+void Mapper::refine_globally(bool with_calibration) {
+  const std::vector<SubmapId> submaps = submaps_by_size(map_);
+  for (const SubmapId submap : submaps) {
+    const bool is_largest = submap == submaps.front();
+    apply(adjust_globally(map_, submap, with_calibration && is_largest ? &calibration_ : nullptr));
   }
-  refresh_appearances();
 }
 
 }  // namespace waymark

@@ -8,6 +8,7 @@
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/mapping/cull.h"
+#include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/match/epipolar.h"
 #include "waymark/match/projection.h"
@@ -19,7 +20,9 @@ namespace waymark {
 /// and keeps the surroundings of the newest keyframe consistent.
 class Mapper {
  public:
-  Mapper(std::shared_ptr<const Rig> rig, const MappingSettings& settings);
+  Mapper(std::shared_ptr<const Rig> rig,
+         const MappingSettings& settings,
+         const CalibrationSettings& calibration = {});
 
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const Map& frozen) { map_ = Map::thaw(frozen); }
@@ -31,8 +34,10 @@ class Mapper {
   };
   Changes add(const NewSubmap& message);
   Changes add(const NewKeyframe& message);
-  /// Adjusts every sub-map as a whole.
-  void refine_globally();
+  /// Adjusts every sub-map as a whole, the largest of them with the calibration.
+  void refine_globally(bool with_calibration);
+  /// Takes in what adjusting a whole sub-map gave.
+  void apply(const GlobalAdjustment& adjustment);
 
   /// For what reaches beyond the surroundings of the newest keyframe: change(map, dirty), which
   /// says what landmarks look different after it.
@@ -44,13 +49,17 @@ class Mapper {
 
   std::shared_ptr<const Map> freeze() { return map_.freeze(); }
   const Map& map() const { return map_; }
+  const KnownCalibration& calibration() const { return calibration_; }
 
  private:
   KeyframeId insert(const NewKeyframe& message);
+  std::shared_ptr<const Features> measured(const std::shared_ptr<const Features>& features,
+                                           const std::shared_ptr<const Rig>& rig) const;
+  void look_with(const KnownCalibration& calibration);
   void refresh_appearances();
 
-  const std::shared_ptr<const Rig> rig_;
   const MappingSettings settings_;
+  KnownCalibration calibration_;
   Map map_;
   DirtyLandmarks dirty_;
   Probation probation_;

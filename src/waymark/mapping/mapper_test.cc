@@ -87,7 +87,7 @@ Session run(const Setup& setup) {
     session.broken.push_back(mapper.map().broken_invariants());
     published.push_back({i + (is_submap ? 1 : kLatency), mapper.freeze()});
   }
-  mapper.refine_globally();
+  mapper.refine_globally(false);
   session.broken.push_back(mapper.map().broken_invariants());
   session.map = mapper.freeze();
   memory.settle(*session.map);

@@ -2,9 +2,35 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
+#include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 
 namespace waymark {
+
+/// What is made of the calibration that was given.
+struct CalibrationSettings {
+  /// "auto": changed where the images contradict it; "on": always to what fits them best; "off".
+  std::string refine = "auto";
+
+  /// Whether it may change at all. InputError for another word.
+  bool is_refined() const {
+    if (refine != "auto" && refine != "on" && refine != "off") {
+      throw InputError("calibration.refine", "is " + refine + ", expected auto, on or off");
+    }
+    return refine != "off";
+  }
+
+  /// Lists the fields, see SettingInfo.
+  template <class Self, class Field>
+  static void describe(Self& self, Field&& field) {
+    field("refine",
+          self.refine,
+          SettingInfo{.help = "Estimate the calibration along with the map: auto changes it only "
+                              "where the images contradict it, on always, off never."});
+  }
+};
 
 /// Landmarks and keyframes.
 struct MappingSettings {

@@ -13,16 +13,17 @@ namespace waymark {
 
 /// All settings of the engine, one section per module. Cameras are read separately (camchain).
 struct Settings {
-  int seed = 0;               ///< Of all random numbers.
-  int map_latency = 2;        ///< In frames.
-  int global_latency = 60;    ///< In frames.
-  FeatureSettings features;   ///< Corners and descriptors.
-  StereoSettings stereo;      ///< Search in the second camera's image.
-  DepthSettings depth;        ///< Depth images.
-  ViewSettings view;          ///< Which directions are used.
-  TrackingSettings tracking;  ///< Pose of each frame.
-  MappingSettings mapping;    ///< Landmarks and keyframes.
-  LoopSettings loop;          ///< Places seen before.
+  int seed = 0;                     ///< Of all random numbers.
+  int map_latency = 2;              ///< In frames.
+  int global_latency = 60;          ///< In frames.
+  FeatureSettings features;         ///< Corners and descriptors.
+  StereoSettings stereo;            ///< Search in the second camera's image.
+  DepthSettings depth;              ///< Depth images.
+  ViewSettings view;                ///< Which directions are used.
+  TrackingSettings tracking;        ///< Pose of each frame.
+  MappingSettings mapping;          ///< Landmarks and keyframes.
+  CalibrationSettings calibration;  ///< Of the cameras, estimated along.
+  LoopSettings loop;                ///< Places seen before.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -50,6 +51,7 @@ struct Settings {
     field("view", self.view, SettingInfo{.help = "Which directions are used."});
     field("tracking", self.tracking, SettingInfo{.help = "Pose of each frame."});
     field("mapping", self.mapping, SettingInfo{.help = "Landmarks and keyframes."});
+    field("calibration", self.calibration, SettingInfo{.help = "Of the cameras, estimated along."});
     field("loop", self.loop, SettingInfo{.help = "Places seen before."});
   }
 };

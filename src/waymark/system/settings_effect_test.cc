@@ -10,6 +10,8 @@
 #include <string>
 
 #include "waymark/base/config.h"
+#include "waymark/loop/global_mapper.h"
+#include "waymark/mapping/test_calibration.h"
 #include "waymark/system/test_sequence.h"
 
 namespace waymark {
@@ -306,6 +308,25 @@ TEST(SettingsEffect, GlobalLatencySaysWhenAnAdjustmentIsTakenIn) {
   EXPECT_EQ(late.front(), soon.front() + 3);
 }
 
+/// Whether a map of a camera of 420 px that is said to have other ones ends with those that it was
+/// told.
+bool believes(double told_px, const std::string& assignment) {
+  const auto told = make_described(1, make_test_pinhole(told_px));
+  TestMap scene = look_around(make_described(1, make_test_pinhole(420.0)), told, 30);
+  const Settings settings = settings_with({assignment, "loop.enabled=false"});
+  GlobalMapper mapper(told, settings.mapping, settings.loop, settings.calibration, 1);
+  mapper.take_over({scene.map.freeze(), std::make_shared<const PlaceIndex>()});
+  mapper.finish();
+  return !mapper.calibration().is_changed();
+}
+
+TEST(SettingsEffect, RefineSaysWhetherTheCalibrationChanges) {
+  EXPECT_TRUE(believes(441.0, "calibration.refine=off"));
+  EXPECT_FALSE(believes(441.0, "calibration.refine=auto"));
+  EXPECT_TRUE(believes(420.2, "calibration.refine=auto"));
+  EXPECT_FALSE(believes(420.2, "calibration.refine=on"));
+}
+
 /// Whoever adds a setting shows its effect here.
 TEST(SettingsEffect, IsShownOfEverySetting) {
   Settings settings;
@@ -329,6 +350,7 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "tracking.keyframe_parallax_px",
                                               "tracking.max_keyframe_interval",
                                               "mapping.window_keyframes",
+                                              "calibration.refine",
                                               "loop.enabled"));
 }
 

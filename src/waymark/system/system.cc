@@ -67,12 +67,17 @@ bool has_pose(FrameState state) {
 class System::Impl {
  public:
   Impl(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
-      : rig_(std::make_shared<const Rig>(std::move(rig))),
+      : given_rig_(std::make_shared<const Rig>(std::move(rig))),
         settings_(settings),
         timing_(timing),
+        rig_(given_rig_),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         memory_(rig_, frame_after(map.get())),
-        mapper_(rig_, settings.mapping, settings.loop, static_cast<std::uint64_t>(settings.seed)),
+        mapper_(rig_,
+                settings.mapping,
+                settings.loop,
+                settings.calibration,
+                static_cast<std::uint64_t>(settings.seed)),
         adjuster_(timing),
         worker_(timing, [this](const MapTask& task) { return process(task); }) {
     if (!map) return;
@@ -90,24 +95,31 @@ class System::Impl {
   std::vector<FrameState> frame_states() const;
   std::shared_ptr<const Map> map() const { return visible_.snapshot.map; }
   SystemStatistics statistics() const;
+  std::shared_ptr<const Rig> rig() const {
+    return visible_.calibration.rig ? visible_.calibration.rig : given_rig_;
+  }
+  std::vector<CalibrationEstimate> calibration() const;
   const FocalCheck* focal_check() const;
   const FrameDetails& details() const { return details_; }
 
  private:
   void make_tracker(bool has_range);
+  void look_with_calibration();
   void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
   std::shared_ptr<const PublishedMap> process(const MapTask& task);
   void add(const MapperMessage& message);
+  bool is_due(FrameId frame) const;
   void finish_adjustment();
   PublishedMap publish();
 
   // Fixed after construction.
-  const std::shared_ptr<const Rig> rig_;
+  const std::shared_ptr<const Rig> given_rig_;
   const Settings settings_;
   const Timing timing_;
 
   // The caller's thread.
+  std::shared_ptr<const Rig> rig_;  // As calibrated so far.
   FrameBuilder builder_;
   std::optional<Tracker> tracker_;
   TrajectoryMemory memory_;
@@ -123,6 +135,7 @@ class System::Impl {
   AdjustmentWorker adjuster_;
   FrameId adjustment_due_;
   std::vector<double> mapping_ms_;
+  MapSnapshot published_;
 
   // Written once by the mapper's thread, before the first map that has_focal_check() is published.
   std::optional<FocalCheck> focal_check_;
@@ -142,6 +155,7 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   TrackingResult result;
   const FrameId id = memory_.next();
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
+  look_with_calibration();
   const Frame frame{id, images.timestamp_ns, builder_.build(images)};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
@@ -180,9 +194,19 @@ void System::Impl::set_mapping(bool is_on) {
 
 std::unique_ptr<System::Impl> System::Impl::begin_anew() const {
   WAYMARK_CHECK(!is_finished_);
-  auto anew = std::make_unique<Impl>(*rig_, settings_, timing_, nullptr);
+  auto anew = std::make_unique<Impl>(*given_rig_, settings_, timing_, nullptr);
   anew->purpose_ = purpose_;
   return anew;
+}
+
+/// Takes over the calibration of the map that the frame before saw.
+void System::Impl::look_with_calibration() {
+  const std::shared_ptr<const Rig>& rig = visible_.calibration.rig;
+  if (!rig || rig == rig_) return;
+  rig_ = rig;
+  builder_.look_with(*rig_);
+  tracker_->look_with(rig_);
+  memory_.look_with(rig_);
 }
 
 void System::Impl::look_at_map(FrameId frame) {
@@ -206,9 +230,12 @@ void System::Impl::send(FrameId frame, MapperMessage message) {
 std::shared_ptr<const PublishedMap> System::Impl::process(const MapTask& task) {
   if (task.message) {
     add(*task.message);
-  } else {
+    published_ = mapper_.snapshot();
+  } else if (is_due(task.frame)) {
     finish_adjustment();
   }
+  // A loop does not wait for an estimate that it makes out of date.
+  if (adjuster_.is_busy_with_calibration() && mapper_.has_loop_task()) adjuster_.finish();
   if (!adjuster_.is_busy()) {
     if (auto adjustment = mapper_.take_task()) {
       adjuster_.start(*std::move(adjustment));
@@ -219,14 +246,22 @@ std::shared_ptr<const PublishedMap> System::Impl::process(const MapTask& task) {
   return std::make_shared<const PublishedMap>(publish());
 }
 
+/// Not if the adjustment that was asked for has been dropped, and another one begun.
+bool System::Impl::is_due(FrameId frame) const {
+  return adjuster_.is_busy() && (timing_ == Timing::kRealtime || adjustment_due_ <= frame);
+}
+
 PublishedMap System::Impl::publish() {
-  return {mapper_.snapshot(), adjustment_due_, mapper_.num_loops(), mapping_ms_};
+  return {published_, mapper_.calibration(), adjustment_due_, mapper_.num_loops(), mapping_ms_};
 }
 
 void System::Impl::finish_adjustment() {
   const AdjustmentWorker::Result result = adjuster_.finish();
-  mapper_.apply(result.task, result.adjustment);
   adjustment_due_ = FrameId{};
+  // The tracker goes on with the very map that it has where nothing came of it.
+  if (result.task.is_for_calibration && !result.adjustment.calibration) return;
+  mapper_.apply(result.task, result.adjustment);
+  published_ = mapper_.snapshot();
 }
 
 void System::Impl::add(const MapperMessage& message) {
@@ -237,6 +272,11 @@ void System::Impl::add(const MapperMessage& message) {
   if (is_focal_checked_ || !has_focal_check(mapper_.map(), memory_.first())) return;
   is_focal_checked_ = true;
   focal_check_ = check_focal_length(mapper_.map());
+}
+
+std::vector<CalibrationEstimate> System::Impl::calibration() const {
+  const KnownCalibration& known = visible_.calibration;
+  return known.is_changed() ? known.estimates() : std::vector<CalibrationEstimate>{};
 }
 
 const FocalCheck* System::Impl::focal_check() const {
@@ -257,6 +297,7 @@ void System::Impl::finish() {
   }
   if (adjuster_.is_busy()) finish_adjustment();
   mapper_.finish();
+  published_ = mapper_.snapshot();
   visible_ = publish();
   memory_.settle(*map());
   const bool is_long = memory_.entries().size() >= kFramesToCheck;
@@ -312,6 +353,8 @@ void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
 const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
+std::shared_ptr<const Rig> System::rig() const { return impl_->rig(); }
+std::vector<CalibrationEstimate> System::calibration() const { return impl_->calibration(); }
 const FrameDetails& System::details() const { return impl_->details(); }
 std::shared_ptr<const Map> System::map() const { return impl_->map(); }
 SystemStatistics System::statistics() const { return impl_->statistics(); }

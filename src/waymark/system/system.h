@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/base/timing.h"
+#include "waymark/camera/calibration.h"
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
@@ -87,6 +88,13 @@ class System {
   /// What the residuals say of the calibration, once some 200 frames are mapped and where the
   /// motion tells; else null.
   const FocalCheck* focal_check() const;
+
+  /// The cameras as they are calibrated by now.
+  std::shared_ptr<const Rig> rig() const;
+
+  /// What the images told of the calibration up to the map that map() gives; empty as long as they
+  /// did not contradict it. After finish(): final.
+  std::vector<CalibrationEstimate> calibration() const;
 
   /// The newest finished map, immutable.
   std::shared_ptr<const Map> map() const;

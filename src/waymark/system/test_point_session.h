@@ -23,7 +23,7 @@ class PointSession {
       : rig_(make_test_rig(num_cameras)),
         cloud_(std::move(cloud)),
         tracker_(rig_, num_cameras > 1, TrackingSettings{}, 1),
-        mapper_(rig_, MappingSettings{}, LoopSettings{}, 1),
+        mapper_(rig_, MappingSettings{}, LoopSettings{}, CalibrationSettings{}, 1),
         visible_(mapper_.snapshot()) {}
 
   /// From now on the frames are a few noisy looks from a place, which are made once.

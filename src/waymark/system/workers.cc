@@ -13,7 +13,7 @@ namespace {
 constexpr std::size_t kInboxCapacity = 8;
 
 AdjustmentWorker::Result adjust(AdjustmentTask task) {
-  GlobalAdjustment adjustment = adjust_globally(*task.map, task.submap);
+  GlobalAdjustment adjustment = task.adjust();
   return {std::move(task), std::move(adjustment)};
 }
 
@@ -91,6 +91,7 @@ void AdjustmentWorker::stop() {
 void AdjustmentWorker::start(AdjustmentTask task) {
   WAYMARK_CHECK(!is_busy_);
   is_busy_ = true;
+  is_for_calibration_ = task.is_for_calibration;
   tasks_.push(std::move(task));
 }
 

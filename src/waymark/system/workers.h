@@ -28,6 +28,7 @@ struct MapTask {
 /// What the mapper shows after a task.
 struct PublishedMap {
   MapSnapshot snapshot;
+  KnownCalibration calibration;  ///< That the map is measured with.
   FrameId adjustment_due;  ///< When a global adjustment is to be taken in; invalid if none runs.
   int num_loops = 0;       ///< Closed so far.
   std::vector<double> mapping_ms;  ///< Of each message so far.
@@ -91,6 +92,8 @@ class AdjustmentWorker {
   AdjustmentWorker& operator=(const AdjustmentWorker&) = delete;
 
   bool is_busy() const { return is_busy_; }
+  /// Whether what it is busy with may be dropped where there is something better to do.
+  bool is_busy_with_calibration() const { return is_busy_ && is_for_calibration_; }
   /// Begins the task; must not be busy.
   void start(AdjustmentTask task);
   /// Whether finish() would not wait; for any thread.
@@ -110,6 +113,7 @@ class AdjustmentWorker {
 
   const Timing timing_;
   bool is_busy_ = false;
+  bool is_for_calibration_ = false;
   Mailbox<AdjustmentTask> tasks_{1};
   Mailbox<Outcome> outcomes_{1};
   std::jthread thread_;

@@ -60,11 +60,11 @@ class Initializer {
                                const Rigid3& guess,
                                const LandmarkSet& landmarks);
 
-  const std::shared_ptr<const Rig> rig_;
-  const bool has_range_;
-  const std::uint64_t seed_;
-  const double pixel_rad_;         ///< Angle of a pixel at the image centre.
-  const double search_radius_px_;  ///< Around where a feature was last seen.
+  std::shared_ptr<const Rig> rig_;
+  bool has_range_;
+  std::uint64_t seed_;
+  double pixel_rad_;         ///< Angle of a pixel at the image centre.
+  double search_radius_px_;  ///< Around where a feature was last seen.
   FrameReason reason_ = FrameReason::kNone;
   AppearanceMatcher appearance_;
   ProjectionMatcher projection_;

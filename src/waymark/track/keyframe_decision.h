@@ -36,9 +36,9 @@ class KeyframeAssessor {
                            std::size_t submap_age) const;
 
  private:
-  const std::shared_ptr<const Rig> rig_;
-  const bool has_range_;
-  const double pixel_rad_;  ///< Angle of a pixel at the image centre.
+  std::shared_ptr<const Rig> rig_;
+  bool has_range_;
+  double pixel_rad_;  ///< Angle of a pixel at the image centre.
 };
 
 /// Whether a frame should become a keyframe.

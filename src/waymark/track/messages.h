@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/base/id.h"
+#include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/image/features.h"
 
@@ -42,6 +43,7 @@ struct NewKeyframe {
   std::shared_ptr<const Features> features;  ///< Never null.
   std::vector<LandmarkId> landmarks;         ///< Per feature, invalid where none.
   std::vector<Sighting> sightings;           ///< Ascending by landmark.
+  std::shared_ptr<const Rig> rig;            ///< As calibrated when the features were measured.
 };
 
 /// A point of a new sub-map and the primary feature that sees it in each of its keyframes.
@@ -63,6 +65,7 @@ struct NewSubmap {
   bool is_metric = false;                  ///< Whether lengths are in metres.
   std::vector<InitialKeyframe> keyframes;  ///< By time.
   std::vector<InitialLandmark> landmarks;  ///< In no order.
+  std::shared_ptr<const Rig> rig;          ///< As calibrated when the features were measured.
 };
 
 /// What the tracker sends to the mapper.

@@ -86,8 +86,8 @@ class PlaceLocator {
                                              std::uint64_t stream,
                                              std::vector<LandmarkId> landmarks);
 
-  const std::shared_ptr<const Rig> rig_;
-  const std::uint64_t seed_;
+  std::shared_ptr<const Rig> rig_;
+  std::uint64_t seed_;
   AppearanceMatcher appearance_;
   TurnVote turn_vote_;
   FrameLocator locator_;

@@ -42,7 +42,7 @@ class Relocalizer {
   void note(const PlaceAttempt& attempt);
 
   PlaceLocator locator_;
-  const int min_inliers_;
+  int min_inliers_;
   FrameStatus diagnosis_;
 };
 

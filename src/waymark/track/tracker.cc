@@ -25,21 +25,36 @@ constexpr int kRecoveryFrames = 30;
 /// Frames after a loss until a single one with range may start a new sub-map.
 constexpr int kPatience = 5;
 
+std::array<double, 2> search_radii(const Rig& rig) {
+  const Camera& camera = *rig.cameras.at(0).camera;
+  return {search_radius_px(camera, kPredictedRadiusPx, kPredictedPart),
+          search_radius_px(camera, kWideRadiusPx, kWidePart)};
+}
+
 }  // namespace
 
 Tracker::Tracker(std::shared_ptr<const Rig> rig,
                  bool has_range,
                  const TrackingSettings& settings,
                  std::uint64_t seed)
-    : has_range_(has_range),
+    : rig_(rig),
+      has_range_(has_range),
       settings_(settings),
+      seed_(seed),
       initializer_(rig, has_range, seed),
       locator_(rig),
       relocalizer_(rig, settings, seed),
       keyframe_assessor_(rig, has_range),
-      search_radii_px_{
-          search_radius_px(*rig->cameras.at(0).camera, kPredictedRadiusPx, kPredictedPart),
-          search_radius_px(*rig->cameras.at(0).camera, kWideRadiusPx, kWidePart)} {}
+      search_radii_px_(search_radii(*rig)) {}
+
+void Tracker::look_with(std::shared_ptr<const Rig> rig) {
+  rig_ = std::move(rig);
+  initializer_ = Initializer(rig_, has_range_, seed_);
+  locator_ = FrameLocator(rig_);
+  relocalizer_ = Relocalizer(rig_, settings_, seed_);
+  keyframe_assessor_ = KeyframeAssessor(rig_, has_range_);
+  search_radii_px_ = search_radii(*rig_);
+}
 
 void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
   purpose_ = purpose;
@@ -202,8 +217,13 @@ TrackOutcome Tracker::accept(const Frame& frame, LocatedFrame located, StageTime
   outcome.is_relocalized = mode_ == Mode::kLost;
   outcome.details = {frame.id, frame.features, {}, pose, {}};
   if (is_keyframe(frame, located)) {
-    outcome.message = NewKeyframe{
-        frame.id, frame.timestamp_ns, pose, frame.features, located.landmarks, sightings_.take()};
+    outcome.message = NewKeyframe{frame.id,
+                                  frame.timestamp_ns,
+                                  pose,
+                                  frame.features,
+                                  located.landmarks,
+                                  sightings_.take(),
+                                  rig_};
     // A keyframe is its own reference, so that it moves as the map moves it.
     outcome.details.pose = {ids_.add_keyframe(), pose.reference_scale, Rigid3{}};
     last_keyframe_frame_ = frame.id;
@@ -263,6 +283,7 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame, StageTimes
   for (FilledPose& filled : outcome.details.filled) {
     filled.pose.reference.value += ids_.submap_start().value;
   }
+  start->submap.rig = rig_;
   outcome.message = std::move(start->submap);
   last_.set(frame, pose, start->rig_from_world, {});
   last_keyframe_frame_ = frame.id;

@@ -51,6 +51,9 @@ class Tracker {
   /// frame. Ids go on from those of the map.
   void begin_in(const Map& map, TrackingPurpose purpose);
 
+  /// From the next frame on its features are of the same cameras calibrated otherwise.
+  void look_with(std::shared_ptr<const Rig> rig);
+
   /// Whether the map goes on growing, or stays as it is while the camera is followed in it.
   void set_purpose(TrackingPurpose purpose) { purpose_ = purpose; }
 
@@ -85,14 +88,16 @@ class Tracker {
   /// The first pose of a new sub-map, if this frame completes one.
   std::optional<TrackOutcome> start_submap(const Frame& frame, StageTimes& times);
 
+  std::shared_ptr<const Rig> rig_;
   const bool has_range_;
   const TrackingSettings settings_;
+  const std::uint64_t seed_;
   Initializer initializer_;
   AppearanceMatcher appearance_;
   FrameLocator locator_;
   Relocalizer relocalizer_;
   KeyframeAssessor keyframe_assessor_;
-  const std::array<double, 2> search_radii_px_;  ///< Around a prediction, and when that fails.
+  std::array<double, 2> search_radii_px_;  ///< Around a prediction, and when that fails.
 
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;

@@ -33,6 +33,9 @@ class TrajectoryMemory {
   explicit TrajectoryMemory(std::shared_ptr<const Rig> rig, FrameId first = FrameId{0})
       : first_(first), newest_sent_(first), refiner_(std::move(rig)) {}
 
+  /// From now on the frames are of the same cameras calibrated otherwise.
+  void look_with(std::shared_ptr<const Rig> rig) { refiner_ = PoseRefiner(std::move(rig)); }
+
   FrameId first() const { return first_; }
   /// The id of the frame after those added so far.
   FrameId next() const {

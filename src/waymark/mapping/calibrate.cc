@@ -1,0 +1,365 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/calibrate.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <utility>
+
+#include "waymark/camera/tangent.h"
+#include "waymark/image/pyramid.h"
+
+namespace waymark {
+namespace {
+
+/// The intrinsics act linearly in an adjustment: it is repeated until they move no more.
+constexpr int kMaxPasses = 8;
+/// An estimate so many standard deviations from what was given is no chance: of exact calibrations
+/// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5 (docs/decisions.md).
+constexpr double kMinSigmas = 7.0;
+/// A calibration is replaced by one that differs by this many.
+constexpr double kMinChange = 2.0;
+/// Where the parts of the way contradict each other by this much more than corners scatter, what is
+/// wrong is not the calibration: a rolling shutter, a stabilised video.
+constexpr double kMaxDisagreement = 6.0;
+/// By less than this part of its standard deviation.
+constexpr double kStill = 0.1;
+/// More tell hardly more, and take longer.
+constexpr std::size_t kMaxObservations = 30000;
+
+/// Observations of the rig by one of its cameras.
+struct CameraMeasurements {
+  std::vector<std::size_t> indices;
+  std::vector<Eigen::Vector2d> pixels;
+  std::vector<float> level_scales;
+};
+
+/// Per camera.
+std::vector<CameraMeasurements> collect(const Map& map,
+                                        std::span<const Observation> observed,
+                                        const Rig& rig,
+                                        const BundleProblem& problem) {
+  std::vector<CameraMeasurements> cameras(rig.cameras.size());
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    if (problem.rigs[problem.observations[i].pose] != &rig) continue;
+    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
+    const Keypoint& keypoint = keyframe.features->keypoints[observed[i].feature];
+    CameraMeasurements& camera = cameras[keypoint.camera];
+    camera.indices.push_back(i);
+    camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
+    camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
+  }
+  return cameras;
+}
+
+/// Directions in which a camera should see the points of its observations.
+std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
+                                     const Rigid3& cam_from_rig,
+                                     const BundleProblem& problem) {
+  std::vector<Eigen::Vector3d> directions;
+  for (const std::size_t i : measured.indices) {
+    const BundleObservation& observation = problem.observations[i];
+    const Eigen::Vector3d point_in_rig =
+        problem.rig_from_world[observation.pose] * problem.points[observation.point];
+    directions.push_back((cam_from_rig * point_in_rig).normalized());
+  }
+  return directions;
+}
+
+/// Whether an image is stretched by so much that its corners are blurred.
+bool is_stretched(const Matrix23d& pixel_from_bearing) {
+  const Eigen::Matrix2d square = pixel_from_bearing * pixel_from_bearing.transpose();
+  const double mean = 0.5 * square.trace();
+  const double larger = mean + std::sqrt(std::max(mean * mean - square.determinant(), 0.0));
+  constexpr double kMaxSquared = TangentComputer::kMaxStretch * TangentComputer::kMaxStretch;
+  return !(larger * larger < kMaxSquared * square.determinant());
+}
+
+/// Makes the residuals of a camera's observations those of pixels, linear around where the points
+/// should be seen. Around where they are seen, as elsewhere, noise would turn up in the
+/// derivatives, and the little that tells a focal length would drown in it: the bearing becomes the
+/// one that is as far from the prediction, in the plane that touches the sphere there, as the
+/// pixels are. What cannot be told so counts as an outlier.
+void linearize(const CameraMeasurements& measured,
+               const Camera& camera,
+               const std::vector<Eigen::Vector3d>& directions,
+               BundleProblem& problem) {
+  const std::size_t count = directions.size();
+  std::vector<Eigen::Vector2d> pixels(count);
+  std::vector<Matrix23d> jacobians(count);
+  std::vector<std::uint8_t> is_visible(count);
+  camera.project_with_jacobian(directions, pixels, jacobians, is_visible);
+  for (std::size_t k = 0; k < count; ++k) {
+    BundleObservation& observation = problem.observations[measured.indices[k]];
+    const Eigen::Vector3d& direction = directions[k];
+    const Matrix23d w = (jacobians[k] - jacobians[k] * direction * direction.transpose()) /
+                        measured.level_scales[k];
+    if (!is_visible[k] || is_stretched(w)) {
+      observation.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
+      continue;
+    }
+    const Eigen::Vector2d off = (measured.pixels[k] - pixels[k]) / measured.level_scales[k];
+    const Eigen::Vector3d bearing =
+        direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
+    observation.bearing = bearing.cast<float>();
+    observation.level_pixel_from_bearing = w.cast<float>();
+  }
+}
+
+/// Appends the derivatives of the pixels of a camera's observations by its intrinsics.
+bool add_derivatives(const CalibrationParameters& parameters,
+                     std::size_t camera,
+                     const Eigen::VectorXd& change,
+                     const CameraMeasurements& measured,
+                     const std::vector<Eigen::Vector3d>& directions,
+                     BundleCalibration& calibration) {
+  const auto derivatives = parameters.pixel_by_intrinsics(camera, change, directions);
+  if (!derivatives) return false;
+  const std::size_t stride = 2 * parameters.blocks()[camera].num_intrinsics;
+  std::vector<float>& all = calibration.level_pixel_by_intrinsics;
+  for (std::size_t k = 0; k < measured.indices.size(); ++k) {
+    calibration.first_derivative[measured.indices[k]] = all.size();
+    for (std::size_t j = k * stride; j < (k + 1) * stride; ++j) {
+      all.push_back(static_cast<float>((*derivatives)[j]) / measured.level_scales[k]);
+    }
+  }
+  return true;
+}
+
+void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem) {
+  for (const Rig*& used : problem.rigs) {
+    if (used == &before) used = &rig;
+  }
+}
+
+/// Bearings of a problem by a rig calibrated otherwise; what has none there keeps that of before.
+void measure_anew(const std::vector<CameraMeasurements>& cameras,
+                  const Rig& rig,
+                  BundleProblem& problem) {
+  TangentComputer computer;
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const TangentArrays& tangents =
+        computer.compute(*rig.cameras[c].camera, cameras[c].pixels, cameras[c].level_scales);
+    for (std::size_t k = 0; k < cameras[c].indices.size(); ++k) {
+      if (!tangents.is_valid[k]) continue;
+      BundleObservation& observation = problem.observations[cameras[c].indices[k]];
+      observation.bearing = tangents.bearings[k];
+      observation.level_pixel_from_bearing = tangents.level_pixel_from_bearing[k];
+    }
+  }
+}
+
+/// A calibration that is being adjusted.
+struct Trial {
+  std::shared_ptr<const Rig> rig;
+  Eigen::VectorXd change;
+  Eigen::VectorXd sigma;
+  /// Of a residual's component, in px^2, by what the parts of the way disagree: more than its
+  /// noise, since errors that last count only once.
+  double variance = 1.0;
+  double noise_px = 1.0;  ///< Of a residual's component.
+};
+
+/// Standard deviations from what an adjustment with this prior told, and the variance of residuals
+/// that they follow from.
+void judge(const CalibrationEvidence& evidence,
+           const Eigen::MatrixXd& prior_information,
+           Trial& trial) {
+  const Eigen::MatrixXd covariance = evidence.information.ldlt().solve(
+      Eigen::MatrixXd::Identity(evidence.information.rows(), evidence.information.cols()));
+  const Eigen::MatrixXd of_residuals = evidence.information - trial.variance * prior_information;
+  const Eigen::MatrixXd sandwich =
+      covariance * (evidence.scatter + trial.variance * trial.variance * prior_information) *
+      covariance;
+  const Eigen::VectorXd plain = trial.variance * covariance.diagonal();
+  trial.sigma = plain.cwiseMax(sandwich.diagonal()).cwiseSqrt();
+  const double expected = (covariance * of_residuals).trace();
+  const double seen = (covariance * evidence.scatter).trace();
+  const double least = trial.noise_px * trial.noise_px;
+  trial.variance = expected > 0.0 ? std::max(seen / expected, least) : least;
+}
+
+/// One adjustment from the calibration reached; whether there is one.
+bool adjust_once(const CalibrationParameters& parameters,
+                 const std::vector<CameraMeasurements>& cameras,
+                 const std::vector<std::uint8_t>& is_free,
+                 BundleProblem& problem,
+                 Trial& trial) {
+  BundleCalibration calibration;
+  calibration.rig = trial.rig.get();
+  calibration.blocks = parameters.blocks();
+  calibration.first_derivative.assign(problem.observations.size(), 0);
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const RigCamera& camera = trial.rig->cameras[c];
+    const auto directions = predict(cameras[c], camera.cam_from_rig, problem);
+    linearize(cameras[c], *camera.camera, directions, problem);
+    if (!add_derivatives(parameters, c, trial.change, cameras[c], directions, calibration)) {
+      return false;
+    }
+  }
+  const Eigen::MatrixXd prior = parameters.prior_information(trial.change, is_free);
+  calibration.prior_information = trial.variance * prior;
+  calibration.prior_change = -trial.change;
+  calibration.change.setZero(trial.change.size());
+  problem.calibration = std::move(calibration);
+  const BundleResult result =
+      adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 4});
+  const BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
+  const std::optional<Rig> rig = parameters.rig_at(trial.change + found.change);
+  if (!rig || found.evidence.information.size() == 0) return false;
+  auto next = std::make_shared<const Rig>(*rig);
+  use_rig(*trial.rig, *next, problem);
+  trial.rig = std::move(next);
+  trial.change += found.change;
+  trial.noise_px = result.noise_px;
+  judge(found.evidence, prior, trial);
+  return true;
+}
+
+/// Adjusts until the calibration moves no more; whether there is one.
+bool adjust(const CalibrationParameters& parameters,
+            const std::vector<CameraMeasurements>& cameras,
+            const std::vector<std::uint8_t>& is_free,
+            BundleProblem& problem,
+            Trial& trial) {
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    const Eigen::VectorXd before = trial.change;
+    if (!adjust_once(parameters, cameras, is_free, problem, trial)) return false;
+    const Eigen::ArrayXd moved = (trial.change - before).array().abs() / trial.sigma.array();
+    if (moved.maxCoeff() < kStill) break;
+  }
+  return trial.variance < std::pow(kMaxDisagreement * trial.noise_px, 2);
+}
+
+/// What is looked at unless all is asked for. Centres and tangential distortion take up errors of
+/// other kinds, such as those of a rolling shutter; a centre that is off can hardly be told from a
+/// turn, and calibrations hardly err in it.
+std::vector<std::uint8_t> likely_wrong(const std::vector<CalibrationParameter>& parameters) {
+  std::vector<std::uint8_t> is_free;
+  for (const CalibrationParameter& parameter : parameters) {
+    is_free.push_back(parameter.group != CalibrationGroup::kCentre &&
+                      parameter.group != CalibrationGroup::kTangential);
+  }
+  return is_free;
+}
+
+/// Of these the groups in which an estimate contradicts what was given. The distortion of other
+/// cameras and where they stand is told by two images of one moment, and hard to tell apart: all or
+/// none of that.
+std::vector<std::uint8_t> contradicted(const std::vector<CalibrationParameter>& parameters,
+                                       const Trial& trial,
+                                       const std::vector<std::uint8_t>& is_free) {
+  std::vector<CalibrationGroup> groups;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    if (is_free[i] && std::abs(trial.change[at]) > kMinSigmas * trial.sigma[at]) {
+      groups.push_back(parameters[i].group);
+    }
+  }
+  std::vector<std::uint8_t> is_contradicted;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const CalibrationParameter& parameter = parameters[i];
+    const bool is_of_pair =
+        !parameter.name.starts_with("cam0.") && parameter.group != CalibrationGroup::kFocalLength;
+    const bool is_in_group = std::ranges::find(groups, parameter.group) != groups.end();
+    is_contradicted.push_back(is_free[i] && !groups.empty() && (is_of_pair || is_in_group));
+  }
+  return is_contradicted;
+}
+
+/// The largest change of a free parameter, in standard deviations.
+double largest_change(const Trial& trial,
+                      const KnownCalibration& known,
+                      const std::vector<std::uint8_t>& is_free) {
+  double largest = 0.0;
+  for (Eigen::Index i = 0; i < trial.change.size(); ++i) {
+    if (!is_free[static_cast<std::size_t>(i)]) continue;
+    largest = std::max(largest, std::abs(trial.change[i] - known.change[i]) / trial.sigma[i]);
+  }
+  return largest;
+}
+
+/// A part of the points with all of their observations: what tells a calibration does so soon.
+struct CalibrationSample {
+  BundleProblem problem;
+  std::vector<Observation> observed;
+};
+
+CalibrationSample sample(const BundleProblem& problem, std::span<const Observation> observed) {
+  CalibrationSample sample{problem, {}};
+  sample.problem.observations.clear();
+  const std::size_t stride = 1 + observed.size() / kMaxObservations;
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    if (problem.observations[i].point % stride != 0) continue;
+    sample.problem.observations.push_back(problem.observations[i]);
+    sample.observed.push_back(observed[i]);
+  }
+  return sample;
+}
+
+}  // namespace
+
+KnownCalibration KnownCalibration::as_given(std::shared_ptr<const Rig> rig,
+                                            bool is_always_refined) {
+  KnownCalibration known{rig, rig, {}, {}, CalibrationParameters(*rig).list()};
+  const auto count = static_cast<Eigen::Index>(known.parameters.size());
+  known.change.setZero(count);
+  known.sigma.resize(count);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    known.sigma[i] = known.parameters[static_cast<std::size_t>(i)].prior_sigma;
+  }
+  known.is_always_refined = is_always_refined;
+  return known;
+}
+
+std::vector<CalibrationEstimate> KnownCalibration::estimates() const {
+  std::vector<CalibrationEstimate> estimates;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    estimates.push_back({parameters[i].name,
+                         parameters[i].given,
+                         change[at],
+                         parameters[i].prior_sigma,
+                         sigma[at]});
+  }
+  return estimates;
+}
+
+std::optional<KnownCalibration> recalibrate(const Map& map,
+                                            std::span<const Observation> observed,
+                                            const KnownCalibration& known,
+                                            BundleProblem& problem) {
+  const CalibrationParameters parameters(*known.given);
+  if (parameters.size() == 0) return std::nullopt;
+  CalibrationSample part = sample(problem, observed);
+  const auto cameras = collect(map, part.observed, *known.rig, part.problem);
+  const Trial start{known.rig, known.change, known.sigma};
+  std::vector<std::uint8_t> is_free = known.is_always_refined
+                                          ? std::vector<std::uint8_t>(parameters.size(), 1)
+                                          : likely_wrong(known.parameters);
+  Trial trial = start;
+  BundleProblem adjusted = part.problem;
+  if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
+  // What the images do not tell stays as given, or it would take up errors of other kinds.
+  if (!known.is_always_refined) {
+    is_free = contradicted(known.parameters, trial, is_free);
+    if (std::ranges::count(is_free, 1) == 0) return std::nullopt;
+    adjusted = part.problem;
+    trial = start;
+    if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
+  }
+  if (largest_change(trial, known, is_free) < kMinChange) return std::nullopt;
+  problem.rig_from_world = adjusted.rig_from_world;
+  problem.points = adjusted.points;
+  use_rig(*known.rig, *trial.rig, problem);
+  measure_anew(collect(map, observed, *trial.rig, problem), *trial.rig, problem);
+  KnownCalibration found = known;
+  found.rig = std::move(trial.rig);
+  found.change = std::move(trial.change);
+  found.sigma = std::move(trial.sigma);
+  return found;
+}
+
+}  // namespace waymark

@@ -1,0 +1,70 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/calibrate.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/mapping/global_adjustment.h"
+#include "waymark/mapping/test_calibration.h"
+
+namespace waymark {
+namespace {
+
+class CalibrateTest : public ::testing::Test {
+ protected:
+  GlobalAdjustment adjust(std::shared_ptr<const Rig> truth,
+                          const std::shared_ptr<const Rig>& told,
+                          double pixel_sigma = 0.3) {
+    TestMap scene = look_around(std::move(truth), told, 16, pixel_sigma);
+    const KnownCalibration known = KnownCalibration::as_given(told);
+    return adjust_globally(*scene.map.freeze(), scene.submap, &known);
+  }
+
+  /// True value of a parameter less its estimate, in standard deviations; 1e9 without one.
+  static double error_in_sigmas(const GlobalAdjustment& found,
+                                std::string_view name,
+                                double true_change) {
+    if (!found.calibration) return 1e9;
+    const auto& parameters = found.calibration->parameters;
+    for (std::size_t i = 0; i < parameters.size(); ++i) {
+      const auto at = static_cast<Eigen::Index>(i);
+      if (parameters[i].name != name) continue;
+      return (true_change - found.calibration->change[at]) / found.calibration->sigma[at];
+    }
+    return 1e9;
+  }
+};
+
+TEST_F(CalibrateTest, FindsTheFocalLength) {
+  for (const int num_cameras : {1, 2}) {
+    const auto truth = make_described(num_cameras, make_test_pinhole(420.0));
+    const GlobalAdjustment found =
+        adjust(truth, make_described(num_cameras, make_test_pinhole(441.0)));
+    EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", -21.0)), 3.0) << num_cameras;
+    EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fv", -21.0)), 3.0) << num_cameras;
+  }
+}
+
+TEST_F(CalibrateTest, FindsDistortion) {
+  const GlobalAdjustment found =
+      adjust(make_described(1, make_test_pinhole(420.0, {-0.2, 0.03, 0.0, 0.0})),
+             make_described(1, make_test_pinhole(420.0)));
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.k1", -0.2)), 3.0);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.k2", 0.03)), 3.0);
+}
+
+TEST_F(CalibrateTest, FindsTheTurnOfTheSecondCamera) {
+  const GlobalAdjustment found = adjust(make_described(2, make_test_pinhole(420.0), 2e-3),
+                                        make_described(2, make_test_pinhole(420.0)));
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam1.turn_y", 2e-3)), 3.0);
+}
+
+TEST_F(CalibrateTest, LeavesWhatIsRight) {
+  for (const int num_cameras : {1, 2}) {
+    const auto truth = make_described(num_cameras, make_test_pinhole(420.0));
+    EXPECT_FALSE(adjust(truth, truth).calibration.has_value());
+  }
+}
+
+}  // namespace
+}  // namespace waymark
