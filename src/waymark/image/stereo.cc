@@ -21,6 +21,10 @@ constexpr float kMinAlignCorrelation = 0.8f;
 /// A patch that would rather leave its curve by more than this shows something else.
 constexpr double kMaxAcrossPx = 1.0;
 
+/// Where a patch lies across its curve is measured if it tells at least this share of what it tells
+/// of the place along it.
+constexpr float kMinToldAcross = 0.5f;
+
 /// Patches may be squeezed, in any direction, by this much at most.
 constexpr double kMaxStretch = 2.0;
 
@@ -48,6 +52,16 @@ Eigen::Vector2d to_level(const Eigen::Vector2d& pixel, int level) {
 
 Eigen::Vector2d center_in_level(const Keypoint& keypoint, int level) {
   return to_level({keypoint.x_px, keypoint.y_px}, level);
+}
+
+/// How far a patch that is aligned along its line would move if it were free to, in its pixels;
+/// zero where it shows too little across the line, such as an edge.
+Eigen::Vector2d off_curve(const AlignTemplate& patch, const Alignment& alignment) {
+  const float along_per_across = -patch.along_across / patch.along_square;
+  const float told_across = patch.across_square + along_per_across * patch.along_across;
+  if (told_across < kMinToldAcross * patch.along_square) return Eigen::Vector2d::Zero();
+  const Eigen::Vector2d across(-patch.direction.y(), patch.direction.x());
+  return alignment.across_px * (across + double{along_per_across} * patch.direction);
 }
 
 int levels_up(int level0, int level1) {
@@ -82,7 +96,7 @@ std::span<const StereoMatch> StereoSearch::search(const Pyramid& image0,
     const bool is_far =
         candidate.angle_rad < kMinDisparityPx * features.size_rad[candidate.primary];
     matches_.push_back({candidate.primary,
-                        pixels_[i],
+                        pixels_[i] + candidate.off_curve,
                         static_cast<std::uint8_t>(candidate.level1),
                         is_far ? 0.0f : static_cast<float>(1.0 / inverse_range)});
   }
@@ -209,7 +223,9 @@ void StereoSearch::sample_curve(std::uint32_t feature, int level1, ImageView ima
 
 std::optional<StereoSearch::Candidate> StereoSearch::refine(const Images& images,
                                                             std::size_t candidate) const {
-  const auto [feature, level1, angle_rad] = candidates_[candidate];
+  const Candidate& found = candidates_[candidate];
+  const auto feature = found.primary;
+  const double angle_rad = found.angle_rad;
   const Keypoint& keypoint = images.features.keypoints[feature];
   const std::optional<Warp> warp = warp_at(images, candidate);
   if (!warp) return std::nullopt;
@@ -228,7 +244,10 @@ std::optional<StereoSearch::Candidate> StereoSearch::refine(const Images& images
       std::abs(alignment->across_px) > kMaxAcrossPx) {
     return std::nullopt;
   }
-  return Candidate{feature, warp->level1, angle_rad + alignment->along_px / level1_px_per_rad};
+  return Candidate{feature,
+                   warp->level1,
+                   angle_rad + alignment->along_px / level1_px_per_rad,
+                   Pyramid::scale(warp->level1) * off_curve(*patch, *alignment)};
 }
 
 }  // namespace waymark

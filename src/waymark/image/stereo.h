@@ -22,7 +22,7 @@ namespace waymark {
 /// A feature of camera 0 found again in camera 1.
 struct StereoMatch {
   std::uint32_t primary;  ///< Index of the feature of camera 0.
-  Eigen::Vector2d pixel;  ///< In camera 1, level 0, sub-pixel, on the epipolar curve.
+  Eigen::Vector2d pixel;  ///< In camera 1, level 0, sub-pixel.
   std::uint8_t level;     ///< Pyramid level of camera 1 that shows it as large as camera 0 does.
   /// Distance along the bearing of camera 0 in metres; 0 (unknown) where the disparity is below
   /// half a pixel of the level, that is, where the feature may as well be infinitely far away.
@@ -36,7 +36,8 @@ struct StereoMatch {
 ///
 /// The search compares patches by normalised cross-correlation, a few pyramid levels above the
 /// feature's. The best place is then refined on the feature's own level by alignment along the
-/// curve, to sub-pixel accuracy.
+/// curve, to sub-pixel accuracy. Where the patch shows enough, the match is where it would leave
+/// the curve to: what the two cameras' calibration says wrong is seen there.
 class StereoSearch {
  public:
   /// rig: two cameras, some distance apart; else InputError.
@@ -53,6 +54,8 @@ class StereoSearch {
     std::uint32_t primary;
     int level1;        ///< Pyramid level in camera 1.
     double angle_rad;  ///< On the feature's epipolar curve.
+    /// Of what is seen from the place on the curve, in pixels of level 0.
+    Eigen::Vector2d off_curve = Eigen::Vector2d::Zero();
   };
   /// How camera 1 sees the surroundings of a feature: offsets in pixels of the feature's level in
   /// camera 0 to offsets in pixels of a level in camera 1 of about the same size.

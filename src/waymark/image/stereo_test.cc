@@ -116,11 +116,12 @@ Truth truth_of(const PlaneScene& scene, const Rig& rig, const Eigen::Vector3d& b
   return {is_inside && seen && std::abs(*seen - back.norm()) < 1e-6, pixel[0], range};
 }
 
-Statistics match(const Rig& rig) {
+/// told: what the search is told of the rig.
+Statistics match(const Rig& rig, const Rig& told) {
   const PlaneScene scene = make_scene();
   const Image image0 = scene.render(*rig.cameras[0].camera, rig.cameras[0].cam_from_rig);
   const Image image1 = scene.render(*rig.cameras[1].camera, rig.cameras[1].cam_from_rig);
-  FrameBuilder builder(rig, {.features = {.count = 400}});
+  FrameBuilder builder(told, {.features = {.count = 400}});
   const std::shared_ptr<const Features> features =
       builder.build({.image0 = image0.view(), .image1 = image1.view()});
   Statistics statistics;
@@ -150,11 +151,11 @@ Statistics match(const Rig& rig) {
 }
 
 void expect_good(const Rig& rig) {
-  const Statistics statistics = match(rig);
+  const Statistics statistics = match(rig, rig);
   EXPECT_GT(statistics.num_visible, 150u);
   EXPECT_GT(statistics.num_right, 0.8 * statistics.num_visible);
   EXPECT_LT(statistics.num_wrong, 0.05 * statistics.num_right);
-  EXPECT_LT(statistics.median_error_px, 0.04);
+  EXPECT_LT(statistics.median_error_px, 0.05);
   EXPECT_LT(std::abs(statistics.median_bias_px), 0.02);
   EXPECT_LT(statistics.median_range_error, 0.012);
 }
@@ -180,6 +181,17 @@ TEST(Stereo, FindsFeaturesAlongCurves) {
 TEST(Stereo, FindsFeaturesOfAPerspectiveImageInAFisheyeImage) {
   expect_good(
       make_rig(perspective(300.0, {-0.1, 0.01, 0.0, 0.0}), equidistant(250.0), {0.0, 0.0, 0.0}));
+}
+
+TEST(Stereo, SeesWhatIsBesideTheCurve) {
+  constexpr double kFocalPx = 380.0;
+  constexpr double kHalfPixelDeg = 0.5 / kFocalPx * 180.0 / std::numbers::pi;
+  const auto camera = perspective(kFocalPx, {});
+  const Statistics statistics = match(make_rig(camera, camera, {kHalfPixelDeg, 0.0, 0.0}),
+                                      make_rig(camera, camera, {0.0, 0.0, 0.0}));
+  EXPECT_GT(statistics.num_right, 0.7 * statistics.num_visible);
+  EXPECT_LT(statistics.median_error_px, 0.1);
+  EXPECT_LT(std::abs(statistics.median_bias_px), 0.02);
 }
 
 TEST(Stereo, RefusesRigsThatAreNoPair) {
