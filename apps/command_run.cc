@@ -138,11 +138,34 @@ EstimatedCalibrationSummary summarize(const EstimatedCalibration& calibration) {
   return summary;
 }
 
-/// Nothing where it was given.
-void write_calibration(const std::optional<EstimatedCalibration>& estimated,
-                       const std::filesystem::path& folder) {
-  if (!estimated) return;
-  write_file_atomically(folder / "calibration.yaml", format_camchain(estimated->chain()));
+/// Nothing where it was given and the images do not contradict it.
+void write_calibration(const Session& session, const std::filesystem::path& folder) {
+  if (!session.estimated && session.system->calibration().empty()) return;
+  CameraChain chain;
+  for (const RigCamera& camera : session.system->rig()->cameras) {
+    if (!camera.description) return;
+    chain.cameras.push_back({*camera.description, camera.cam_from_rig});
+  }
+  if (session.input->info().setup == Setup::kRgbd) {
+    chain.depth_factor = session.settings.depth.factor;
+  }
+  write_file_atomically(folder / "calibration.yaml", format_camchain(chain));
+}
+
+/// What the images have changed beyond doubt, in one line; empty if nothing.
+std::string describe_refined(const std::vector<CalibrationEstimate>& calibration) {
+  constexpr double kSigmas = 3.0;
+  std::string changes;
+  for (const CalibrationEstimate& estimate : calibration) {
+    if (std::abs(estimate.change) <= kSigmas * estimate.sigma) continue;
+    changes += fmt::format("{}{} {:.6g} -> {:.6g} +- {:.2g}",
+                           changes.empty() ? "calibration changed: " : ", ",
+                           estimate.name,
+                           estimate.given,
+                           estimate.given + estimate.change,
+                           estimate.sigma);
+  }
+  return changes;
 }
 
 int run(RunOptions options, Reporter& reporter) {
@@ -186,15 +209,18 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
   if (session.estimated) results.summary.calibration = summarize(*session.estimated);
+  results.summary.refined_calibration = session.system->calibration();
   // What ended the session early is told together with what could not be saved.
   save_each({[&] { write_results(options.report.out, results); },
-             [&] { write_calibration(session.estimated, options.report.out); },
+             [&] { write_calibration(session, options.report.out); },
              [&] {
                if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
              },
              [&] {
                if (live) live->finish();
                report_results(reporter, results, options);
+               const std::string refined = describe_refined(results.summary.refined_calibration);
+               if (!refined.empty()) reporter.info(refined);
                check_finished(results);
              }});
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;

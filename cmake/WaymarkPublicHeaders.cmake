@@ -5,6 +5,7 @@ set(roots
   base/check.h # InputError, which every reader throws
   base/config.h # settings files
   calibrate/calibrate.h # cameras that nobody knows
+  camera/calibration.h
   camera/camchain.h
   camera/camera.h
   camera/model_camera.h # own camera models

@@ -45,6 +45,19 @@ Json to_json(const EstimatedCalibrationSummary& calibration) {
           {"is_sure", calibration.is_sure}};
 }
 
+/// Numbers of a calibration keep their digits: distortion is small.
+Json to_json(const std::vector<CalibrationEstimate>& calibration) {
+  Json list = Json::array();
+  for (const CalibrationEstimate& estimate : calibration) {
+    list.push_back({{"name", estimate.name},
+                    {"given", estimate.given},
+                    {"given_sigma", estimate.given_sigma},
+                    {"change", estimate.change},
+                    {"sigma", estimate.sigma}});
+  }
+  return list;
+}
+
 void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
   json["frames"] = counts.frames;
   json["tracked"] = counts.tracked;
@@ -148,6 +161,9 @@ std::string format_summary_json(const RunSummary& summary) {
   json["relocalizations"] = summary.relocalizations;
   if (summary.quality) json["quality"] = to_json(*summary.quality);
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
+  if (!summary.refined_calibration.empty()) {
+    json["refined_calibration"] = to_json(summary.refined_calibration);
+  }
   if (summary.calibration) json["calibration"] = to_json(*summary.calibration);
   json["wall_s"] = rounded(summary.wall_s);
   json["cpu_s"] = rounded(summary.cpu_s);

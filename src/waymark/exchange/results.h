@@ -15,6 +15,7 @@
 #include <vector>
 
 #include "waymark/base/frame_state.h"
+#include "waymark/camera/calibration.h"
 #include "waymark/exchange/trajectory.h"
 
 namespace waymark {
@@ -108,6 +109,7 @@ struct RunSummary {
   /// Of run only: what seems to be wrong with the calibration and the time stamps, in words.
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
+  std::vector<CalibrationEstimate> refined_calibration;  ///< Empty where it stayed as it was.
 };
 
 /// Statistics per stage over all rows, in the order of the table.

@@ -1,0 +1,60 @@
+#!/usr/bin/python3
+# Copyright the Waymark authors.
+# SPDX-License-Identifier: Apache-2.0
+"""A calibration that is off is mended along with the map, and given back."""
+import json
+import pathlib
+import tempfile
+import unittest
+
+from cli_support import CAMERA, waymark
+
+TURN = 2e-3  # rad
+
+
+class Refine(unittest.TestCase):
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="waymark_refine_")
+        cls.addClassCleanup(folder.cleanup)
+        cls.folder = pathlib.Path(folder.name)
+        cls.room = cls.folder / "room"
+        camera = cls.folder / "camera.yaml"
+        camera.write_text(CAMERA)
+        done = waymark("simulate", "room", "--motion", "loop", "--camera", camera, "--setup", "stereo", "--frames", 90,
+                       "--told", f"turn_y={TURN * 1e3}", "-o", cls.room)
+        assert done.returncode == 0, done.stderr
+
+    def run_with(self, name, *options):
+        out = self.folder / name
+        done = waymark("run", self.room, "-o", out, *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        return out, json.loads((out / "summary.json").read_text()), done.stderr
+
+    def error_m(self, out):
+        done = waymark("eval", out / "trajectory.txt", self.room / "groundtruth.txt", "--align", "se3", "--json")
+        return json.loads(done.stdout)["ate_rmse_m"]
+
+    def test_a_turn_of_camera_1_is_found_and_kept(self):
+        as_told, summary, _ = self.run_with("as_told", "--set", "calibration.refine=off")
+        self.assertNotIn("refined_calibration", summary)
+        self.assertFalse((as_told / "calibration.yaml").exists())
+
+        refined, summary, said = self.run_with("refined")
+        self.assertIn("calibration changed: ", said)
+        found = {each["name"]: each for each in summary["refined_calibration"]}
+        self.assertLess(abs(abs(found["cam1.turn_y"]["change"]) - TURN), 0.25 * TURN)
+        self.assertLess(self.error_m(refined), 0.3 * self.error_m(as_told))
+
+        again, summary, _ = self.run_with("again", "-c", refined / "calibration.yaml")
+        self.assertNotIn("refined_calibration", summary, "what was found is right")
+        self.assertLess(self.error_m(again), 0.3 * self.error_m(as_told))
+
+    def test_words_that_mean_nothing(self):
+        done = waymark("run", self.room, "-o", self.folder / "none", "--set", "calibration.refine=maybe")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("expected auto, on or off", done.stderr)
+
+
+if __name__ == "__main__":
+    unittest.main()
