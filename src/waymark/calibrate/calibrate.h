@@ -14,6 +14,7 @@
 
 namespace waymark {
 
+/// What is known, and how the search is followed.
 struct CalibrateOptions {
   std::optional<double> fov_deg;      ///< Horizontal field of view, if it is roughly known.
   int seed = 0;                       ///< Of all random numbers.
@@ -24,10 +25,10 @@ struct CalibrateOptions {
 
 /// What images tell of the camera that took them.
 struct EstimatedCalibration {
-  LensModel model = LensModel::kPerspective;
-  CameraDescription camera;                ///< Of the images as they are.
-  LensChange sigmas = LensChange::Zero();  ///< Standard deviations of its numbers.
-  double fov_deg = 0.0;                    ///< Horizontal, distortion included.
+  LensModel model = LensModel::kPerspective;  ///< The one that fits best.
+  CameraDescription camera;                   ///< Of the images as they are.
+  LensChange sigmas = LensChange::Zero();     ///< Standard deviations of its numbers.
+  double fov_deg = 0.0;                       ///< Horizontal, distortion included.
   bool is_sure = false;        ///< Whether the motion told the focal length, within some percent.
   std::string reason;          ///< What decided, in words.
   std::size_t num_frames = 0;  ///< That were looked at.

@@ -52,12 +52,12 @@ double horizontal_fov_rad(const Camera& camera);
 /// The camera that is described; null where there is none.
 std::shared_ptr<const Camera> make_if_possible(const CameraDescription& description);
 
-/// The camera with its numbers changed, as described and made; nothing where there is no such
-/// camera.
+/// A camera with its numbers changed.
 struct Lens {
-  CameraDescription description;
-  std::shared_ptr<const Camera> camera;
+  CameraDescription description;         ///< Its numbers.
+  std::shared_ptr<const Camera> camera;  ///< Made of them; never null.
 };
+/// The camera that is described with its numbers changed; nothing where there is no such camera.
 std::optional<Lens> changed(const CameraDescription& description, const LensChange& change);
 
 /// The camera of images that are larger by a factor; the corner of the image stays where it is.
