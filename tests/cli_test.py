@@ -170,7 +170,6 @@ class Inputs(CliTest):
 
     def test_tum(self):
         source = self.sequence("rgbd")
-        self.assert_fails(self.run_on(source), 2, "-c")
         summary = self.assert_maps(source, "-c", source / "camchain.yaml")
         self.assertEqual(summary["setup"], "rgbd")
 
