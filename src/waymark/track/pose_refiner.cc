@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/pose_refiner.h"
 
+#include "waymark/image/pyramid.h"
+
 namespace waymark {
 namespace {
 
@@ -11,14 +13,25 @@ constexpr double kMinInlierRatio = 0.5;
 /// A start's poses are off by what little parallax it had.
 constexpr double kRefineRadiusPx = 20.0;
 
+SeenLandmark see(const Features& features, std::uint32_t feature, LandmarkId landmark) {
+  const Keypoint& keypoint = features.keypoints[feature];
+  const Measurement measured = features.measurement(feature);
+  return {landmark,
+          keypoint.x_px,
+          keypoint.y_px,
+          measured.inverse_range,
+          measured.inverse_range_sigma,
+          keypoint.level,
+          keypoint.camera};
+}
+
 }  // namespace
 
 std::vector<SeenLandmark> seen_landmarks(const Features& features,
                                          std::span<const LandmarkId> landmarks) {
   std::vector<SeenLandmark> seen;
   for (std::uint32_t feature = 0; feature < landmarks.size(); ++feature) {
-    if (!landmarks[feature].is_valid()) continue;
-    seen.push_back({features.measurement(feature), landmarks[feature]});
+    if (landmarks[feature].is_valid()) seen.push_back(see(features, feature, landmarks[feature]));
   }
   return seen;
 }
@@ -27,10 +40,8 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
                                           std::span<const SeenLandmark> seen,
                                           const Rigid3& rig_from_world) {
   observations_.clear();
-  for (const SeenLandmark& one : seen) {
-    const LandmarkId living = map.resolve(one.landmark);
-    if (!living.is_valid()) continue;
-    observations_.add(map.landmarks().at(living).position_in_world, one);
+  for (std::size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
+    measure(map, seen, static_cast<std::uint8_t>(camera));
   }
   if (observations_.size() < kMinObservations) return std::nullopt;
   const PoseEstimate estimate =
@@ -41,6 +52,30 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
     return std::nullopt;
   }
   return estimate.rig_from_world;
+}
+
+void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen, std::uint8_t camera) {
+  living_.clear();
+  pixels_.clear();
+  level_scales_.clear();
+  for (const SeenLandmark& one : seen) {
+    if (one.camera != camera || !map.resolve(one.landmark).is_valid()) continue;
+    living_.push_back(&one);
+    pixels_.emplace_back(one.x_px, one.y_px);
+    level_scales_.push_back(static_cast<float>(Pyramid::scale(one.level)));
+  }
+  const TangentArrays& tangents =
+      tangents_.compute(*rig_->cameras[camera].camera, pixels_, level_scales_);
+  for (std::size_t i = 0; i < living_.size(); ++i) {
+    if (!tangents.is_valid[i]) continue;
+    const SeenLandmark& one = *living_[i];
+    observations_.add(map.landmarks().at(map.resolve(one.landmark)).position_in_world,
+                      {camera,
+                       tangents.bearings[i],
+                       tangents.level_pixel_from_bearing[i],
+                       one.inverse_range,
+                       one.inverse_range_sigma});
+  }
 }
 
 std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
@@ -56,7 +91,7 @@ std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
   std::vector<SeenLandmark> seen;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
-    seen.push_back({features.measurement(matches.features[i]), set.ids[i]});
+    seen.push_back(see(features, matches.features[i], set.ids[i]));
   }
   return seen;
 }

@@ -2,20 +2,29 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <span>
 #include <vector>
 
+#include "waymark/camera/tangent.h"
 #include "waymark/map/map.h"
 #include "waymark/match/projection.h"
 #include "waymark/optimize/pose.h"
 
 namespace waymark {
 
-/// What a feature measured of a landmark, without the rest of the frame.
-struct SeenLandmark : Measurement {
+/// What a feature saw of a landmark, without the rest of the frame: what it measured follows from
+/// that and the camera. Many are kept: small.
+struct SeenLandmark {
   LandmarkId landmark;
+  float x_px = 0.0f;                 ///< Of level 0, as in Keypoint.
+  float y_px = 0.0f;                 ///< The same.
+  float inverse_range = 0.0f;        ///< As in Measurement.
+  float inverse_range_sigma = 0.0f;  ///< As in Measurement.
+  std::uint8_t level = 0;            ///< Of the pyramid.
+  std::uint8_t camera = 0;           ///< Index in the rig.
 };
 
 /// The features of a frame that show a landmark. landmarks: per feature, invalid where none.
@@ -30,8 +39,8 @@ class PoseRefiner {
  public:
   explicit PoseRefiner(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
 
-  /// Pose of a frame from what it saw of landmarks that still live; nothing if too few do, or too
-  /// few agree on a pose near the given one.
+  /// Pose of a frame from what it saw of landmarks that still live, as the rig measures it; nothing
+  /// if too few do, or too few agree on a pose near the given one.
   std::optional<Rigid3> refine(const Map& map,
                                std::span<const SeenLandmark> seen,
                                const Rigid3& rig_from_world);
@@ -43,8 +52,14 @@ class PoseRefiner {
                                  const Rigid3& rig_from_world);
 
  private:
+  void measure(const Map& map, std::span<const SeenLandmark> seen, std::uint8_t camera);
+
   std::shared_ptr<const Rig> rig_;
   ProjectionMatcher matcher_;
+  TangentComputer tangents_;
+  std::vector<const SeenLandmark*> living_;
+  std::vector<Eigen::Vector2d> pixels_;
+  std::vector<float> level_scales_;
   PoseObservations observations_;
   PoseWorkspace workspace_;
 };

@@ -19,7 +19,7 @@ namespace waymark {
 /// so that memory per frame stays small in sessions of any length, and at rest.
 class TrajectoryMemory {
  public:
-  static constexpr std::size_t kMaxUnsettled = 2000;
+  static constexpr std::size_t kMaxUnsettled = 600;
   static constexpr std::size_t kMaxUnposed = 300;
   static constexpr std::uint32_t kMaxSinceKeyframe = 300;
 

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include "waymark/camera/perspective.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/track/test_map.h"
 
 namespace waymark {
@@ -88,6 +90,18 @@ TEST_F(TrajectoryMemoryTest, FillsGapsFromBothSides) {
   }
   EXPECT_EQ(memory_.entries()[5].state, FrameState::kLost);
   EXPECT_EQ(memory_.entries()[6].state, FrameState::kLost) << "nothing known beside it";
+}
+
+TEST_F(TrajectoryMemoryTest, MeasuresWhatFramesSawAsCalibratedSince) {
+  auto told = std::make_shared<Rig>(*scene_.rig);
+  told->cameras[0].camera = std::make_shared<PerspectiveCamera>(
+      PerspectiveModel({380.0, 380.0}, {319.5, 239.5}), 640, 480);
+  view_.features = measure_anew(*view_.features, *told);
+  memory_.look_with(told);
+  add_stale(1);
+  memory_.look_with(scene_.rig);
+  memory_.settle(scene_.map);
+  EXPECT_LT(error_m(1), 0.01);
 }
 
 TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
