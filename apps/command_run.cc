@@ -154,10 +154,9 @@ void write_calibration(const Session& session, const std::filesystem::path& fold
 
 /// What the images have changed beyond doubt, in one line; empty if nothing.
 std::string describe_refined(const std::vector<CalibrationEstimate>& calibration) {
-  constexpr double kSigmas = 3.0;
   std::string changes;
   for (const CalibrationEstimate& estimate : calibration) {
-    if (std::abs(estimate.change) <= kSigmas * estimate.sigma) continue;
+    if (!estimate.is_changed()) continue;
     changes += fmt::format("{}{} {:.6g} -> {:.6g} +- {:.2g}",
                            changes.empty() ? "calibration changed: " : ", ",
                            estimate.name,

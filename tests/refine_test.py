@@ -4,10 +4,13 @@
 """A calibration that is off is mended along with the map, and given back."""
 import json
 import pathlib
+import re
+import subprocess
 import tempfile
 import unittest
 
-from cli_support import CAMERA, waymark
+from cli_support import CAMERA, PROGRAM, waymark
+from viewer_client import ViewerClient
 
 TURN = 2e-3  # rad
 
@@ -31,6 +34,20 @@ class Refine(unittest.TestCase):
         self.assertEqual(done.returncode, 0, done.stderr)
         return out, json.loads((out / "summary.json").read_text()), done.stderr
 
+    def run_in_view(self, name):
+        """The same with a viewer: what that says of the calibration at the end, too."""
+        out = self.folder / name
+        with subprocess.Popen([PROGRAM, "run", self.room, "-o", out, "--viewer", "0"], stdout=subprocess.PIPE,
+                              stderr=subprocess.STDOUT, text=True) as program:
+            self.addCleanup(program.kill)
+            url = next(found[1] for found in (re.search(r"open (http://\S+)", line) for line in program.stdout) if found)
+            client = ViewerClient(url)
+            self.addCleanup(client.close)
+            client.wait_for(lambda c: c.status and c.status["phase"] == "done", seconds=300)
+            said = program.stdout.read()
+        self.assertEqual(program.returncode, 0, said)
+        return out, json.loads((out / "summary.json").read_text()), said, client.status["calibration"]
+
     def error_m(self, out):
         done = waymark("eval", out / "trajectory.txt", self.room / "groundtruth.txt", "--align", "se3", "--json")
         return json.loads(done.stdout)["ate_rmse_m"]
@@ -40,11 +57,14 @@ class Refine(unittest.TestCase):
         self.assertNotIn("refined_calibration", summary)
         self.assertFalse((as_told / "calibration.yaml").exists())
 
-        refined, summary, said = self.run_with("refined")
+        refined, summary, said, told = self.run_in_view("refined")
         self.assertIn("calibration changed: ", said)
         found = {each["name"]: each for each in summary["refined_calibration"]}
         self.assertLess(abs(abs(found["cam1.turn_y"]["change"]) - TURN), 0.25 * TURN)
         self.assertLess(self.error_m(refined), 0.3 * self.error_m(as_told))
+        self.assertIn("cam1.turn_y", [each["name"] for each in told])
+        for each in told:
+            self.assertEqual(each, {key: found[each["name"]][key] for key in ("name", "given", "change", "sigma")})
 
         again, summary, _ = self.run_with("again", "-c", refined / "calibration.yaml")
         self.assertNotIn("refined_calibration", summary, "what was found is right")

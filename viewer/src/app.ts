@@ -7,6 +7,7 @@ import { Scene } from "./scene/scene";
 import type { ViewName } from "./scene/view";
 import { Store } from "./store/store";
 import type { Hello, Status } from "./text_messages";
+import { CalibrationPanel } from "./ui/calibration_panel";
 import { CameraPanel } from "./ui/camera_panel";
 import { Controls } from "./ui/controls";
 import { byId, Choice, setIcon, setText } from "./ui/dom";
@@ -34,6 +35,7 @@ export class App implements Listener {
   private readonly session = new SessionPanel();
   private readonly controls = new Controls(this.connection);
   private readonly camera = new CameraPanel();
+  private readonly calibration = new CalibrationPanel();
   private readonly legend = new Legend(this.scene);
   private readonly notice = new Notice();
   private readonly viewChoice: Choice<ViewName>;
@@ -88,6 +90,7 @@ export class App implements Listener {
     this.status = status;
     this.session.setStatus(status);
     this.controls.setStatus(status);
+    this.calibration.show(status.calibration);
     this.report.statusTaken(status);
   }
 

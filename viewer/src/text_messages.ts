@@ -45,7 +45,16 @@ export interface Status {
   submaps: number;
   loops: number;
   frames_per_s: number;
+  calibration: CalibrationChange[];
   clients: number;
+}
+
+/** A number of the calibration that the images changed; in px or rad, or without a unit. */
+export interface CalibrationChange {
+  name: string;
+  given: number;
+  change: number;
+  sigma: number;
 }
 
 export interface Reply {

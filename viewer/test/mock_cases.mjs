@@ -194,6 +194,26 @@ async function worksWithoutWebGl({ cleanUp, pictures }) {
   assert.deepEqual(page.problems.filter((problem) => !problem.includes("WebGL context")), []);
 }
 
+/** What the images say of the calibration, as soon as they do and no longer than they do. */
+async function tellsOfTheCalibration(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 100 });
+  await until(page, isOpen);
+  assert.ok(await page.isHidden("#calibration"));
+  mock.calibration = [
+    { name: "cam0.fu", given: 458.654, change: 2.6513, sigma: 0.2345 },
+    { name: "cam1.turn_y", given: 0, change: -0.00203, sigma: 0.000031 },
+  ];
+  await page.waitForSelector("#calibration:not([hidden])");
+  const cells = await page.$$eval("#calibration tr", (rows) => rows.map((row) => [...row.cells].map((cell) => cell.textContent)));
+  assert.deepEqual(cells.slice(1), [["cam0.fu", "458.65", "461.31", "0.23"], ["cam1.turn_y, mrad", "0.000", "-2.030", "0.031"]]);
+  const fits = await page.$eval("#calibration", (panel) => panel.scrollWidth <= panel.clientWidth);
+  assert.ok(fits, "it is no wider than its place");
+  await picture(page, `${context.pictures}/desktop_calibration.png`);
+  mock.calibration = [];
+  await page.waitForSelector("#calibration", { state: "hidden" });
+  assert.deepEqual(page.problems, []);
+}
+
 /** The page is as wide as its window and the picture as wide as its place, whatever they were before. */
 async function followsItsWindow(context) {
   const { mock, page } = await serve(context, { world: "walk", skip: 200 }, { size: { width: 1280, height: 800 } });
@@ -245,6 +265,6 @@ async function drawsLargeMaps(context) {
 
 export const mockCases = [
   growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
-  saysWhatIsMissing, worksWithoutWebGl, followsItsWindow, followsItsScreen,
+  saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, followsItsWindow, followsItsScreen,
   drawsLargeMaps,
 ];

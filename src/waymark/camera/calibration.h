@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
 #include <optional>
@@ -39,6 +40,9 @@ struct CalibrationEstimate {
   double change = 0.0;       ///< Of the value in use from the one given.
   double given_sigma = 0.0;  ///< Standard deviation that was assumed of what was given.
   double sigma = 0.0;        ///< The same of the value in use.
+
+  /// Whether the images contradict what was given.
+  bool is_changed() const { return std::abs(change) > 3.0 * sigma; }
 };
 
 /// The numbers of a rig as one vector: per camera the intrinsics and the distortion; of each camera

@@ -39,6 +39,18 @@ json names(std::size_t count) {
 
 double rounded(double value) { return std::round(1e3 * value) / 1e3; }
 
+/// Numbers keep their digits: distortion is small.
+json array_of(const std::vector<CalibrationEstimate>& calibration) {
+  json list = json::array();
+  for (const CalibrationEstimate& estimate : calibration) {
+    list.push_back({{"name", estimate.name},
+                    {"given", estimate.given},
+                    {"change", estimate.change},
+                    {"sigma", estimate.sigma}});
+  }
+  return list;
+}
+
 /// Distance of a feature from where its landmark should be seen.
 double error_px(const Keyframe& keyframe, std::uint32_t feature, const Landmark& landmark) {
   const Features& features = *keyframe.features;
@@ -205,6 +217,7 @@ std::string format_status(const SessionStatus& status, const Map& map, std::size
        {"submaps", num_submaps},
        {"loops", map.measured_loop_edges().size()},
        {"frames_per_s", rounded(status.frames_per_s)},
+       {"calibration", array_of(status.calibration)},
        {"clients", num_clients}});
 }
 

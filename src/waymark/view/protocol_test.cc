@@ -121,10 +121,15 @@ TEST(Protocol, TextsHaveWhatTheDocumentPromises) {
   EXPECT_EQ(hello["reasons"].size(), 10u);
   EXPECT_EQ(hello["reasons"][9], "late");
   EXPECT_EQ(hello["controls"].size(), 5u);
-  const json status = json::parse(format_status(SessionStatus(), Map(), 3));
+  SessionStatus now;
+  now.calibration = {{"cam0.k1", -0.283, 2.5e-5, 1e-2, 3e-6}};
+  const json status = json::parse(format_status(now, Map(), 3));
   EXPECT_EQ(status["phase"], "starting");
   EXPECT_EQ(status["frame"], nullptr);
   EXPECT_EQ(status["clients"], 3);
+  EXPECT_EQ(
+      status["calibration"],
+      json::parse(R"([{"name": "cam0.k1", "given": -0.283, "change": 2.5e-5, "sigma": 3e-6}])"));
   EXPECT_EQ(status["stages_ms"].size(), hello["stages"].size());
   const json reply = json::parse(format_keyframe(Map(), KeyframeId{3}, 5));
   EXPECT_EQ(reply["ok"], false);

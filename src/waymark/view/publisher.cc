@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstring>
+#include <utility>
 #include <vector>
 
 #include "waymark/base/median.h"
@@ -58,6 +59,7 @@ void ViewPublisher::tell(const System& system,
   measure(result);
   count(result);
   update_.map = system.map();
+  note_calibration(system);
   note_frames(system, input, result);
   update_.colors.push_back(colors_of(details, input.image0));
   if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
@@ -89,6 +91,14 @@ void ViewPublisher::note_frames(const System& system,
                               filled.pose});
   }
   update_.status.num_tracked += details.filled.size();
+}
+
+/// Every estimate of the calibration is another rig.
+void ViewPublisher::note_calibration(const System& system) {
+  if (const auto rig = system.rig(); rig == std::exchange(rig_, rig)) return;
+  std::vector<CalibrationEstimate>& calibration = update_.status.calibration;
+  calibration = system.calibration();
+  std::erase_if(calibration, [](const auto& estimate) { return !estimate.is_changed(); });
 }
 
 void ViewPublisher::count(const FrameStatus& newest) {
@@ -151,6 +161,7 @@ void ViewPublisher::finish(const System& system) {
   status.phase = SessionPhase::kDone;
   status.num_tracked = 0;
   update_.map = system.map();
+  note_calibration(system);
   for (const TrajectoryFrame& frame : system.trajectory()) {
     update_.frames.push_back({{.state = frame.state, .submap = frame.submap},
                               FrameId{first_frame_.value + frame.frame.value},

@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cstddef>
 #include <deque>
+#include <memory>
 #include <optional>
 
 #include "waymark/system/system.h"
@@ -41,11 +42,13 @@ class ViewPublisher {
   void note_frames(const System& system, const FrameImages& input, const TrackingResult& result);
   void count(const FrameStatus& newest);
   void measure(const TrackingResult& result);
+  void note_calibration(const System& system);
   void push();
 
   ViewChannel& channel_;
   ViewUpdate update_;  ///< Not taken in by the viewer yet.
   FrameId first_frame_;
+  std::shared_ptr<const Rig> rig_;          ///< That the status tells of.
   std::deque<std::int64_t> timestamps_ns_;  ///< Of all frames fed.
   std::deque<float> recent_tracking_ms_;
   std::deque<Clock::time_point> recent_times_;

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "waymark/base/frame_state.h"
+#include "waymark/camera/calibration.h"
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
@@ -62,10 +63,11 @@ struct SessionStatus {
   std::size_t num_frames = 0;                                 ///< So far.
   std::optional<std::size_t> num_frames_total;                ///< Of the input, if it is known.
   std::size_t num_tracked = 0;                                ///< Frames with a pose.
-  std::size_t num_unreadable = 0;  ///< Frames whose images could not be used.
-  std::size_t num_dropped = 0;     ///< Frames that came too late.
-  std::size_t lost_count = 0;      ///< Transitions to lost.
-  double frames_per_s = 0.0;       ///< Of the recent frames.
+  std::size_t num_unreadable = 0;                ///< Frames whose images could not be used.
+  std::size_t num_dropped = 0;                   ///< Frames that came too late.
+  std::size_t lost_count = 0;                    ///< Transitions to lost.
+  double frames_per_s = 0.0;                     ///< Of the recent frames.
+  std::vector<CalibrationEstimate> calibration;  ///< What the images changed of it.
 };
 
 /// What changed in the session since the update before.
