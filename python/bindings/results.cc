@@ -168,6 +168,19 @@ void bind_statistics(py::module_& module) {
           "factor", "float: the true focal length by that of the calibration.", &FocalCheck::factor)
       .get("sigma", "float: standard deviation of the factor.", &FocalCheck::sigma)
       .get("is_off", "bool: off by more than 2 %, beyond doubt.", &FocalCheck::is_off);
+  Class<CalibrationEstimate>(module,
+                             "CalibrationEstimate",
+                             "What the images told of one number of the calibration; px, rad or 1.")
+      .get("name", "str: for example 'cam0.fu', 'cam1.turn_y'.", &CalibrationEstimate::name)
+      .get("given", "float: as the calibration says.", &CalibrationEstimate::given)
+      .get("given_sigma",
+           "float: standard deviation that was assumed of what was given.",
+           &CalibrationEstimate::given_sigma)
+      .get("change", "float: of the value in use from the one given.", &CalibrationEstimate::change)
+      .get("sigma", "float: standard deviation of the value in use.", &CalibrationEstimate::sigma)
+      .get("is_changed",
+           "bool: whether the images contradict what was given.",
+           &CalibrationEstimate::is_changed);
 }
 
 }  // namespace

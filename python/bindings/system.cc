@@ -105,6 +105,11 @@ class PythonSystem {
     return check ? std::optional(*check) : std::nullopt;
   }
 
+  std::vector<CalibrationEstimate> calibration() {
+    const Turn turn = take();
+    return system_.calibration();
+  }
+
   FrameDetails details() {
     const Turn turn = take();
     return system_.details();
@@ -250,6 +255,11 @@ Totals up to the map that map() gives: Statistics. Final after finish().)")
 
 What the residuals say of the calibration's focal length: a FocalCheck, once some 200 frames are
 mapped and where the motion tells; None before.)")
+      .def("calibration", &PythonSystem::calibration, R"(calibration(self)
+--
+
+What the images told of each number of the calibration, up to the map that map() gives: a list of
+CalibrationEstimate, empty as long as they did not contradict it. Final after finish().)")
       .def("details", &PythonSystem::details, R"(details(self)
 --
 

@@ -9,6 +9,7 @@ OUT/installed   the module, installed from the build
 OUT/stereo      a simulated stereo pair; OUT/stereo_out what the program made of it, with map.wmap
 OUT/rgbd        a simulated camera with depth; OUT/rgbd_out
 OUT/mono_out    what the program made of camera 0 of the stereo pair
+OUT/turned      a pair whose calibration leaves out that camera 1 is turned by 2 mrad
 """
 import pathlib
 import shutil
@@ -35,6 +36,8 @@ def main():
     for setup in ("stereo", "rgbd"):
         run(program, "simulate", "room", "--motion", "slide", "--camera", out / "camera.yaml",
             "--setup", setup, "--frames", NUM_FRAMES, "-o", out / setup)
+    run(program, "simulate", "room", "--motion", "loop", "--camera", out / "camera.yaml", "--setup", "stereo",
+        "--frames", 60, "--told", "turn_y=2", "-o", out / "turned")
     for setup, source in (("stereo", "stereo"), ("mono", "stereo"), ("rgbd", "rgbd")):
         run(program, "run", out / source, "-c", out / source / "camchain.yaml", "--setup", setup,
             "-o", out / f"{setup}_out", "--map-out", out / f"{setup}_out/map.wmap",

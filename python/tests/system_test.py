@@ -135,6 +135,19 @@ class Results(Test):
         self.assertFalse(trajectory.is_filled.any())
         self.assertFalse(trajectory.world_from_rig.flags.writeable)
         self.assertIsNone(system.focal_check())
+        self.assertEqual(system.calibration(), [])
+
+    def test_calibration_that_images_contradict(self):
+        with waymark.System(camchain("turned"), settings={"features.count": 300}) as system:
+            for frame in frames("turned"):
+                system.feed(frame.timestamp_ns, frame.image0, frame.image1)
+        estimates = {estimate.name: estimate for estimate in system.calibration()}
+        turn = estimates["cam1.turn_y"]
+        self.assertTrue(turn.is_changed)
+        self.assertEqual(turn.given, 0)
+        self.assertLess(abs(abs(turn.change) - 2e-3), 3e-4)
+        self.assertTrue(0 < turn.sigma < turn.given_sigma)
+        self.assertFalse(estimates["cam0.fu"].is_changed)
 
     def test_map_is_the_same_object_until_it_changes(self):
         system = waymark.System(camchain(), timing="inline")

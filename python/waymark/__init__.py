@@ -17,15 +17,15 @@ that is its camera 0, is in the world and how it stands. Units are metres, radia
 times, nanoseconds; lengths of a map made by one camera without depth have no unit. Arrays that come
 out are read-only.
 """
-from ._waymark import (NO_ID, Calibration, Camera, EstimatedCalibration, Features, FocalCheck,
-                       FrameDetails, Input, InputError, InputFrame, Keyframe, Keyframes, Landmark,
-                       Landmarks, Localizer, LoopEdge, Map, OutputError, Statistics, Submap, System,
-                       TrackingResult, Trajectory, __version__, calibrate, open_input,
-                       read_depth_image, read_grey_image)
+from ._waymark import (NO_ID, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
+                       Features, FocalCheck, FrameDetails, Input, InputError, InputFrame, Keyframe,
+                       Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, OutputError,
+                       Statistics, Submap, System, TrackingResult, Trajectory, __version__,
+                       calibrate, open_input, read_depth_image, read_grey_image)
 
 __all__ = [
-    "NO_ID", "Calibration", "Camera", "EstimatedCalibration", "Features", "FocalCheck", "FrameDetails", "Input",
-    "InputError", "InputFrame", "Keyframe", "Keyframes", "Landmark", "Landmarks", "Localizer",
+    "NO_ID", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
+    "FocalCheck", "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes", "Landmark", "Landmarks", "Localizer",
     "LoopEdge", "Map", "OutputError", "Statistics", "Submap", "System", "TrackingResult",
     "Trajectory", "__version__", "calibrate", "open_input", "read_depth_image", "read_grey_image",
 ]
