@@ -76,7 +76,7 @@ std::vector<std::string> mistakes_of(const std::vector<InputFrame>& frames,
   input->info().setup = told.cameras.size() > 1 ? Setup::kStereo
                         : told.depth_factor     ? Setup::kRgbd
                                                 : Setup::kMono;
-  PreparedInput prepared{std::move(input), {}, make_rig(told), {}};
+  PreparedInput prepared{std::move(input), {}, make_rig(told), {}, {}};
   prepared.settings.features.count = 500;
   if (told.depth_factor) prepared.settings.depth.factor = *told.depth_factor;
   std::vector<std::string> heard;
