@@ -106,17 +106,14 @@ void set_ranges(const OpenvslamKeyframe& keyframe,
                 Features& features) {
   features.range_m.assign(features.num_primary, 0.0f);
   features.inverse_range_sigma.assign(features.num_primary, 0.0f);
-  if (setup == Setup::kMono || keyframe.depths_m.empty()) return;
+  if (setup != Setup::kRgbd || keyframe.depths_m.empty()) return;
   for (std::size_t i = 0; i < keyframe.depths_m.size(); ++i) {
     const std::uint32_t feature = feature_of_keypoint[i];
     if (feature == kNoFeature || !(keyframe.depths_m[i] > 0.0f)) continue;
     const float z = features.bearings[feature].z();
     if (!(z > 0.0f)) continue;
-    if (setup == Setup::kStereo && features.partner[feature] == kNoFeature) continue;
     features.range_m[feature] = keyframe.depths_m[i] / z;
-    if (setup == Setup::kRgbd) {
-      features.inverse_range_sigma[feature] = static_cast<float>(z * kInverseDepthSigma);
-    }
+    features.inverse_range_sigma[feature] = static_cast<float>(z * kInverseDepthSigma);
   }
 }
 
@@ -158,6 +155,7 @@ OpenvslamFeatures convert_openvslam_features(const OpenvslamKeyframe& keyframe,
     for (std::size_t i = 0; i < is_valid.size(); ++i) *is_used[i] = is_valid[i];
     if (std::find(is_valid.begin(), is_valid.end(), 0) != is_valid.end()) continue;
     set_ranges(keyframe, view.setup, result.feature_of_keypoint, features);
+    if (view.rig->cameras.size() == 2) measure_stereo_ranges(*view.rig, features);
     result.features = std::make_shared<const Features>(std::move(features));
     return result;
   }

@@ -255,9 +255,6 @@ void Importer::add_landmark(const OpenvslamLandmark& landmark,
   const LandmarkId id = map_.add_landmark(submap, landmark.position_in_world, reference);
   for (const Observation& observation : observations) {
     map_.observe(observation.keyframe, observation.feature, id);
-    const Features& features = *map_.keyframes().at(observation.keyframe).features;
-    const std::uint32_t partner = features.partner[observation.feature];
-    if (partner != kNoFeature) map_.observe(observation.keyframe, partner, id);
   }
   const std::int64_t num_visible = std::max(landmark.num_visible, landmark.num_found);
   map_.count_sightings(

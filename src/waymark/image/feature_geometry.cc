@@ -2,12 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/image/feature_geometry.h"
 
+#include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/camera/tangent.h"
-#include "waymark/geometry/triangulation.h"
 #include "waymark/image/pyramid.h"
+#include "waymark/image/range_precision.h"
+#include "waymark/image/stereo_curve.h"
 
 namespace waymark {
 namespace {
@@ -45,30 +48,14 @@ void derive_of_camera(std::size_t index,
   }
 }
 
-/// Below this disparity, in pixels of the level, a feature may as well be infinitely far away.
-constexpr double kMinStereoDisparityPx = 0.5;
-
-/// Range of a primary feature from its partner in camera 1; 0 where that is unknown.
-float stereo_range_m(const Rig& rig, const Features& features, std::uint32_t feature) {
-  const Rigid3 cam0_from_cam1 = rig.cameras[0].cam_from_rig * rig.cameras[1].cam_from_rig.inverse();
-  const auto point = triangulate(features.bearings[feature].cast<double>(),
-                                 features.bearings[features.partner[feature]].cast<double>(),
-                                 cam0_from_cam1,
-                                 kMinStereoDisparityPx * features.size_rad[feature]);
-  return point ? static_cast<float>(point->norm()) : 0.0f;
-}
-
-/// before: the same with the bearings that the ranges were measured along.
-void derive_ranges(const Rig& rig, const Features& before, Features& features) {
+/// Of the depth image, which measures along z. before: the same with the bearings that the ranges
+/// were measured along.
+void derive_depth_ranges(const Features& before, Features& features) {
   for (std::uint32_t i = 0; i < features.num_primary; ++i) {
-    if (features.partner[i] != kNoFeature) {
-      features.range_m[i] = stereo_range_m(rig, features, i);
-    } else if (features.inverse_range_sigma[i] > 0.0f) {
-      // What is measured is the depth along z.
-      const float factor = before.bearings[i].z() / features.bearings[i].z();
-      features.range_m[i] *= factor;
-      features.inverse_range_sigma[i] /= factor;
-    }
+    if (features.partner[i] != kNoFeature || features.inverse_range_sigma[i] == 0.0f) continue;
+    const float factor = before.bearings[i].z() / features.bearings[i].z();
+    features.range_m[i] *= factor;
+    features.inverse_range_sigma[i] /= factor;
   }
 }
 
@@ -99,6 +86,26 @@ std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features) {
   return is_valid;
 }
 
+void measure_stereo_ranges(const Rig& rig, Features& features) {
+  constexpr double kFarAway = 1e9;  // In metres: as good as infinite.
+  const Rigid3 cam1_from_cam0 = rig.cameras[1].cam_from_rig * rig.cameras[0].cam_from_rig.inverse();
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    const std::uint32_t partner = features.partner[i];
+    if (partner == kNoFeature) continue;
+    features.range_m[i] = features.inverse_range_sigma[i] = 0.0f;
+    const EpipolarRay ray(cam1_from_cam0, features.bearings[i].cast<double>().normalized());
+    const Eigen::Vector3d seen = features.bearings[partner].cast<double>();
+    const double angle_rad = std::atan2(seen.dot(ray.toward), seen.dot(ray.infinity));
+    const double off_rad = kStereoSigmaPx * features.size_rad[partner];
+    const double inverse_range = ray.inverse_range(angle_rad);
+    const double sigma =
+        0.5 * (ray.inverse_range(angle_rad + off_rad) - ray.inverse_range(angle_rad - off_rad));
+    if (!(static_cast<float>(sigma) > 0.0f)) continue;
+    features.range_m[i] = static_cast<float>(std::clamp(1.0 / inverse_range, -kFarAway, kFarAway));
+    features.inverse_range_sigma[i] = static_cast<float>(sigma);
+  }
+}
+
 std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig) {
   auto anew = std::make_shared<Features>(features);
   const std::vector<std::uint8_t> is_valid = derive_geometry(rig, *anew);
@@ -108,7 +115,8 @@ std::shared_ptr<const Features> measure_anew(const Features& features, const Rig
     anew->level_pixel_from_bearing[i] = features.level_pixel_from_bearing[i];
     anew->size_rad[i] = features.size_rad[i];
   }
-  derive_ranges(rig, features, *anew);
+  derive_depth_ranges(features, *anew);
+  if (rig.cameras.size() == 2) measure_stereo_ranges(rig, *anew);
   return anew;
 }
 

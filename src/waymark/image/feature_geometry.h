@@ -19,6 +19,10 @@ namespace waymark {
 /// bearing; where it has none, what was filled in is unspecified.
 std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features);
 
+/// Ranges of the primary features that have a partner in camera 1, with their standard deviations:
+/// from the angle between the two in the epipolar plane. rig: two cameras, some distance apart.
+void measure_stereo_ranges(const Rig& rig, Features& features);
+
 /// The same features as a rig of the same cameras measures them that is calibrated otherwise:
 /// bearings, level_pixel_from_bearing, sizes and ranges anew. Where a pixel has no bearing any more
 /// all of that stays as it was.

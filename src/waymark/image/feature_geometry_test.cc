@@ -10,6 +10,8 @@
 #include "waymark/camera/perspective.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/image/image_testing.h"
+#include "waymark/image/pyramid.h"
+#include "waymark/image/range_precision.h"
 
 namespace waymark {
 namespace {
@@ -57,6 +59,62 @@ TEST(FeatureGeometry, SaysWhichPixelsHaveNoBearing) {
   features.keypoints = {{.x_px = 160.0f, .y_px = 120.0f}, {.x_px = 1e6f, .y_px = 120.0f}};
   features.num_primary = 2;
   EXPECT_EQ(derive_geometry(make_rig(), features), (std::vector<std::uint8_t>{1, 0}));
+}
+
+/// A feature that shows a point in both cameras; found in camera 1 beside where that is, in pixels
+/// of level 0 along its rows.
+Features see_pair(const Rig& rig, const Eigen::Vector3d& point_in_rig, double off_px) {
+  Features features;
+  features.num_primary = 1;
+  features.partner = {1, 0};
+  features.range_m = features.inverse_range_sigma = {0.0f};
+  for (std::uint8_t c = 0; c < 2; ++c) {
+    const Eigen::Vector3d point_in_cam = rig.cameras[c].cam_from_rig * point_in_rig;
+    Eigen::Vector2d pixel;
+    std::uint8_t is_visible = 0;
+    rig.cameras[c].camera->project({&point_in_cam, 1}, {&pixel, 1}, {&is_visible, 1});
+    EXPECT_TRUE(is_visible);
+    features.keypoints.push_back({.x_px = static_cast<float>(pixel.x() + c * off_px),
+                                  .y_px = static_cast<float>(pixel.y()),
+                                  .level = 2,
+                                  .camera = c});
+  }
+  derive_geometry(rig, features);
+  measure_stereo_ranges(rig, features);
+  return features;
+}
+
+TEST(FeatureGeometry, RangesOfAPairHaveThePrecisionOfItsParallax) {
+  const Rig rig = make_rig();
+  const Eigen::Vector3d point(0.4, -0.3, 2.5);
+  const Features exact = see_pair(rig, point, 0.0);
+  EXPECT_NEAR(exact.range_m[0], point.norm(), 1e-3);
+  const double sigma_px = kStereoSigmaPx * Pyramid::scale(2);
+  const Features off = see_pair(rig, point, -sigma_px);
+  const double change = 1.0 / off.range_m[0] - 1.0 / exact.range_m[0];
+  EXPECT_NEAR(change / exact.inverse_range_sigma[0], 1.0, 0.05);
+}
+
+TEST(FeatureGeometry, RangesOfWhatIsFarAwayMayLieBeyondInfinity) {
+  const Eigen::Vector3d far_away(500.0, 100.0, 2000.0);
+  const Features beyond = see_pair(make_rig(), far_away, 1.0);
+  EXPECT_LT(beyond.range_m[0], 0.0f);
+  EXPECT_GT(beyond.inverse_range_sigma[0], 0.0f);
+  EXPECT_FALSE(has_reliable_range(beyond, 0));
+  EXPECT_GT(see_pair(make_rig(), far_away, -1.0).range_m[0], 0.0f);
+}
+
+TEST(FeatureGeometry, IsMeasuredAnewByAnotherCalibration) {
+  const Rig rig = make_rig();
+  const Features before = see_pair(rig, {0.4, -0.3, 2.5}, 0.0);
+  Rig turned = rig;
+  turned.cameras[1].cam_from_rig.rotation =
+      Eigen::AngleAxisd(2e-3, Eigen::Vector3d::UnitY()) * rig.cameras[1].cam_from_rig.rotation;
+  Features expected = before;
+  measure_stereo_ranges(turned, expected);
+  const auto anew = measure_anew(before, turned);
+  EXPECT_EQ(anew->range_m, expected.range_m);
+  EXPECT_GT(std::abs(anew->range_m[0] / before.range_m[0] - 1.0f), 0.01f);
 }
 
 }  // namespace

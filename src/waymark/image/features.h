@@ -43,17 +43,19 @@ struct Features {
   std::vector<float> size_rad;  ///< Angle of one pixel of the feature's level.
   /// The feature of camera 1 that belongs to a primary feature, and back; kNoFeature where none.
   std::vector<std::uint32_t> partner;
-  /// Distance along the bearing in metres, derived from stereo or measured by the depth image;
-  /// 0 where unknown. num_primary entries.
+  /// Distance along the bearing in metres, from stereo or the depth image; 0 where unknown,
+  /// negative where the two cameras see the feature beyond infinity, as noise makes them do with
+  /// what is far away. num_primary entries.
   std::vector<float> range_m;
-  /// RGB-D only: standard deviation of the inverse range in 1/m; 0 where there is no measurement.
+  /// Standard deviation of the inverse range in 1/m; 0 where there is no range.
   std::vector<float> inverse_range_sigma;
   FeatureGrid grid;  ///< Of the primary features, by level-0 pixel.
 
   /// Features of both cameras.
   std::size_t size() const { return keypoints.size(); }
 
-  /// What a feature measures; those of camera 1 have no range from the depth image.
+  /// What a feature measures. Features of camera 1 are found again where those of camera 0 are,
+  /// with the errors of these: what they add is the range.
   Measurement measurement(std::uint32_t feature) const {
     Measurement measured{
         keypoints[feature].camera, bearings[feature], level_pixel_from_bearing[feature]};

@@ -11,6 +11,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/image/brief.h"
+#include "waymark/image/feature_geometry.h"
 
 namespace waymark {
 namespace {
@@ -204,9 +205,9 @@ void FrameBuilder::add_stereo(const FrameImages& images, Features& features) {
     keypoint.camera = 1;
     features.partner[match.primary] = static_cast<std::uint32_t>(features.size());
     features.partner.push_back(match.primary);
-    features.range_m[match.primary] = match.range_m;
     append(features, keypoint, tangents, i);
   }
+  measure_stereo_ranges(rig_, features);
 }
 
 void FrameBuilder::reserve(Features& features, std::size_t count) {

@@ -28,9 +28,6 @@ constexpr float kMinToldAcross = 0.5f;
 /// Patches may be squeezed, in any direction, by this much at most.
 constexpr double kMaxStretch = 2.0;
 
-/// Disparity in pixels of the level below which a range is unknown.
-constexpr double kMinDisparityPx = 0.5;
-
 Rigid3 second_from_first(const Rig& rig) {
   if (rig.cameras.size() != 2) {
     throw InputError("rig",
@@ -92,13 +89,9 @@ std::span<const StereoMatch> StereoSearch::search(const Pyramid& image0,
   for (std::size_t i = 0; i < candidates_.size(); ++i) {
     if (!is_visible_[i]) continue;
     const Candidate& candidate = candidates_[i];
-    const double inverse_range = curves_.ray(candidate.primary).inverse_range(candidate.angle_rad);
-    const bool is_far =
-        candidate.angle_rad < kMinDisparityPx * features.size_rad[candidate.primary];
     matches_.push_back({candidate.primary,
                         pixels_[i] + candidate.off_curve,
-                        static_cast<std::uint8_t>(candidate.level1),
-                        is_far ? 0.0f : static_cast<float>(1.0 / inverse_range)});
+                        static_cast<std::uint8_t>(candidate.level1)});
   }
   return matches_;
 }

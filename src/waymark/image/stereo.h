@@ -24,9 +24,6 @@ struct StereoMatch {
   std::uint32_t primary;  ///< Index of the feature of camera 0.
   Eigen::Vector2d pixel;  ///< In camera 1, level 0, sub-pixel.
   std::uint8_t level;     ///< Pyramid level of camera 1 that shows it as large as camera 0 does.
-  /// Distance along the bearing of camera 0 in metres; 0 (unknown) where the disparity is below
-  /// half a pixel of the level, that is, where the feature may as well be infinitely far away.
-  float range_m;
 };
 
 /// Finds features of camera 0 in the image of camera 1 by search along their epipolar curves: the

@@ -263,7 +263,7 @@ TEST_F(MapDamage, Arrays) {
   const std::vector<Case> cases = {
       {"keyframe", "pixel", 20, raw(NAN), "pixel holds nan as number 5"},
       {"keyframe", "size_rad", 0, raw(0.0f), "size_rad holds 0"},
-      {"keyframe", "range_m", 0, raw(-1.0f), "range_m holds -1"},
+      {"keyframe", "range_m", 0, raw(-HUGE_VALF), "range_m holds -inf"},
       {"keyframe",
        "level_pixel_from_bearing",
        20,

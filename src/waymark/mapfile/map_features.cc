@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/mapfile/map_reader.h"
 
@@ -64,10 +65,19 @@ void check_keypoint(const MapRecord& record,
 }
 
 void check_range(const MapRecord& record, const Features& features, std::size_t i) {
-  if (features.range_m[i] > 0.0f || features.inverse_range_sigma[i] == 0.0f) return;
+  if (features.range_m[i] != 0.0f || features.inverse_range_sigma[i] == 0.0f) return;
   record.fail(fmt::format("inverse_range_sigma of feature {} is {} without a range, expected 0",
                           i,
                           features.inverse_range_sigma[i]));
+}
+
+/// Whether ranges from stereo come without their precision, as in earlier maps.
+bool lacks_precision(const Features& features) {
+  for (std::size_t i = 0; i < features.num_primary; ++i) {
+    const bool has_range = features.partner[i] != kNoFeature && features.range_m[i] != 0.0f;
+    if (has_range && features.inverse_range_sigma[i] == 0.0f) return true;
+  }
+  return false;
 }
 
 void check_partner(const MapRecord& record, const Features& features, std::size_t i) {
@@ -102,7 +112,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
       record.array<Matrix23f>("level_pixel_from_bearing", count, kSlopeRange);
   features->size_rad = record.array<float>("size_rad", count, kFeatureSizeRange);
   features->partner = record.array<std::uint32_t>("partner", count);
-  features->range_m = record.array<float>("range_m", num_primary, kNotNegative);
+  features->range_m = record.array<float>("range_m", num_primary, kLengthRange);
   features->inverse_range_sigma =
       record.array<float>("inverse_range_sigma", num_primary, kNotNegative);
   for (std::size_t i = 0; i < count; ++i) {
@@ -110,6 +120,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
     check_partner(record, *features, i);
     if (i < num_primary) check_range(record, *features, i);
   }
+  if (lacks_precision(*features) && rig.cameras.size() == 2) measure_stereo_ranges(rig, *features);
   const Camera& camera = *rig.cameras[0].camera;
   features->grid =
       FeatureGrid(camera.width_px(),

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <functional>
+#include <map>
 #include <sstream>
 
 #include "waymark/base/testing/errors.h"
@@ -111,6 +112,38 @@ TEST(MapFile, SavingWhatWasLoadedGivesTheSameBytes) {
     std::istringstream stream(bytes);
     EXPECT_EQ(read_map(stream, "stream").map->broken_invariants(), "");
   }
+}
+
+/// Its ranges from stereo had no precision, and features of camera 1 showed landmarks.
+TEST(MapFile, ReadsEarlierMaps) {
+  const TemporaryFolder folder;
+  StoredMap stored = stored_map(1);
+  MapParts parts = take_apart(*stored.map);
+  std::map<KeyframeId, std::vector<LandmarkId>> expected;
+  for (auto& [id, keyframe] : parts.keyframes) {
+    expected[id] = keyframe.landmarks;
+    auto features = std::make_shared<Features>(*keyframe.features);
+    features->inverse_range_sigma.assign(features->num_primary, 0.0f);
+    for (std::size_t i = features->num_primary; i < features->size(); ++i) {
+      keyframe.landmarks[i] = keyframe.landmarks[features->partner[i]];
+    }
+    keyframe.features = std::move(features);
+  }
+  stored.map = Map::restore(std::move(parts)).freeze();
+  save_map(folder / "old.wmap", stored);
+  const StoredMap loaded = load_map(folder / "old.wmap");
+  EXPECT_EQ(loaded.map->broken_invariants(), "");
+  int num_pairs = 0;
+  loaded.map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    EXPECT_EQ(keyframe.landmarks, expected.at(id));
+    const Features& features = *keyframe.features;
+    for (std::size_t i = 0; i < features.num_primary; ++i) {
+      if (features.partner[i] == kNoFeature) continue;
+      ++num_pairs;
+      EXPECT_EQ(features.range_m[i] != 0.0f, features.inverse_range_sigma[i] > 0.0f);
+    }
+  });
+  EXPECT_GT(num_pairs, 0);
 }
 
 TEST(MapFile, KeepsEmptyMaps) {

@@ -132,6 +132,10 @@ void MapReader::read_keyframe(MapRecord& record) {
   keyframe.applied_scale = record.number("applied_scale", kScaleRange);
   keyframe.features = read_features(record, *keyframe.rig);
   keyframe.landmarks = record.array<LandmarkId>("landmark", keyframe.features->size());
+  // Earlier maps have those of camera 1, too.
+  const auto begin_of_camera1 =
+      keyframe.landmarks.begin() + static_cast<std::ptrdiff_t>(keyframe.features->num_primary);
+  std::fill(begin_of_camera1, keyframe.landmarks.end(), LandmarkId{});
   parts_.keyframes.push_back(std::move(stored));
 }
 

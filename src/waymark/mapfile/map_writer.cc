@@ -111,7 +111,7 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing, kSlopeRange);
   writer.add_array("size_rad", features.size_rad, kFeatureSizeRange);
   writer.add_array("partner", features.partner);
-  writer.add_array("range_m", features.range_m, kNotNegative);
+  writer.add_array("range_m", features.range_m, kLengthRange);
   writer.add_array("inverse_range_sigma", features.inverse_range_sigma, kNotNegative);
 }
 

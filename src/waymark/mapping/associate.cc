@@ -26,25 +26,6 @@ bool agrees(const Keyframe& keyframe,
   return squared && *squared < kMaxSquaredResidual;
 }
 
-void observe_with_partner(Map& map, KeyframeId id, std::uint32_t feature, LandmarkId landmark) {
-  map.observe(id, feature, landmark);
-  const Keyframe& keyframe = map.keyframes().at(id);
-  const std::uint32_t partner = keyframe.features->partner[feature];
-  if (partner == kNoFeature || keyframe.landmarks[partner].is_valid()) return;
-  if (agrees(keyframe, partner, map.landmarks().at(landmark).position_in_world)) {
-    map.observe(id, partner, landmark);
-  }
-}
-
-void forget_with_partner(Map& map, KeyframeId id, std::uint32_t feature) {
-  const Keyframe& keyframe = map.keyframes().at(id);
-  const std::uint32_t partner =
-      feature < keyframe.features->num_primary ? keyframe.features->partner[feature] : kNoFeature;
-  const bool has_partner = partner != kNoFeature && keyframe.landmarks[partner].is_valid();
-  map.forget(id, feature);
-  if (has_partner) map.forget(id, partner);
-}
-
 int add_landmarks_from_range(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
   const std::shared_ptr<const Features> features = map.keyframes().at(id).features;
   const std::shared_ptr<const Rig> rig = map.keyframes().at(id).rig;
@@ -54,10 +35,10 @@ int add_landmarks_from_range(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
   int num_added = 0;
   for (std::uint32_t i = 0; i < features->num_primary; ++i) {
     if (map.keyframes().at(id).landmarks[i].is_valid()) continue;
-    if (!has_reliable_range(*rig, *features, i)) continue;
+    if (!has_reliable_range(*features, i)) continue;
     const Eigen::Vector3d point = features->range_m[i] * features->bearings[i].cast<double>();
     const LandmarkId landmark = map.add_landmark(submap, world_from_cam * point, id);
-    observe_with_partner(map, id, i, landmark);
+    map.observe(id, i, landmark);
     dirty.insert(landmark);
     ++num_added;
   }

@@ -21,15 +21,6 @@ inline constexpr double kMaxSquaredResidual = 5.991;  ///< 95 % of chi-square, 2
 /// Whether a point fits a feature.
 bool agrees(const Keyframe& keyframe, std::uint32_t feature, const Eigen::Vector3d& point_in_world);
 
-/// Associates a primary feature with a landmark, and its partner where that agrees.
-void observe_with_partner(Map& map,
-                          KeyframeId keyframe,
-                          std::uint32_t feature,
-                          LandmarkId landmark);
-
-/// Removes an observation; that of a primary feature takes its partner's with it.
-void forget_with_partner(Map& map, KeyframeId keyframe, std::uint32_t feature);
-
 /// Landmarks changed since their appearance was last computed, in order.
 using DirtyLandmarks = std::set<LandmarkId>;
 

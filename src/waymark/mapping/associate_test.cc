@@ -63,35 +63,6 @@ TEST_F(AssociateTest, APointBehindHasNoResidual) {
   EXPECT_FALSE(agrees(keyframe(), feature_, behind));
 }
 
-TEST_F(AssociateTest, APartnerFollowsWhenItAgrees) {
-  const LandmarkId landmark = scene_.map.add_landmark(scene_.submap, point_, id_);
-  observe_with_partner(scene_.map, id_, feature_, landmark);
-  EXPECT_EQ(keyframe().landmarks[feature_], landmark);
-  EXPECT_EQ(keyframe().landmarks[partner_], landmark);
-  forget_with_partner(scene_.map, id_, feature_);
-  EXPECT_FALSE(keyframe().landmarks[feature_].is_valid());
-  EXPECT_FALSE(keyframe().landmarks[partner_].is_valid());
-  EXPECT_EQ(scene_.map.broken_invariants(), "");
-}
-
-TEST_F(AssociateTest, APartnerStaysAwayWhenItDisagrees) {
-  // On the same ray at half the distance: right for camera 0, wrong for camera 1.
-  const Eigen::Vector3d centre = keyframe().rig_from_world.origin_in_source();
-  const LandmarkId landmark =
-      scene_.map.add_landmark(scene_.submap, centre + 0.5 * (point_ - centre), id_);
-  observe_with_partner(scene_.map, id_, feature_, landmark);
-  EXPECT_EQ(keyframe().landmarks[feature_], landmark);
-  EXPECT_FALSE(keyframe().landmarks[partner_].is_valid());
-}
-
-TEST_F(AssociateTest, APartnerIsForgottenAlone) {
-  const LandmarkId landmark = scene_.map.add_landmark(scene_.submap, point_, id_);
-  observe_with_partner(scene_.map, id_, feature_, landmark);
-  forget_with_partner(scene_.map, id_, partner_);
-  EXPECT_EQ(keyframe().landmarks[feature_], landmark);
-  EXPECT_FALSE(keyframe().landmarks[partner_].is_valid());
-}
-
 TEST_F(AssociateTest, ReliableRangesWithoutALandmarkMakeOne) {
   const LandmarkId present = scene_.map.add_landmark(scene_.submap, point_, id_);
   scene_.map.observe(id_, feature_, present);
@@ -103,7 +74,7 @@ TEST_F(AssociateTest, ReliableRangesWithoutALandmarkMakeOne) {
   EXPECT_EQ(keyframe().landmarks[feature_], present);
   int num_expected = 0;
   for (std::uint32_t i = 0; i < keyframe().features->num_primary; ++i) {
-    const bool is_reliable = has_reliable_range(*scene_.rig, *keyframe().features, i);
+    const bool is_reliable = has_reliable_range(*keyframe().features, i);
     if (i == feature_) continue;
     num_expected += is_reliable;
     ASSERT_EQ(keyframe().landmarks[i].is_valid(), is_reliable) << i;

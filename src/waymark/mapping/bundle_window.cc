@@ -3,15 +3,34 @@
 #include "waymark/mapping/bundle_window.h"
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/optimize/residual.h"
 
 namespace waymark {
 namespace {
 
 /// Keyframes that hold the window in place; those that share most with it.
 constexpr std::size_t kMaxFixed = 25;
+/// Ranges that are off by more standard deviations are of something else.
+constexpr double kMaxRangeSigmas = 3.0;
+
+/// What a feature measures of a landmark; without its range where that is of something else, as of
+/// a pattern that repeats.
+Measurement measurement_of(const Keyframe& keyframe,
+                           std::uint32_t feature,
+                           const Eigen::Vector3d& point_in_world) {
+  Measurement measured = keyframe.features->measurement(feature);
+  if (!(measured.inverse_range_sigma > 0.0f)) return measured;
+  const Rigid3& cam_from_rig = keyframe.rig->cameras[measured.camera].cam_from_rig;
+  const InverseRangePoint seen =
+      in_inverse_range(cam_from_rig * (keyframe.rig_from_world * point_in_world));
+  const double off = range_residual(seen, measured.inverse_range, measured.inverse_range_sigma);
+  if (std::abs(off) > kMaxRangeSigmas) measured.inverse_range_sigma = 0.0f;
+  return measured;
+}
 
 template <class Id>
 std::size_t index_of(const std::vector<Id>& sorted, Id id) {
@@ -96,9 +115,11 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
     for (const Observation& observation : landmark.observations) {
       const std::size_t pose = index_of(keyframes, observation.keyframe);
       if (pose == keyframes.size()) continue;
-      const Features& features = *map.keyframes().at(observation.keyframe).features;
-      problem.observations.push_back(
-          {features.measurement(observation.feature), static_cast<std::uint32_t>(pose), point});
+      problem.observations.push_back({measurement_of(map.keyframes().at(observation.keyframe),
+                                                     observation.feature,
+                                                     landmark.position_in_world),
+                                      static_cast<std::uint32_t>(pose),
+                                      point});
       result.observations.push_back(observation);
     }
   }
@@ -153,9 +174,10 @@ BundleWindow whole_submap(const Map& map, SubmapId submap) {
 bool is_supported(const Map& map, const Landmark& landmark) {
   if (num_observers(landmark) >= 2) return true;
   for (const Observation& observation : landmark.observations) {
-    const Features& features = *map.keyframes().at(observation.keyframe).features;
-    if (observation.feature >= features.num_primary) return true;
-    if (features.inverse_range_sigma[observation.feature] > 0.0f) return true;
+    const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
+    const Measurement measured =
+        measurement_of(keyframe, observation.feature, landmark.position_in_world);
+    if (measured.inverse_range_sigma > 0.0f) return true;
   }
   return false;
 }
@@ -182,11 +204,10 @@ std::vector<LandmarkId> drop_outliers(Map& map,
                                       std::span<const LandmarkId> landmarks,
                                       DirtyLandmarks& dirty) {
   for (const auto& [keyframe, feature] : outliers) {
-    // A partner may have gone with its primary feature already.
     const Keyframe* observer = map.keyframes().find(keyframe);
     if (!observer || !observer->landmarks[feature].is_valid()) continue;
     dirty.insert(observer->landmarks[feature]);
-    forget_with_partner(map, keyframe, feature);
+    map.forget(keyframe, feature);
   }
   std::vector<LandmarkId> erased;
   for (LandmarkId id : landmarks) {

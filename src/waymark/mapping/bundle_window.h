@@ -57,7 +57,7 @@ std::vector<LandmarkId> adjust_window(Map& map,
                                       DirtyLandmarks& dirty);
 
 /// Whether what is left of a landmark's observations fixes its position: two keyframes, or a
-/// partner feature or range in one.
+/// range that fits in one.
 bool is_supported(const Map& map, const Landmark& landmark);
 
 }  // namespace waymark

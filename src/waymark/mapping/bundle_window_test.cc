@@ -129,7 +129,7 @@ TEST_P(BundleWindowTest, AdjustsAWholeSubmap) {
   EXPECT_LT(place_error(), 0.01);
 }
 
-TEST_P(BundleWindowTest, DropsAWrongObservationWithItsPartner) {
+TEST_P(BundleWindowTest, DropsAWrongObservation) {
   // The newest keyframe's features trade landmarks.
   const auto& landmarks = scene_.map.keyframes().at(last()).landmarks;
   std::vector<std::uint32_t> features;
@@ -141,8 +141,8 @@ TEST_P(BundleWindowTest, DropsAWrongObservationWithItsPartner) {
   ASSERT_GT(features.size(), 20u);
   const std::uint32_t a = features.front(), b = features.back();
   const LandmarkId of_a = landmarks[a], of_b = landmarks[b];
-  forget_with_partner(scene_.map, last(), a);
-  forget_with_partner(scene_.map, last(), b);
+  scene_.map.forget(last(), a);
+  scene_.map.forget(last(), b);
   scene_.map.observe(last(), a, of_b);
   scene_.map.observe(last(), b, of_a);
   adjust_window(scene_.map, choose_window(scene_.map, last(), 4), {}, dirty_);
@@ -160,19 +160,29 @@ TEST_P(BundleWindowTest, ErasesLandmarksThatLoseTheirSupport) {
     for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
       if (!keyframe.landmarks[i].is_valid()) continue;
       if (skip-- > 0) continue;
-      forget_with_partner(scene_.map, id, i);
+      scene_.map.forget(id, i);
       return i;
     }
     return kNoFeature;
   };
   const LandmarkId id = scene_.map.add_landmark(scene_.submap, {4.5, 0.0, 3.0}, last());
   scene_.map.observe(last(), free_feature(last(), 0), id);
-  scene_.map.observe(other, free_feature(other, 100), id);
+  scene_.map.observe(other, free_feature(other, 60), id);
   const auto erased = adjust_window(scene_.map, choose_window(scene_.map, last(), 4), {}, dirty_);
   EXPECT_FALSE(scene_.map.landmarks().contains(id));
   EXPECT_TRUE(std::find(erased.begin(), erased.end(), id) != erased.end());
   EXPECT_EQ(dirty_.count(id), 0u);
   EXPECT_EQ(scene_.map.broken_invariants(), "");
+}
+
+TEST_P(BundleWindowTest, LeavesOutRangesOfSomethingElse) {
+  // A pattern that repeats: each third feature of the newest keyframe looks half as far away.
+  Keyframe keyframe = scene_.map.keyframes().at(last());
+  auto features = std::make_shared<Features>(*keyframe.features);
+  for (std::uint32_t i = 0; i < features->num_primary; i += 3) features->range_m[i] *= 0.5f;
+  scene_.map.measure_keyframe(last(), keyframe.rig, features);
+  adjust_window(scene_.map, choose_window(scene_.map, last(), 4), {}, dirty_);
+  EXPECT_LT(place_error(), 0.005);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, BundleWindowTest, ::testing::Values(1, 2), [](const auto& info) {
@@ -197,8 +207,16 @@ TEST(IsSupported, ByTwoViewsOrByARange) {
 
   TestMap rgbd(1, cloud_ahead(), {.seed = 9, .inverse_range_sigma = 0.002}, true);
   rgbd.add_keyframe(pose_at(0.0));
-  rgbd.map.landmarks().for_each(
-      [&](LandmarkId, const Landmark& landmark) { EXPECT_TRUE(is_supported(rgbd.map, landmark)); });
+  std::size_t num_by_range = 0;
+  rgbd.map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
+    num_by_range += is_supported(rgbd.map, landmark);
+  });
+  // All whose range errs by less than three standard deviations.
+  EXPECT_GT(num_by_range, rgbd.map.landmarks().size() * 99 / 100);
+  const LandmarkId some = rgbd.map.keyframes().at(KeyframeId{0}).landmarks[0];
+  Landmark moved = rgbd.map.landmarks().at(some);
+  moved.position_in_world *= 2.0;
+  EXPECT_FALSE(is_supported(rgbd.map, moved)) << "the range is of something else";
 }
 
 }  // namespace

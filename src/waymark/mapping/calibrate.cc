@@ -6,9 +6,12 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <map>
+#include <memory>
 #include <utility>
 
 #include "waymark/camera/tangent.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
@@ -134,21 +137,23 @@ void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem) {
   }
 }
 
-/// Bearings of a problem by a rig calibrated otherwise; what has none there keeps that of before.
-void measure_anew(const std::vector<CameraMeasurements>& cameras,
+/// The observations of a problem as a rig calibrated otherwise makes them.
+void measure_anew(const Map& map,
+                  std::span<const Observation> observed,
+                  const Rig& before,
                   const Rig& rig,
                   BundleProblem& problem) {
-  TangentComputer computer;
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const TangentArrays& tangents =
-        computer.compute(*rig.cameras[c].camera, cameras[c].pixels, cameras[c].level_scales);
-    for (std::size_t k = 0; k < cameras[c].indices.size(); ++k) {
-      if (!tangents.is_valid[k]) continue;
-      BundleObservation& observation = problem.observations[cameras[c].indices[k]];
-      observation.bearing = tangents.bearings[k];
-      observation.level_pixel_from_bearing = tangents.level_pixel_from_bearing[k];
-    }
+  std::map<KeyframeId, std::shared_ptr<const Features>> features;
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    BundleObservation& observation = problem.observations[i];
+    if (problem.rigs[observation.pose] != &before) continue;
+    std::shared_ptr<const Features>& anew = features[observed[i].keyframe];
+    if (!anew) anew = measure_anew(*map.keyframes().at(observed[i].keyframe).features, rig);
+    const bool has_range = observation.inverse_range_sigma > 0.0f;
+    static_cast<Measurement&>(observation) = anew->measurement(observed[i].feature);
+    if (!has_range) observation.inverse_range_sigma = 0.0f;
   }
+  use_rig(before, rig, problem);
 }
 
 /// A calibration that is being adjusted.
@@ -282,19 +287,33 @@ double largest_change(const Trial& trial,
 }
 
 /// A part of the points with all of their observations: what tells a calibration does so soon.
+/// Those of camera 1 are pixels here, since ranges are made with the calibration.
 struct CalibrationSample {
   BundleProblem problem;
   std::vector<Observation> observed;
 };
 
-CalibrationSample sample(const BundleProblem& problem, std::span<const Observation> observed) {
+CalibrationSample sample(const Map& map,
+                         const BundleProblem& problem,
+                         std::span<const Observation> observed) {
   CalibrationSample sample{problem, {}};
   sample.problem.observations.clear();
+  const auto add = [&](const BundleObservation& like, Observation seen) {
+    const Features& features = *map.keyframes().at(seen.keyframe).features;
+    sample.problem.observations.push_back(
+        {features.measurement(seen.feature), like.pose, like.point});
+    sample.observed.push_back(seen);
+  };
   const std::size_t stride = 1 + observed.size() / kMaxObservations;
   for (std::size_t i = 0; i < observed.size(); ++i) {
-    if (problem.observations[i].point % stride != 0) continue;
-    sample.problem.observations.push_back(problem.observations[i]);
-    sample.observed.push_back(observed[i]);
+    const BundleObservation& observation = problem.observations[i];
+    if (observation.point % stride != 0) continue;
+    add(observation, observed[i]);
+    const Features& features = *map.keyframes().at(observed[i].keyframe).features;
+    const std::uint32_t partner = features.partner[observed[i].feature];
+    if (partner == kNoFeature) continue;
+    sample.problem.observations.back().inverse_range_sigma = 0.0f;
+    add(observation, {observed[i].keyframe, partner});
   }
   return sample;
 }
@@ -333,7 +352,7 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
                                             BundleProblem& problem) {
   const CalibrationParameters parameters(*known.given);
   if (parameters.size() == 0) return std::nullopt;
-  CalibrationSample part = sample(problem, observed);
+  CalibrationSample part = sample(map, problem, observed);
   const auto cameras = collect(map, part.observed, *known.rig, part.problem);
   const Trial start{known.rig, known.change, known.sigma};
   std::vector<std::uint8_t> is_free = known.is_always_refined
@@ -353,8 +372,7 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   if (largest_change(trial, known, is_free) < kMinChange) return std::nullopt;
   problem.rig_from_world = adjusted.rig_from_world;
   problem.points = adjusted.points;
-  use_rig(*known.rig, *trial.rig, problem);
-  measure_anew(collect(map, observed, *trial.rig, problem), *trial.rig, problem);
+  measure_anew(map, observed, *known.rig, *trial.rig, problem);
   KnownCalibration found = known;
   found.rig = std::move(trial.rig);
   found.change = std::move(trial.change);

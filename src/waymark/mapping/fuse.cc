@@ -77,7 +77,7 @@ void fuse_into(Map& map,
     if (!agrees(keyframe, feature, landmark.position_in_world)) continue;
     const LandmarkId present = keyframe.landmarks[feature];
     if (!present.is_valid()) {
-      observe_with_partner(map, target, feature, id);
+      map.observe(target, feature, id);
       dirty.insert(id);
       continue;
     }

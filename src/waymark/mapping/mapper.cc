@@ -38,7 +38,7 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
     const LandmarkId id = map_.add_landmark(submap, initial.position_in_world, ids.back());
     for (std::size_t k = 0; k < ids.size(); ++k) {
       if (initial.features[k] != kNoFeature) {
-        observe_with_partner(map_, ids[k], initial.features[k], id);
+        map_.observe(ids[k], initial.features[k], id);
       }
     }
     dirty_.insert(id);
@@ -90,7 +90,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
     const auto& observations = map_.landmarks().at(landmark).observations;
     // Two of the frame's landmarks may have been merged since.
     if (!observations.empty() && observations.back().keyframe == id) continue;
-    observe_with_partner(map_, id, i, landmark);
+    map_.observe(id, i, landmark);
     dirty_.insert(landmark);
   }
   return id;

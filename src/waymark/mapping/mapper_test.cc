@@ -162,7 +162,7 @@ BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
   for (int i = 0; i < kNumFrames; i += every) {
     const PointObservation seen =
         observe(cloud, rig, truth(i), make_noise(setup), static_cast<std::uint64_t>(i));
-    for (std::uint32_t k = 0; k < seen.features->size(); ++k) {
+    for (std::uint32_t k = 0; k < seen.features->num_primary; ++k) {
       const std::uint32_t landmark = seen.landmark_of_feature[k];
       if (landmark == kNoLandmark) continue;
       const auto pose = static_cast<std::uint32_t>(problem.rig_from_world.size());

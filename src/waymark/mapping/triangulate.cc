@@ -73,8 +73,8 @@ std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
       const auto point = triangulate_match(a, b, b_from_a, match);
       if (!point) continue;
       const LandmarkId landmark = map.add_landmark(a.submap, *point, id);
-      observe_with_partner(map, id, match.a, landmark);
-      observe_with_partner(map, neighbour, match.b, landmark);
+      map.observe(id, match.a, landmark);
+      map.observe(neighbour, match.b, landmark);
       dirty.insert(landmark);
       added.push_back(landmark);
     }

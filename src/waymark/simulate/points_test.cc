@@ -63,7 +63,7 @@ TEST_F(Points, ResidualsHaveTheSigmaAskedFor) {
   for (std::uint64_t frame = 0; frame < 4; ++frame) {
     const PointObservation seen = observe(cloud_, stereo_, world_from_rig_, noise, frame);
     ASSERT_GT(seen.features->num_primary, 200u);
-    for (std::size_t i = 0; i < seen.features->size(); ++i) {
+    for (std::size_t i = 0; i < seen.features->num_primary; ++i) {
       squares += residual(seen, i).squaredNorm();
       count += 2.0;
     }

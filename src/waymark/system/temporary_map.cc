@@ -39,7 +39,7 @@ KeyframeId TemporaryMap::insert(const NewKeyframe& message) {
   for (std::uint32_t i = 0; i < message.features->num_primary; ++i) {
     const LandmarkId landmark = message.landmarks[i];
     if (!landmark.is_valid()) continue;
-    observe_with_partner(map_, id, i, landmark);
+    map_.observe(id, i, landmark);
     if (landmark.value >= end.value) dirty_.insert(landmark);
   }
   return id;

@@ -35,7 +35,7 @@ class FrameLocator {
   explicit FrameLocator(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
 
   /// landmarks: per feature; primary features have candidates (living in the map). Of these
-  /// outliers are cleared, and partner features of inliers that agree are set.
+  /// outliers are cleared.
   LocatedFrame locate(const Features& features,
                       const Map& map,
                       const Rigid3& initial_rig_from_world,

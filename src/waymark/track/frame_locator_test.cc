@@ -80,31 +80,15 @@ TEST_P(FrameLocatorTest, ClearsWrongAssociationsAndKeepsRightOnes) {
   EXPECT_LT((located.rig_from_world * truth_).log().head<3>().norm(), 0.02);
 }
 
-TEST_P(FrameLocatorTest, PartnersFollowTheirPrimaries) {
+TEST_P(FrameLocatorTest, IsNotMisledByWrongRanges) {
   auto damaged = std::make_shared<Features>(*view_.features);
-  std::vector<std::uint32_t> bad_partners;
-  for (std::uint32_t i = 0; i < damaged->num_primary; i += 10) {
-    if (damaged->partner[i] == kNoFeature || !landmarks_[i].is_valid()) continue;
-    bad_partners.push_back(damaged->partner[i]);
-    Eigen::Vector3f& bearing = damaged->bearings[damaged->partner[i]];
-    bearing = (bearing + Eigen::Vector3f(0.1f, 0.0f, 0.0f)).normalized();
-  }
+  for (std::uint32_t i = 0; i < damaged->num_primary; i += 10) damaged->range_m[i] *= 0.5f;
   view_.features = damaged;
-  locate();
-  std::size_t num_set = 0;
-  for (std::uint32_t i = 0; i < damaged->num_primary; ++i) {
-    const std::uint32_t partner = damaged->partner[i];
-    if (partner == kNoFeature || !landmarks_[partner].is_valid()) continue;
-    EXPECT_EQ(landmarks_[partner], landmarks_[i]);
-    ++num_set;
+  const LocatedFrame located = locate();
+  EXPECT_LT((located.rig_from_world * truth_).log().head<3>().norm(), 0.02);
+  for (std::size_t i = damaged->num_primary; i < damaged->size(); ++i) {
+    EXPECT_FALSE(landmarks_[i].is_valid()) << "features of camera 1 show none of their own";
   }
-  if (GetParam() == 1) {
-    EXPECT_EQ(num_set, 0u);
-    return;
-  }
-  EXPECT_GT(num_set, 100u);
-  ASSERT_FALSE(bad_partners.empty());
-  for (const std::uint32_t partner : bad_partners) EXPECT_FALSE(landmarks_[partner].is_valid());
 }
 
 TEST_P(FrameLocatorTest, WithoutLandmarksTheGuessComesBack) {

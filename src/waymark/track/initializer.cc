@@ -30,12 +30,11 @@ constexpr double kSearchPart = 1.0 / 16.0;
 constexpr double kRestPx = kMinParallaxPx / 4;
 
 /// Primary features whose range has at most this relative standard deviation.
-std::vector<std::uint32_t> features_with_range(const Rig& rig,
-                                               const Features& features,
+std::vector<std::uint32_t> features_with_range(const Features& features,
                                                double max_relative_sigma) {
   std::vector<std::uint32_t> chosen;
   for (std::uint32_t i = 0; i < features.num_primary; ++i) {
-    const std::optional<double> sigma = relative_range_sigma(rig, features, i);
+    const std::optional<double> sigma = relative_range_sigma(features, i);
     if (sigma && *sigma < max_relative_sigma) chosen.push_back(i);
   }
   return chosen;
@@ -46,10 +45,10 @@ std::vector<std::uint32_t> features_with_range(const Rig& rig,
 /// stereo parallax moves a landmark by sigma * d / b pixels in a view at distance d from the first,
 /// b being the baseline, however far the landmark is. So far ones serve to track the first frames
 /// as well as near ones, and later views refine them.
-std::vector<std::uint32_t> features_to_start_from(const Rig& rig, const Features& features) {
-  std::vector<std::uint32_t> chosen = features_with_range(rig, features, kReliableRangeSigma);
+std::vector<std::uint32_t> features_to_start_from(const Features& features) {
+  std::vector<std::uint32_t> chosen = features_with_range(features, kReliableRangeSigma);
   if (chosen.size() >= kPlentyOfLandmarks) return chosen;
-  return features_with_range(rig, features, kFiniteRangeSigma);
+  return features_with_range(features, kFiniteRangeSigma);
 }
 
 std::vector<Eigen::Vector2f> pixels_of(const Features& features) {
@@ -175,7 +174,7 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
   start.submap.is_metric = true;
   start.submap.keyframes.push_back({frame.id, frame.timestamp_ns, Rigid3{}, frame.features});
   const Rigid3 world_from_cam = rig_->cameras[0].cam_from_rig.inverse();
-  for (const std::uint32_t i : features_to_start_from(*rig_, features)) {
+  for (const std::uint32_t i : features_to_start_from(features)) {
     const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
     start.submap.landmarks.push_back({world_from_cam * point, {i}});
   }

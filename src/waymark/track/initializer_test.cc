@@ -213,7 +213,7 @@ TEST(Initializer, RangeStartsAtOnceWithTheReliableOnes) {
   const PointObservation view = scene.look(0);
   std::size_t num_reliable = 0;
   for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
-    num_reliable += has_reliable_range(*scene.rig, *view.features, i);
+    num_reliable += has_reliable_range(*view.features, i);
   }
   EXPECT_EQ(submap.landmarks.size(), num_reliable);
   for (const InitialLandmark& landmark : submap.landmarks) {
@@ -232,14 +232,13 @@ TEST(Initializer, ABaselineShortForTheSceneStillStarts) {
   scene.noise.pixel_sigma = 0.15;
   const PointObservation view = scene.look(0);
   for (std::uint32_t i = 0; i < view.features->num_primary; ++i) {
-    ASSERT_FALSE(has_reliable_range(*scene.rig, *view.features, i));
+    ASSERT_FALSE(has_reliable_range(*view.features, i));
   }
   const Started started = run(scene, true, 1);
   ASSERT_TRUE(started.start);
   EXPECT_TRUE(started.start->submap.is_metric);
   for (const InitialLandmark& landmark : started.start->submap.landmarks) {
-    const std::optional<double> sigma =
-        relative_range_sigma(*scene.rig, *view.features, landmark.features[0]);
+    const std::optional<double> sigma = relative_range_sigma(*view.features, landmark.features[0]);
     ASSERT_TRUE(sigma);
     EXPECT_LT(*sigma, kFiniteRangeSigma);
   }

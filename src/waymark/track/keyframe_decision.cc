@@ -46,7 +46,7 @@ KeyframeSituation KeyframeAssessor::assess(const Features& features,
   std::vector<double> parallaxes_px;
   for (std::uint32_t i = 0; i < features.num_primary; ++i) {
     const LandmarkId id = located.landmarks[i];
-    const bool is_near = has_range_ && has_reliable_range(*rig_, features, i);
+    const bool is_near = has_range_ && has_reliable_range(features, i);
     situation.num_near_tracked += is_near && id.is_valid();
     situation.num_near_untracked += is_near && !id.is_valid();
     if (!id.is_valid()) continue;

@@ -15,14 +15,13 @@ constexpr double kRefineRadiusPx = 20.0;
 
 SeenLandmark see(const Features& features, std::uint32_t feature, LandmarkId landmark) {
   const Keypoint& keypoint = features.keypoints[feature];
+  SeenLandmark seen{.landmark = landmark, .x_px = keypoint.x_px, .y_px = keypoint.y_px};
+  seen.level = keypoint.level;
+  if (features.partner[feature] != kNoFeature) return seen;
   const Measurement measured = features.measurement(feature);
-  return {landmark,
-          keypoint.x_px,
-          keypoint.y_px,
-          measured.inverse_range,
-          measured.inverse_range_sigma,
-          keypoint.level,
-          keypoint.camera};
+  seen.inverse_range = measured.inverse_range;
+  seen.inverse_range_sigma = measured.inverse_range_sigma;
+  return seen;
 }
 
 }  // namespace
@@ -39,10 +38,7 @@ std::vector<SeenLandmark> seen_landmarks(const Features& features,
 std::optional<Rigid3> PoseRefiner::refine(const Map& map,
                                           std::span<const SeenLandmark> seen,
                                           const Rigid3& rig_from_world) {
-  observations_.clear();
-  for (std::size_t camera = 0; camera < rig_->cameras.size(); ++camera) {
-    measure(map, seen, static_cast<std::uint8_t>(camera));
-  }
+  measure(map, seen);
   if (observations_.size() < kMinObservations) return std::nullopt;
   const PoseEstimate estimate =
       optimize_pose(*rig_, observations_, rig_from_world, PoseOptions{}, workspace_);
@@ -54,23 +50,24 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
   return estimate.rig_from_world;
 }
 
-void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen, std::uint8_t camera) {
+void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
   living_.clear();
   pixels_.clear();
   level_scales_.clear();
   for (const SeenLandmark& one : seen) {
-    if (one.camera != camera || !map.resolve(one.landmark).is_valid()) continue;
+    if (!map.resolve(one.landmark).is_valid()) continue;
     living_.push_back(&one);
     pixels_.emplace_back(one.x_px, one.y_px);
     level_scales_.push_back(static_cast<float>(Pyramid::scale(one.level)));
   }
   const TangentArrays& tangents =
-      tangents_.compute(*rig_->cameras[camera].camera, pixels_, level_scales_);
+      tangents_.compute(*rig_->cameras[0].camera, pixels_, level_scales_);
+  observations_.clear();
   for (std::size_t i = 0; i < living_.size(); ++i) {
     if (!tangents.is_valid[i]) continue;
     const SeenLandmark& one = *living_[i];
     observations_.add(map.landmarks().at(map.resolve(one.landmark)).position_in_world,
-                      {camera,
+                      {0,
                        tangents.bearings[i],
                        tangents.level_pixel_from_bearing[i],
                        one.inverse_range,

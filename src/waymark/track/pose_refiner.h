@@ -15,16 +15,17 @@
 
 namespace waymark {
 
-/// What a feature saw of a landmark, without the rest of the frame: what it measured follows from
-/// that and the camera. Many are kept: small.
+/// What a feature of camera 0 saw of a landmark, without the rest of the frame: its bearing follows
+/// from that and the camera. Many are kept: small.
 struct SeenLandmark {
   LandmarkId landmark;
-  float x_px = 0.0f;                 ///< Of level 0, as in Keypoint.
-  float y_px = 0.0f;                 ///< The same.
-  float inverse_range = 0.0f;        ///< As in Measurement.
-  float inverse_range_sigma = 0.0f;  ///< As in Measurement.
+  float x_px = 0.0f;  ///< Of level 0, as in Keypoint.
+  float y_px = 0.0f;  ///< The same.
+  /// As in Measurement. Of the depth image only: those from stereo would be measured with the
+  /// calibration of then.
+  float inverse_range = 0.0f;
+  float inverse_range_sigma = 0.0f;  ///< The same.
   std::uint8_t level = 0;            ///< Of the pyramid.
-  std::uint8_t camera = 0;           ///< Index in the rig.
 };
 
 /// The features of a frame that show a landmark. landmarks: per feature, invalid where none.
@@ -52,7 +53,7 @@ class PoseRefiner {
                                  const Rigid3& rig_from_world);
 
  private:
-  void measure(const Map& map, std::span<const SeenLandmark> seen, std::uint8_t camera);
+  void measure(const Map& map, std::span<const SeenLandmark> seen);
 
   std::shared_ptr<const Rig> rig_;
   ProjectionMatcher matcher_;

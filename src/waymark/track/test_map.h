@@ -53,8 +53,6 @@ class TestMap {
       if (index == kNoLandmark || index % stride != 0) continue;
       const LandmarkId landmark = landmark_at(index, id);
       map.observe(id, i, landmark);
-      const std::uint32_t partner = view.features->partner[i];
-      if (partner != kNoFeature) map.observe(id, partner, landmark);
     }
     return id;
   }

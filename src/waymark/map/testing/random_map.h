@@ -81,9 +81,8 @@ class RandomMap {
     for (std::uint32_t i = 0; i < num_primary_; ++i) {
       append_feature(*features, 0);
       features->descriptors.push_back(random_descriptor());
-      features->range_m.push_back(rng_.below(2) ? real(1, 9) : 0.0f);
-      const bool is_measured = features->range_m.back() > 0.0f && rng_.below(2);
-      features->inverse_range_sigma.push_back(is_measured ? 0.01f : 0.0f);
+      features->range_m.push_back(rng_.below(2) ? real(-9, 9) : 0.0f);
+      features->inverse_range_sigma.push_back(features->range_m.back() != 0.0f ? 0.01f : 0.0f);
     }
     for (std::uint32_t i = 0; rig.cameras.size() > 1 && i < num_primary_; i += 3) {
       append_feature(*features, 1);
@@ -130,7 +129,7 @@ class RandomMap {
     const KeyframeId id = pick_keyframe();
     const Keyframe& keyframe = map_.keyframes().at(id);
     const SubmapId submap = keyframe.submap;
-    const std::uint32_t feature = rng_.below(static_cast<std::uint32_t>(keyframe.features->size()));
+    const std::uint32_t feature = rng_.below(num_primary_);
     const bool is_free = !keyframe.landmarks[feature].is_valid();
     switch (rng_.below(8)) {
       case 0:

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <numbers>
 #include <optional>
 #include <tuple>
@@ -9,6 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/tangent.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/simulate/testing/points.h"
 
@@ -197,16 +199,32 @@ void append(const Camera& camera,
   extend(features.size_rad, arrays.size_rad);
 }
 
-/// Distance along bearing0 where it meets bearing1 best: the component of b1 x (r R b0 + t) = 0
-/// along b1 x t, which is what the epipolar plane holds; noise across the plane says nothing of the
-/// distance. 0 where the rays do not meet in front.
-float stereo_range(const Rigid3& cam1_from_cam0,
-                   const Vector3d& bearing0,
-                   const Vector3d& bearing1) {
-  const Vector3d normal = bearing1.cross(cam1_from_cam0.translation);
-  const double range =
-      -normal.squaredNorm() / normal.dot(bearing1.cross(cam1_from_cam0.rotation * bearing0));
-  return std::isfinite(range) && range > 0.0 ? static_cast<float>(range) : 0.0f;
+/// By which the features of camera 0 err, in pixels of their levels, per landmark.
+std::map<std::uint32_t, Vector2d> errors_of_primary(const PointCloud& cloud,
+                                                    const Rig& rig,
+                                                    const Rigid3& world_from_rig,
+                                                    const std::vector<std::uint32_t>& landmarks,
+                                                    const std::vector<std::uint32_t>& feature_of,
+                                                    const Features& features) {
+  Eye eye(cloud, *rig.cameras[0].camera, rig.cameras[0].cam_from_rig * world_from_rig.inverse());
+  std::map<std::uint32_t, Vector2d> errors;
+  for (const Sight& sight : eye.see(landmarks)) {
+    const Keypoint& found = features.keypoints[feature_of[sight.landmark]];
+    errors[sight.landmark] =
+        (Vector2d(found.x_px, found.y_px) - sight.pixel) / Pyramid::scale(found.level);
+  }
+  return errors;
+}
+
+/// Features of camera 1 are found again where those of camera 0 are: with their errors, and half as
+/// much of their own.
+void add_noise_of_pairs(std::vector<Sight>& sights,
+                        const std::map<std::uint32_t, Vector2d>& errors,
+                        double sigma,
+                        Rng& rng) {
+  add_pixel_noise(sights, 0.5 * sigma, rng);
+  for (Sight& sight : sights)
+    sight.pixel += Pyramid::scale(sight.level) * errors.at(sight.landmark);
 }
 
 void add_stereo(const PointCloud& cloud,
@@ -227,20 +245,20 @@ void add_stereo(const PointCloud& cloud,
   const Camera& camera = *rig.cameras[1].camera;
   Eye eye(cloud, camera, rig.cameras[1].cam_from_rig * world_from_rig.inverse());
   std::vector<Sight> sights = eye.see(landmarks);
-  add_pixel_noise(sights, noise.pixel_sigma, rng);
+  add_noise_of_pairs(sights,
+                     errors_of_primary(cloud, rig, world_from_rig, landmarks, feature_of, features),
+                     noise.pixel_sigma,
+                     rng);
   keep_valid(camera, sights);
   append(camera, 1, sights, features);
-  const Rigid3 cam1_from_cam0 = rig.cameras[1].cam_from_rig * rig.cameras[0].cam_from_rig.inverse();
   for (const Sight& sight : sights) {
     const std::uint32_t primary = feature_of[sight.landmark];
     const std::uint32_t secondary = static_cast<std::uint32_t>(features.partner.size());
     features.partner[primary] = secondary;
     features.partner.push_back(primary);
     result.landmark_of_feature.push_back(sight.landmark);
-    features.range_m[primary] = stereo_range(cam1_from_cam0,
-                                             features.bearings[primary].cast<double>(),
-                                             features.bearings[secondary].cast<double>());
   }
+  measure_stereo_ranges(rig, features);
 }
 
 void add_measured_range(const std::vector<Sight>& sights,

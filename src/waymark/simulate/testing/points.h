@@ -48,7 +48,8 @@ PointCloud scatter_in(const Eigen::Vector3d& min,
 /// How features differ from the truth.
 struct PointNoise {
   std::uint64_t seed = 0;
-  double pixel_sigma = 0.5;          ///< Per axis, in pixels of the feature's level.
+  /// Per axis, in pixels of the feature's level; in camera 1 half as much besides that of camera 0.
+  double pixel_sigma = 0.5;
   double flip_probability = 0.04;    ///< Of each bit of a descriptor.
   double miss_probability = 0.1;     ///< Of a visible landmark.
   double outlier_share = 0.0;        ///< Features at random places with the looks of landmarks.
