@@ -30,7 +30,7 @@ constexpr double kMaxDisagreement = 6.0;
 /// By less than this part of its standard deviation.
 constexpr double kStill = 0.1;
 /// More tell hardly more, and take longer.
-constexpr std::size_t kMaxObservations = 30000;
+constexpr std::size_t kMaxObservations = 12000;
 
 /// Observations of the rig by one of its cameras.
 struct CameraMeasurements {
@@ -210,7 +210,7 @@ bool adjust_once(const CalibrationParameters& parameters,
   calibration.change.setZero(trial.change.size());
   problem.calibration = std::move(calibration);
   const BundleResult result =
-      adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 4});
+      adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 2});
   const BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
   const std::optional<Rig> rig = parameters.rig_at(trial.change + found.change);
   if (!rig || found.evidence.information.size() == 0) return false;

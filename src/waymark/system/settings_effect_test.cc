@@ -323,8 +323,8 @@ bool believes(double told_px, const std::string& assignment) {
 TEST(SettingsEffect, RefineSaysWhetherTheCalibrationChanges) {
   EXPECT_TRUE(believes(441.0, "calibration.refine=off"));
   EXPECT_FALSE(believes(441.0, "calibration.refine=auto"));
-  EXPECT_TRUE(believes(420.2, "calibration.refine=auto"));
-  EXPECT_FALSE(believes(420.2, "calibration.refine=on"));
+  EXPECT_TRUE(believes(421.5, "calibration.refine=auto"));
+  EXPECT_FALSE(believes(421.5, "calibration.refine=on"));
 }
 
 /// Whoever adds a setting shows its effect here.
