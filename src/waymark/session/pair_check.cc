@@ -9,6 +9,8 @@
 #include <cmath>
 #include <utility>
 
+#include "waymark/image/range_precision.h"
+
 namespace waymark {
 namespace {
 
@@ -16,6 +18,9 @@ namespace {
 /// mistake up to 13 %, of a fisheye lens that is turned by a degree up to 20 %.
 constexpr double kFewShare = 0.25;
 constexpr double kManyShare = 0.4;
+/// A distance is one whose standard deviation is less than itself: a mistake leaves disparities of
+/// a part of a pixel, of either sign.
+constexpr double kToldFromInfinity = 1.0;
 /// A mistake explains the images where it is that much better than others.
 constexpr double kClearly = 1.2;
 /// Images with fewer features show nothing.
@@ -43,7 +48,8 @@ void PairCheck::Counts::add(const Features& found) {
   features += found.num_primary;
   for (std::size_t i = 0; i < found.num_primary; ++i) {
     partners += found.partner[i] != kNoFeature;
-    ranges += found.range_m[i] > 0.0f;
+    const auto relative_sigma = relative_range_sigma(found, static_cast<std::uint32_t>(i));
+    ranges += relative_sigma && *relative_sigma < kToldFromInfinity;
   }
 }
 
