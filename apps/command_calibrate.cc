@@ -13,7 +13,6 @@
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/calibrate/calibrate.h"
-#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {

@@ -12,7 +12,6 @@
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/input/foreign_calibration.h"
-#include "waymark/simulate/dataset.h"
 #include "waymark/system/settings.h"
 
 namespace waymark {

@@ -19,7 +19,6 @@
 #include "waymark/exchange/openvslam_camera.h"
 #include "waymark/exchange/openvslam_map.h"
 #include "waymark/mapfile/map_file.h"
-#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {

@@ -20,7 +20,6 @@
 #include "waymark/session/quality.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
-#include "waymark/simulate/dataset.h"
 
 namespace waymark {
 namespace {

@@ -167,6 +167,31 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
   return chain;
 }
 
+std::string format_camchain(const CameraChain& chain) {
+  std::string text;
+  for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
+    const CameraDescription& camera = chain.cameras[i].description;
+    text += fmt::format("cam{}:\n  camera_model: {}\n", i, camera.camera_model);
+    if (!camera.intrinsics.empty()) {
+      text += fmt::format("  intrinsics: [{}]\n", fmt::join(camera.intrinsics, ", "));
+    }
+    text += fmt::format("  distortion_model: {}\n", camera.distortion_model);
+    if (!camera.distortion_coeffs.empty()) {
+      text += fmt::format("  distortion_coeffs: [{}]\n", fmt::join(camera.distortion_coeffs, ", "));
+    }
+    text += fmt::format("  resolution: [{}, {}]\n", camera.width_px, camera.height_px);
+    if (i == 0) continue;
+    const Eigen::Matrix4d from_previous =
+        (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
+    text += "  T_cn_cnm1:\n";
+    for (int row = 0; row < 4; ++row) {
+      text += fmt::format("  - [{}]\n", fmt::join(from_previous.row(row), ", "));
+    }
+  }
+  if (chain.depth_factor) text += fmt::format("depth: {{factor: {}}}\n", *chain.depth_factor);
+  return text;
+}
+
 Rig make_rig(const CameraChain& chain, const CameraRegistry& registry) {
   WAYMARK_CHECK(!chain.cameras.empty());
   Rig rig;

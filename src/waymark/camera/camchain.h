@@ -33,6 +33,9 @@ struct CameraChain {
 /// malformed, with its line; models and their numbers are checked by make_rig().
 std::optional<CameraChain> read_camchain(const ConfigNode& config);
 
+/// The text of a camchain file of a chain; read_camchain() gives the chain again.
+std::string format_camchain(const CameraChain& chain);
+
 /// Makes the cameras. Throws InputError for what a model refuses.
 Rig make_rig(const CameraChain& chain,
              const CameraRegistry& registry = CameraRegistry::with_builtin_models());

@@ -125,6 +125,20 @@ TEST(Camchain, TransformationsChain) {
   EXPECT_LT((point - Eigen::Vector3d(-0.5, -1.5, 3.0)).norm(), 1e-12);
 }
 
+TEST(Camchain, IsReadAsWritten) {
+  CameraChain chain = *read(kKalibrStereo);
+  chain.depth_factor = 5000.0;
+  const CameraChain again = *read(format_camchain(chain));
+  ASSERT_EQ(again.cameras.size(), 2u);
+  EXPECT_EQ(again.depth_factor, chain.depth_factor);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_TRUE(again.cameras[i].description.is_same(chain.cameras[i].description)) << i;
+    const Eigen::Matrix4d off =
+        again.cameras[i].cam_from_rig.matrix() - chain.cameras[i].cam_from_rig.matrix();
+    EXPECT_LT(off.norm(), 1e-12) << i;
+  }
+}
+
 TEST(Camchain, DepthFactor) {
   EXPECT_EQ(read(one_camera("") + "depth: {factor: 5000}\n")->depth_factor, 5000.0);
   EXPECT_EQ(read(one_camera("") + "depth:\n")->depth_factor, std::nullopt);

@@ -12,6 +12,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/camera/camchain.h"
 #include "waymark/exchange/trajectory.h"
 
 namespace waymark {
@@ -157,31 +158,6 @@ class Writer {
 };
 
 }  // namespace
-
-std::string format_camchain(const CameraChain& chain) {
-  std::string text;
-  for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
-    const CameraDescription& camera = chain.cameras[i].description;
-    text += fmt::format("cam{}:\n  camera_model: {}\n", i, camera.camera_model);
-    if (!camera.intrinsics.empty()) {
-      text += fmt::format("  intrinsics: {}\n", numbers(camera.intrinsics));
-    }
-    text += fmt::format("  distortion_model: {}\n", camera.distortion_model);
-    if (!camera.distortion_coeffs.empty()) {
-      text += fmt::format("  distortion_coeffs: {}\n", numbers(camera.distortion_coeffs));
-    }
-    text += fmt::format("  resolution: {}\n", size_of(camera));
-    if (i == 0) continue;
-    const Eigen::Matrix4d from_previous =
-        (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
-    text += "  T_cn_cnm1:\n";
-    for (int row = 0; row < 4; ++row) {
-      text += fmt::format("  - [{}]\n", fmt::join(from_previous.row(row), ", "));
-    }
-  }
-  if (chain.depth_factor) text += fmt::format("depth: {{factor: {}}}\n", *chain.depth_factor);
-  return text;
-}
 
 void write_dataset(SimulatedSequence& sequence,
                    const fs::path& folder,

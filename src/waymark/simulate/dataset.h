@@ -23,9 +23,6 @@ void write_dataset(SimulatedSequence& sequence,
                    const std::filesystem::path& folder,
                    const std::function<void(int frame)>& done = {});
 
-/// The chain as a camchain.yaml file.
-std::string format_camchain(const CameraChain& chain);
-
 /// A sequence for evaluation, and what it exercises.
 struct SuiteEntry {
   SequenceSpec spec;
