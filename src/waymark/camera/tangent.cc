@@ -21,39 +21,59 @@ double reprojection_error(const Camera& camera,
   return error.norm();
 }
 
+struct SquaredSingularValues {
+  double larger;
+  double smaller;
+
+  /// Works on J J^T, a symmetric 2x2 matrix whose eigenvalues are the squares of the singular
+  /// values.
+  explicit SquaredSingularValues(const Matrix23d& jacobian) {
+    const double a = jacobian.row(0).squaredNorm();
+    const double b = jacobian.row(0).dot(jacobian.row(1));
+    const double c = jacobian.row(1).squaredNorm();
+    larger = 0.5 * (a + c) + std::hypot(0.5 * (a - c), b);
+    smaller = (a * c - b * b) / larger;
+  }
+
+  bool is_bounded() const {
+    return larger <= TangentComputer::kMaxStretch * TangentComputer::kMaxStretch * smaller;
+  }
+};
+
 struct BoundedTangent {
   Matrix23d pixel_from_bearing;
   double pixels_per_rad;  ///< Geometric mean over the two directions.
 };
 
-/// Lowers the larger singular value of the Jacobian to kMaxStretch times the smaller one. Works on
-/// J J^T, a symmetric 2x2 matrix whose eigenvalues are the squares of the singular values. Nothing
+/// Lowers the larger singular value of the Jacobian to kMaxStretch times the smaller one. Nothing
 /// where the Jacobian is not finite or has lost a rank.
 std::optional<BoundedTangent> bound_tangent(const Matrix23d& jacobian) {
+  const SquaredSingularValues squared(jacobian);
+  if (!std::isfinite(squared.larger) || !(squared.smaller > 1e-12 * squared.larger)) {
+    return std::nullopt;
+  }
+  if (squared.is_bounded()) {
+    return BoundedTangent{jacobian, std::sqrt(std::sqrt(squared.larger * squared.smaller))};
+  }
+  // Eigenvector of the larger value; of the two equivalent forms the longer one is exact.
   const double a = jacobian.row(0).squaredNorm();
   const double b = jacobian.row(0).dot(jacobian.row(1));
   const double c = jacobian.row(1).squaredNorm();
-  const double mean = 0.5 * (a + c);
-  const double half_gap = std::hypot(0.5 * (a - c), b);
-  const double larger = mean + half_gap;
-  const double smaller = (a * c - b * b) / larger;
-  if (!std::isfinite(larger) || !(smaller > 1e-12 * larger)) return std::nullopt;
-
-  constexpr double kMaxSquared = TangentComputer::kMaxStretch * TangentComputer::kMaxStretch;
-  if (larger <= kMaxSquared * smaller) {
-    return BoundedTangent{jacobian, std::sqrt(std::sqrt(larger * smaller))};
-  }
-  // Eigenvector of the larger value; of the two equivalent forms the longer one is exact.
   Eigen::Vector2d direction =
-      a >= c ? Eigen::Vector2d(larger - c, b) : Eigen::Vector2d(b, larger - a);
+      a >= c ? Eigen::Vector2d(squared.larger - c, b) : Eigen::Vector2d(b, squared.larger - a);
   direction.normalize();
-  const double shrink = std::sqrt(kMaxSquared * smaller / larger);
+  constexpr double kMax = TangentComputer::kMaxStretch;
+  const double shrink = std::sqrt(kMax * kMax * squared.smaller / squared.larger);
   const Eigen::RowVector3d along = direction.transpose() * jacobian;
   return BoundedTangent{jacobian - (1.0 - shrink) * direction * along,
-                        std::sqrt(TangentComputer::kMaxStretch * smaller)};
+                        std::sqrt(kMax * squared.smaller)};
 }
 
 }  // namespace
+
+bool TangentComputer::is_stretched(const Matrix23d& pixel_from_bearing) {
+  return !SquaredSingularValues(pixel_from_bearing).is_bounded();
+}
 
 const TangentArrays& TangentComputer::compute(const Camera& camera,
                                               std::span<const Eigen::Vector2d> pixels,

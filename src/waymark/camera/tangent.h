@@ -38,6 +38,9 @@ class TangentComputer {
   /// of 70 degrees.
   static constexpr double kMaxStretch = 3.0;
 
+  /// Whether the singular values of a derivative of pixels by bearings differ by more than that.
+  static bool is_stretched(const Matrix23d& pixel_from_bearing);
+
   /// pixels: of level 0; level_scales: size of one pixel of the feature's level in pixels of level
   /// 0, as many. The result stays valid until the next call.
   const TangentArrays& compute(const Camera& camera,

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
 #include <Eigen/SVD>
 #include <cmath>
 #include <numbers>
@@ -154,6 +155,19 @@ TEST(Tangent, IsBoundedNearThePoleAndLowersOnlyTheSteepDirection) {
     EXPECT_NEAR(values[0] / values[1], stretch, 0.01);
     EXPECT_NEAR(arrays.size_rad[i] * std::sqrt(values[0] * values[1]), 1.0f, 1e-3f);
   }
+}
+
+TEST(Tangent, TellsWhatIsStretched) {
+  Matrix23d w = Matrix23d::Zero();
+  w(0, 0) = 500.0;
+  for (const double smaller : {500.0, 170.0, 160.0, 0.0}) {
+    w(1, 1) = smaller;
+    const Eigen::Matrix2d turn = Eigen::Rotation2Dd(0.4).toRotationMatrix();
+    EXPECT_EQ(TangentComputer::is_stretched(turn * w),
+              smaller * TangentComputer::kMaxStretch < 500.0);
+  }
+  w(0, 0) = std::nan("");
+  EXPECT_TRUE(TangentComputer::is_stretched(w));
 }
 
 TEST(Tangent, PixelsWithoutBearingAreInvalidAndLeaveTheOthersAlone) {

@@ -71,15 +71,6 @@ std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
   return directions;
 }
 
-/// Whether an image is stretched by so much that its corners are blurred.
-bool is_stretched(const Matrix23d& pixel_from_bearing) {
-  const Eigen::Matrix2d square = pixel_from_bearing * pixel_from_bearing.transpose();
-  const double mean = 0.5 * square.trace();
-  const double larger = mean + std::sqrt(std::max(mean * mean - square.determinant(), 0.0));
-  constexpr double kMaxSquared = TangentComputer::kMaxStretch * TangentComputer::kMaxStretch;
-  return !(larger * larger < kMaxSquared * square.determinant());
-}
-
 /// Makes the residuals of a camera's observations those of pixels, linear around where the points
 /// should be seen. Around where they are seen, as elsewhere, noise would turn up in the
 /// derivatives, and the little that tells a focal length would drown in it: the bearing becomes the
@@ -99,7 +90,7 @@ void linearize(const CameraMeasurements& measured,
     const Eigen::Vector3d& direction = directions[k];
     const Matrix23d w = (jacobians[k] - jacobians[k] * direction * direction.transpose()) /
                         measured.level_scales[k];
-    if (!is_visible[k] || is_stretched(w)) {
+    if (!is_visible[k] || TangentComputer::is_stretched(w)) {
       observation.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
       continue;
     }
