@@ -176,13 +176,14 @@ TEST_P(BundleWindowTest, ErasesLandmarksThatLoseTheirSupport) {
 }
 
 TEST_P(BundleWindowTest, LeavesOutRangesOfSomethingElse) {
-  // A pattern that repeats: each third feature of the newest keyframe looks half as far away.
+  // A pattern that repeats: each third feature of the newest keyframe looks half as far away. Its
+  // bearing is still good.
   Keyframe keyframe = scene_.map.keyframes().at(last());
   auto features = std::make_shared<Features>(*keyframe.features);
   for (std::uint32_t i = 0; i < features->num_primary; i += 3) features->range_m[i] *= 0.5f;
   scene_.map.measure_keyframe(last(), keyframe.rig, features);
   adjust_window(scene_.map, choose_window(scene_.map, last(), 4), {}, dirty_);
-  EXPECT_LT(place_error(), 0.005);
+  EXPECT_LT(place_error(), 0.003);
 }
 
 INSTANTIATE_TEST_SUITE_P(Cameras, BundleWindowTest, ::testing::Values(1, 2), [](const auto& info) {
