@@ -106,7 +106,9 @@ found in camera 1, which have none and belong to one of camera 0. len() gives th
            "uint32 array (N,): the feature of the other camera that belongs to it, or NO_ID.",
            feature_column(&Features::partner))
       .get("ranges",
-           "float32 array (num_primary,): distance along the bearing in metres, 0 where unknown.",
+           "float32 array (num_primary,): distance along the bearing in metres, 0 where unknown; "
+           "negative where a stereo pair sees the feature beyond infinity, as noise makes it do "
+           "with what is far away.",
            feature_column(&Features::range_m))
       .get("landmarks",
            "uint32 array (N,): id of the landmark that it shows, or NO_ID; of a frame's details "
