@@ -19,6 +19,8 @@ constexpr BesideOptions kBeside = {.num_known_steps = 5, .distance = 0.8, .angle
 
 /// Keyframes when the calibration is looked at first, then at twice as many and so on.
 constexpr std::size_t kFirstCalibration = 30;
+/// With so many it is looked at in the end.
+constexpr std::size_t kLeastKeyframes = 10;
 
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
@@ -137,7 +139,7 @@ void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& befor
 void GlobalMapper::refine_globally(bool with_calibration) {
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
   mapper_.refine_globally(with_calibration && is_calibrating_ &&
-                          mapper_.map().keyframes().size() >= kFirstCalibration);
+                          mapper_.map().keyframes().size() >= kLeastKeyframes);
   look_with_calibration(before);
 }
 

@@ -22,6 +22,8 @@ constexpr int kMaxPasses = 8;
 /// An estimate so many standard deviations from what was given is no chance: of exact calibrations
 /// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5 (docs/decisions.md).
 constexpr double kMinSigmas = 7.0;
+/// With fewer keyframes the scatter itself is known less well, and more is asked for.
+constexpr double kManyKeyframes = 30.0;
 /// A calibration is replaced by one that differs by this many.
 constexpr double kMinChange = 2.0;
 /// Where the parts of the way contradict each other by this much more than corners scatter, what is
@@ -246,11 +248,12 @@ std::vector<std::uint8_t> likely_wrong(const std::vector<CalibrationParameter>& 
 /// none of that.
 std::vector<std::uint8_t> contradicted(const std::vector<CalibrationParameter>& parameters,
                                        const Trial& trial,
+                                       double min_sigmas,
                                        const std::vector<std::uint8_t>& is_free) {
   std::vector<CalibrationGroup> groups;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
-    if (is_free[i] && std::abs(trial.change[at]) > kMinSigmas * trial.sigma[at]) {
+    if (is_free[i] && std::abs(trial.change[at]) > min_sigmas * trial.sigma[at]) {
       groups.push_back(parameters[i].group);
     }
   }
@@ -354,7 +357,9 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
   // What the images do not tell stays as given, or it would take up errors of other kinds.
   if (!known.is_always_refined) {
-    is_free = contradicted(known.parameters, trial, is_free);
+    const auto num_keyframes = static_cast<double>(part.problem.rig_from_world.size());
+    const double min_sigmas = kMinSigmas * std::max(1.0, kManyKeyframes / num_keyframes);
+    is_free = contradicted(known.parameters, trial, min_sigmas, is_free);
     if (std::ranges::count(is_free, 1) == 0) return std::nullopt;
     adjusted = part.problem;
     trial = start;
