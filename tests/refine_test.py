@@ -48,8 +48,8 @@ class Refine(unittest.TestCase):
         self.assertEqual(program.returncode, 0, said)
         return out, json.loads((out / "summary.json").read_text()), said, client.status["calibration"]
 
-    def error_m(self, out):
-        done = waymark("eval", out / "trajectory.txt", self.room / "groundtruth.txt", "--align", "se3", "--json")
+    def error_m(self, out, name="trajectory.txt"):
+        done = waymark("eval", out / name, self.room / "groundtruth.txt", "--align", "se3", "--json")
         return json.loads(done.stdout)["ate_rmse_m"]
 
     def test_a_turn_of_camera_1_is_found_and_kept(self):
@@ -69,6 +69,14 @@ class Refine(unittest.TestCase):
         again, summary, _ = self.run_with("again", "-c", refined / "calibration.yaml")
         self.assertNotIn("refined_calibration", summary, "what was found is right")
         self.assertLess(self.error_m(again), 0.3 * self.error_m(as_told))
+
+    def test_in_a_short_run_all_frames_are_located_with_what_its_end_finds(self):
+        longer = self.folder / "longer.yaml"
+        longer.write_text(CAMERA.replace("[290, 291,", "[305, 306,"))
+        out, summary, _ = self.run_with("short", "--frames", 40, "-c", longer)
+        self.assertIn("refined_calibration", summary)
+        self.assertLess(summary["keyframes"], 30, "is not calibrated before the end")
+        self.assertLess(self.error_m(out), 1.5 * self.error_m(out, "keyframes.txt"))
 
     def test_words_that_mean_nothing(self):
         done = waymark("run", self.room, "-o", self.folder / "none", "--set", "calibration.refine=maybe")

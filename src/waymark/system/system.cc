@@ -299,6 +299,7 @@ void System::Impl::finish() {
   mapper_.finish();
   published_ = mapper_.snapshot();
   visible_ = publish();
+  look_with_calibration();
   memory_.settle(*map());
   const bool is_long = memory_.entries().size() >= kFramesToCheck;
   if (is_long && !is_focal_checked_) focal_check_ = check_focal_length(*map());
