@@ -143,7 +143,7 @@ void write_calibration(const Session& session, const std::filesystem::path& fold
   CameraChain chain;
   for (const RigCamera& camera : session.system->rig()->cameras) {
     if (!camera.description) return;
-    chain.cameras.push_back({*camera.description, camera.cam_from_rig});
+    chain.cameras.push_back({*camera.description, camera.cam_from_rig, camera.readout_s});
   }
   if (session.input->info().setup == Setup::kRgbd) {
     chain.depth_factor = session.settings.depth.factor;

@@ -28,9 +28,11 @@ class Refine(unittest.TestCase):
                        "--told", f"turn_y={TURN * 1e3}", "-o", cls.room)
         assert done.returncode == 0, done.stderr
 
-    def run_with(self, name, *options):
+    def run_with(self, name, *options, sequence=None):
         out = self.folder / name
-        done = waymark("run", self.room, "-o", out, *options)
+        sequence = sequence or self.room
+        camchain = () if sequence == self.room else ("-c", sequence / "camchain.yaml")
+        done = waymark("run", sequence, "-o", out, *camchain, *options)
         self.assertEqual(done.returncode, 0, done.stderr)
         return out, json.loads((out / "summary.json").read_text()), done.stderr
 
@@ -48,8 +50,9 @@ class Refine(unittest.TestCase):
         self.assertEqual(program.returncode, 0, said)
         return out, json.loads((out / "summary.json").read_text()), said, client.status["calibration"]
 
-    def error_m(self, out, name="trajectory.txt"):
-        done = waymark("eval", out / name, self.room / "groundtruth.txt", "--align", "se3", "--json")
+    def error_m(self, out, sequence=None, name="trajectory.txt"):
+        truth = (sequence or self.room) / "groundtruth.txt"
+        done = waymark("eval", out / name, truth, "--align", "se3", "--json")
         return json.loads(done.stdout)["ate_rmse_m"]
 
     def test_a_turn_of_camera_1_is_found_and_kept(self):
@@ -76,7 +79,20 @@ class Refine(unittest.TestCase):
         out, summary, _ = self.run_with("short", "--frames", 40, "-c", longer)
         self.assertIn("refined_calibration", summary)
         self.assertLess(summary["keyframes"], 30, "is not calibrated before the end")
-        self.assertLess(self.error_m(out), 1.5 * self.error_m(out, "keyframes.txt"))
+        self.assertLess(self.error_m(out), 1.5 * self.error_m(out, name="keyframes.txt"))
+
+    def test_a_rolling_shutter_is_found_and_kept(self):
+        walk = self.folder / "walk"
+        done = waymark("simulate", "room", "--motion", "inspect", "--setup", "rgbd", "--frames", 120, "--readout", 30,
+                       "-o", walk)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        as_told, _, _ = self.run_with("global", "--set", "calibration.refine=off", sequence=walk)
+        refined, summary, said = self.run_with("rolling", sequence=walk)
+        self.assertIn("readout_ms 0 -> ", said)
+        found = {each["name"]: each for each in summary["refined_calibration"]}["readout_ms"]
+        self.assertLess(abs(found["change"] - 30), 2)
+        self.assertLess(self.error_m(refined, walk), 0.8 * self.error_m(as_told, walk))
+        self.assertIn("  readout_ms: ", (refined / "calibration.yaml").read_text())
 
     def test_words_that_mean_nothing(self):
         done = waymark("run", self.room, "-o", self.folder / "none", "--set", "calibration.refine=maybe")

@@ -36,7 +36,8 @@ void check_keys(const ConfigNode& camera, const std::string& name, CameraChain& 
                                           name + ".distortion_model",
                                           name + ".distortion_coeffs",
                                           name + ".resolution",
-                                          name + ".T_cn_cnm1"};
+                                          name + ".T_cn_cnm1",
+                                          name + ".readout_ms"};
   for (std::size_t i = 0; i < camera.items.size(); ++i) {
     const std::string key = name + "." + camera.keys[i];
     if (is_ignored_key(camera.keys[i])) {
@@ -156,6 +157,11 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
     }
     const CameraDescription description = read_description(*camera, name);
     chain.cameras.push_back({description, read_cam_from_rig(*camera, name, chain)});
+    if (const ConfigNode* readout = camera->find("readout_ms")) {
+      const double readout_ms =
+          config_double(*readout, name + ".readout_ms", {.low = -1e3, .high = 1e3});
+      chain.cameras.back().readout_s = 1e-3 * readout_ms;
+    }
   }
   check_numbering(config, chain.cameras.size());
   if (chain.cameras.empty()) return std::nullopt;
@@ -180,6 +186,8 @@ std::string format_camchain(const CameraChain& chain) {
       text += fmt::format("  distortion_coeffs: [{}]\n", fmt::join(camera.distortion_coeffs, ", "));
     }
     text += fmt::format("  resolution: [{}, {}]\n", camera.width_px, camera.height_px);
+    const double readout_s = chain.cameras[i].readout_s;
+    if (readout_s != 0.0) text += fmt::format("  readout_ms: {:.6g}\n", 1e3 * readout_s);
     if (i == 0) continue;
     const Eigen::Matrix4d from_previous =
         (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
@@ -201,7 +209,8 @@ Rig make_rig(const CameraChain& chain, const CameraRegistry& registry) {
         {registry.make_camera(camera.description),
          camera.cam_from_rig,
          camera.description,
-         [models](const CameraDescription& other) { return models->make_camera(other); }});
+         [models](const CameraDescription& other) { return models->make_camera(other); },
+         camera.readout_s});
   }
   return rig;
 }

@@ -19,6 +19,7 @@ namespace waymark {
 struct ChainCamera {
   CameraDescription description;  ///< Model and numbers, not checked yet.
   Rigid3 cam_from_rig;            ///< Identity for camera 0; translation in metres.
+  double readout_s = 0.0;         ///< See RigCamera.
 };
 
 /// The calibration of a rig, as written: cameras are made of it by make_rig().

@@ -146,6 +146,15 @@ TEST(Camchain, DepthFactor) {
             "a.yaml:2: depth.factor is -1, expected a number from 0.001 to 1000000000");
 }
 
+TEST(Camchain, ReadoutOfARollingShutter) {
+  EXPECT_EQ(make_rig(*read(one_camera(""))).cameras[0].readout_s, 0.0);
+  EXPECT_DOUBLE_EQ(make_rig(*read(one_camera(", readout_ms: 22.5"))).cameras[0].readout_s, 0.0225);
+  EXPECT_DOUBLE_EQ(make_rig(*read(one_camera(", readout_ms: -30"))).cameras[0].readout_s, -0.03)
+      << "from the bottom up";
+  EXPECT_EQ(error_of(one_camera(", readout_ms: 33000")),
+            "a.yaml:1: cam0.readout_ms is 33000, expected a number from -1000 to 1000");
+}
+
 TEST(Camchain, SettingsAloneHaveNoCameras) {
   EXPECT_FALSE(read("features: {count: 1000}\n"));
   EXPECT_FALSE(read(""));

@@ -23,6 +23,9 @@ struct RigCamera {
   /// Makes the camera of another description, as the registry did that make_rig() was given. Where
   /// it is missing the camera is taken as it is.
   CameraFactory remake = nullptr;
+  /// Rolling shutter: from reading the first row to reading the last. A frame's time is that of the
+  /// row in the middle. 0: all rows are read at once.
+  double readout_s = 0.0;
 };
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.

@@ -10,6 +10,7 @@
 #include "waymark/camera/tangent.h"
 #include "waymark/image/pyramid.h"
 #include "waymark/image/range_precision.h"
+#include "waymark/image/rolling_shutter.h"
 #include "waymark/image/stereo_curve.h"
 
 namespace waymark {
@@ -106,17 +107,37 @@ void measure_stereo_ranges(const Rig& rig, Features& features) {
   }
 }
 
-std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig) {
-  auto anew = std::make_shared<Features>(features);
-  const std::vector<std::uint8_t> is_valid = derive_geometry(rig, *anew);
+namespace {
+
+/// What follows from pixels that are elsewhere than before, or in other cameras.
+void derive_anew(const Rig& rig, const Features& before, bool is_moved, Features& features) {
+  const std::vector<std::uint8_t> is_valid = derive_geometry(rig, features);
   for (std::size_t i = 0; i < features.size(); ++i) {
     if (is_valid[i]) continue;
-    anew->bearings[i] = features.bearings[i];
-    anew->level_pixel_from_bearing[i] = features.level_pixel_from_bearing[i];
-    anew->size_rad[i] = features.size_rad[i];
+    features.bearings[i] = before.bearings[i];
+    features.level_pixel_from_bearing[i] = before.level_pixel_from_bearing[i];
+    features.size_rad[i] = before.size_rad[i];
   }
-  derive_depth_ranges(features, *anew);
-  if (rig.cameras.size() == 2) measure_stereo_ranges(rig, *anew);
+  // What was seen a moment before is as far away.
+  if (!is_moved) derive_depth_ranges(before, features);
+  if (rig.cameras.size() == 2) measure_stereo_ranges(rig, features);
+}
+
+}  // namespace
+
+std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig) {
+  auto anew = std::make_shared<Features>(features);
+  const bool is_moved = correct_rolling(rig, features.motion, *anew);
+  derive_anew(rig, features, is_moved, *anew);
+  return anew;
+}
+
+std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
+                                      const Rig& rig,
+                                      const RigMotion& motion) {
+  if (features->motion == motion) return features;
+  auto anew = std::make_shared<Features>(*features);
+  if (correct_rolling(rig, motion, *anew)) derive_anew(rig, *features, true, *anew);
   return anew;
 }
 

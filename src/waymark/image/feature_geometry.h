@@ -28,4 +28,9 @@ void measure_stereo_ranges(const Rig& rig, Features& features);
 /// all of that stays as it was.
 std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig);
 
+/// The same features of a rig that moved otherwise while they were seen.
+std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
+                                      const Rig& rig,
+                                      const RigMotion& motion);
+
 }  // namespace waymark

@@ -29,6 +29,15 @@ using Descriptor = std::array<std::uint64_t, 4>;
 /// In place of the index of a feature: none.
 inline constexpr std::uint32_t kNoFeature = UINT32_MAX;
 
+/// How what is seen moves past the rig, in its frame: a point at X moves by shift + turn x X. All 0
+/// where that is not known.
+struct RigMotion {
+  Eigen::Vector3f turn_rad_s = Eigen::Vector3f::Zero();   ///< That of rig_from_world.
+  Eigen::Vector3f shift_per_s = Eigen::Vector3f::Zero();  ///< In metres (map units for mono).
+  float inverse_range = 0.0f;  ///< Of what is seen, in the median; 1/m (1 / map units).
+  bool operator==(const RigMotion&) const = default;
+};
+
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
 /// none and belong to a primary feature.
@@ -49,6 +58,10 @@ struct Features {
   std::vector<float> range_m;
   /// Standard deviation of the inverse range in 1/m; 0 where there is no range.
   std::vector<float> inverse_range_sigma;
+  RigMotion motion;  ///< At the frame's time.
+  /// Per camera the readout that the keypoints are corrected for: they are where all of them would
+  /// have been seen at the frame's time.
+  std::array<float, 2> readout_s = {};
   FeatureGrid grid;  ///< Of the primary features, by level-0 pixel.
 
   /// Features of both cameras.

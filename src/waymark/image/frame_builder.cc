@@ -12,6 +12,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/brief.h"
 #include "waymark/image/feature_geometry.h"
+#include "waymark/image/rolling_shutter.h"
 
 namespace waymark {
 namespace {
@@ -108,7 +109,8 @@ void check_sizes(const FrameImages& images, const Rig& rig) {
   if (!images.mask.is_empty()) check_size(images.mask, *rig.cameras[0].camera, "mask");
 }
 
-std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
+std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images,
+                                                    const RigMotion& motion) {
   check_sizes(images, rig_);
   auto features = std::make_shared<Features>();
   const auto features_start = std::chrono::steady_clock::now();
@@ -118,16 +120,50 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images) {
   if (!images.image1.is_empty()) {
     add_stereo(images, *features);
   } else if (!images.depth.is_empty()) {
-    sample_depth(images.depth,
-                 settings_.depth,
-                 features->keypoints,
-                 features->bearings,
-                 features->level_pixel_from_bearing,
-                 features->range_m,
-                 features->inverse_range_sigma);
+    add_depth(images, motion, *features);
   }
   times_.depth_ms = ms_since(depth_start);
-  return features;
+  return moved(std::move(features), rig_, motion);
+}
+
+bool FrameBuilder::needs_motion(const FrameImages& images) const {
+  const bool has_lag = images.depth_lag_ns != 0 || settings_.depth.lag_ms != 0.0;
+  return rig_.cameras[0].readout_s != 0.0 || (!images.depth.is_empty() && has_lag);
+}
+
+/// Looks where the features were when the depth image was taken, all at once, and how far away
+/// they were at the frame's time.
+void FrameBuilder::add_depth(const FrameImages& images,
+                             const RigMotion& motion,
+                             Features& features) {
+  const RigCamera& camera = rig_.cameras[0];
+  const float lag_s = 1e-9f * static_cast<float>(images.depth_lag_ns) +
+                      1e-3f * static_cast<float>(settings_.depth.lag_ms);
+  const auto readout_s = static_cast<float>(camera.readout_s);
+  keypoints_ = features.keypoints;
+  std::vector<Eigen::Vector3f> bearings = features.bearings;
+  for (std::size_t i = 0; i < keypoints_.size() && motion != RigMotion{}; ++i) {
+    Keypoint& keypoint = keypoints_[i];
+    const float seconds = lag_s - readout_s * row_delay(*camera.camera, keypoint.y_px);
+    const Eigen::Vector3f shift = seconds * bearing_rate(motion, camera, features, i);
+    const Eigen::Vector2f shift_px = static_cast<float>(Pyramid::scale(keypoint.level)) *
+                                     (features.level_pixel_from_bearing[i] * shift);
+    keypoint.x_px += shift_px.x();
+    keypoint.y_px += shift_px.y();
+    bearings[i] = (bearings[i] + shift).normalized();
+  }
+  sample_depth(images.depth,
+               settings_.depth,
+               keypoints_,
+               bearings,
+               features.level_pixel_from_bearing,
+               features.range_m,
+               features.inverse_range_sigma);
+  const Eigen::Vector3f shift = lag_s * camera_shift(motion, camera);
+  for (std::size_t i = 0; i < keypoints_.size(); ++i) {
+    const float farther_m = bearings[i].dot(shift);
+    if (features.range_m[i] > 2.0f * std::abs(farther_m)) features.range_m[i] -= farther_m;
+  }
 }
 
 const TangentArrays& FrameBuilder::compute_tangents(const Camera& camera) {

@@ -66,7 +66,13 @@ class FrameBuilder {
 
   /// Throws InputError where the size of an image is not the camera's. image1 takes a rig of two
   /// cameras; a rig of two without image1 gives features without range.
-  std::shared_ptr<const Features> build(const FrameImages& images);
+  ///
+  /// motion: as far as it is known beforehand; features of rolling shutters are corrected by it,
+  /// and found in depth images of other times.
+  std::shared_ptr<const Features> build(const FrameImages& images, const RigMotion& motion = {});
+
+  /// Whether features depend on the motion: of rolling shutters, or in depth images of other times.
+  bool needs_motion(const FrameImages& images) const;
 
   const FrameTimes& times() const { return times_; }
 
@@ -77,6 +83,7 @@ class FrameBuilder {
   void extract_primary(const FrameImages& images, Features& features);
   void extract_keypoints(const FrameImages& images);
   void add_stereo(const FrameImages& images, Features& features);
+  void add_depth(const FrameImages& images, const RigMotion& motion, Features& features);
   const TangentArrays& compute_tangents(const Camera& camera);
   static void reserve(Features& features, std::size_t count);
   static void append(Features& features,

@@ -4,6 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <Eigen/Geometry>
+#include <cmath>
+
 #include "waymark/base/check.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/image/image_testing.h"
@@ -115,6 +118,49 @@ TEST(FrameBuilder, DepthImageGivesRangeAndSigma) {
   for (std::size_t i = 0; i < features->num_primary; ++i) {
     EXPECT_NEAR(features->range_m[i] * features->bearings[i].z(), 2.0f, 1e-3f);
     EXPECT_GT(features->inverse_range_sigma[i], 0.0f);
+  }
+}
+
+TEST(FrameBuilder, ReadsDepthWhereFeaturesWereThen) {
+  const StereoImages images;
+  DepthImage ramp(kFrameWidth, kFrameHeight);
+  for (int v = 0; v < kFrameHeight; ++v) {
+    for (int u = 0; u < kFrameWidth; ++u) ramp.row(v)[u] = static_cast<std::uint16_t>(2000 + u);
+  }
+  FrameBuilder builder({{{make_camera(), Rigid3()}}}, {.features = {.count = 300}});
+  FrameImages input{.image0 = images.left(), .depth = ramp.view()};
+  EXPECT_FALSE(builder.needs_motion(input));
+  input.depth_lag_ns = 20'000'000;
+  EXPECT_TRUE(builder.needs_motion(input));
+  RigMotion motion;
+  motion.turn_rad_s = {0.0f, 1.0f, 0.0f};  // At least 6 px to the right.
+  const auto at_once = builder.build(input);
+  const auto later = builder.build(input, motion);
+  ASSERT_EQ(later->size(), at_once->size());
+  int num_right = 0;
+  for (std::size_t i = 0; i < later->size(); ++i) {
+    EXPECT_EQ(later->keypoints[i].x_px, at_once->keypoints[i].x_px) << "a global shutter";
+    const Eigen::Vector3f bearing = at_once->bearings[i];
+    const Eigen::Vector3f then = (bearing + 0.02f * motion.turn_rad_s.cross(bearing)).normalized();
+    const double column_px = 159.5 + kFocalPx * then.x() / then.z();
+    num_right += std::abs(later->range_m[i] - (2.0 + 1e-3 * column_px) / then.z()) < 2e-3;
+  }
+  EXPECT_GT(num_right, static_cast<int>(later->size() * 9 / 10));
+}
+
+TEST(FrameBuilder, TakesRangesBackToTheTimeOfTheFrame) {
+  const StereoImages images;
+  DepthImage wall(kFrameWidth, kFrameHeight);
+  std::fill(wall.values.begin(), wall.values.end(), std::uint16_t{4000});
+  FrameBuilder builder({{{make_camera(), Rigid3()}}}, {.features = {.count = 300}});
+  FrameImages input{.image0 = images.left(), .depth = wall.view(), .depth_lag_ns = 20'000'000};
+  RigMotion motion;
+  motion.shift_per_s = {0.0f, 0.0f, -1.0f};  // Towards the wall.
+  const auto features = builder.build(input, motion);
+  ASSERT_GT(features->size(), 200u);
+  for (std::size_t i = 0; i < features->size(); ++i) {
+    const float z = features->bearings[i].z();
+    EXPECT_NEAR(features->range_m[i], 4.0f / z + 0.02f * z, 2e-3f);
   }
 }
 

@@ -60,6 +60,7 @@ struct FrameImages {
   ImageView image1 = {};          ///< Camera 1 of a stereo rig; empty otherwise.
   DepthView depth = {};  ///< Depth along z registered to camera 0; empty where there is none.
   ImageView mask = {};   ///< Of camera 0; no features where it is 0. Empty: everything is used.
+  std::int64_t depth_lag_ns = 0;  ///< How much later than image0 the depth was taken.
 };
 
 }  // namespace waymark

@@ -47,6 +47,7 @@ struct StereoSettings {
 /// Depth images.
 struct DepthSettings {
   double factor = 1000.0;  ///< Units of the depth image per metre.
+  double lag_ms = 0.0;     ///< How much later they are taken than their time stamps say.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -56,6 +57,13 @@ struct DepthSettings {
         self.factor,
         SettingInfo{
             .low = 1.0, .high = 1e6, .unit = "1/m", .help = "Units of the depth image per metre."});
+    field("lag_ms",
+          self.lag_ms,
+          SettingInfo{.low = -100.0,
+                      .high = 100.0,
+                      .unit = "ms",
+                      .help = "Depth images are taken so much later than their time stamps say. "
+                              "What the time stamps say is known."});
   }
 };
 

@@ -271,6 +271,7 @@ TEST(TumRgbd, KeepsColourImagesWithoutDepth) {
   EXPECT_EQ(first->timestamp_ns, 10'000'000'000);
   EXPECT_EQ(first->images.at(0).view().at(3, 3), 90);
   ASSERT_TRUE(first->depth);
+  EXPECT_EQ(first->depth_lag_ns, 10'000'000);
   EXPECT_EQ(first->depth->view().at(31, 23), 5000);
   EXPECT_FALSE(input->next()->depth);
   EXPECT_TRUE(input->next()->depth);

@@ -36,6 +36,7 @@ struct InputFrame {
   std::int64_t timestamp_ns = 0;    ///< Increases from frame to frame.
   std::vector<Image> images;        ///< Grey, one per camera of the setup.
   std::optional<DepthImage> depth;  ///< Of camera 0; nothing where the moment has no depth image.
+  std::int64_t depth_lag_ns = 0;    ///< How much later the depth image was taken.
   std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
   std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
   FrameFault fault = FrameFault::kNone;  ///< Why there are no images.

@@ -18,6 +18,7 @@ struct ListedFrame {
   std::int64_t timestamp_ns = 0;              ///< As the data set states it.
   std::vector<std::filesystem::path> images;  ///< One per camera.
   std::filesystem::path depth;                ///< Empty: none.
+  std::int64_t depth_lag_ns = 0;              ///< How much later that was taken.
 };
 
 /// A data set of image files, understood but not yet decoded: what each layout comes down to.

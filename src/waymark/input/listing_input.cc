@@ -84,6 +84,7 @@ void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) cons
   if (listed.depth.empty()) return;
   const ImageSize size = size_of(frame.images.front());
   frame.depth = read_depth_image(listed.depth);
+  frame.depth_lag_ns = listed.depth_lag_ns;
   if (!frame.depth) {
     frame.warning =
         fmt::format("{}: {}", listed.depth.string(), describe_bad_image(listed.depth, kDepthImage));

@@ -83,6 +83,7 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
   for (std::size_t i = 0; i < pairs.size(); ++i) {
     if (!pairs[i]) continue;
     listing.frames[i].depth = folder / depth[*pairs[i]].name;
+    listing.frames[i].depth_lag_ns = depth[*pairs[i]].timestamp_ns - colour[i].timestamp_ns;
     ++num_pairs;
   }
   if (num_pairs == 0) {

@@ -19,8 +19,8 @@ constexpr BesideOptions kBeside = {.num_known_steps = 5, .distance = 0.8, .angle
 
 /// Keyframes when the calibration is looked at first, then at twice as many and so on.
 constexpr std::size_t kFirstCalibration = 30;
-/// With so many it is looked at in the end.
-constexpr std::size_t kLeastKeyframes = 10;
+/// In the end so few are looked at: they tell the readout of a rolling shutter.
+constexpr std::size_t kFewestInTheEnd = 5;
 
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
@@ -48,7 +48,9 @@ void GlobalMapper::take_over(const MapSnapshot& before) {
 void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(message)); }
 
 void GlobalMapper::add(const NewKeyframe& message) {
+  const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
   const Mapper::Changes changes = mapper_.add(message);
+  look_with_calibration(before);
   update_places(changes);
   if (!settings_.enabled || close_alike(changes.added.back())) return;
   if (!unadjusted_.is_valid()) consolidate_some(kNumConsolidatedPerKeyframe);
@@ -139,7 +141,7 @@ void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& befor
 void GlobalMapper::refine_globally(bool with_calibration) {
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
   mapper_.refine_globally(with_calibration && is_calibrating_ &&
-                          mapper_.map().keyframes().size() >= kLeastKeyframes);
+                          mapper_.map().keyframes().size() >= kFewestInTheEnd);
   look_with_calibration(before);
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/mapping/readout.h"
 #include "waymark/optimize/residual.h"
 
 namespace waymark {
@@ -189,7 +190,10 @@ WindowAdjustment compute_adjustment(const Map& map,
   WindowProblem window_problem = make_problem(map, window);
   std::optional<KnownCalibration> calibration;
   if (known) {
-    calibration = recalibrate(map, window_problem.observations, *known, window_problem.problem);
+    calibration = find_readout(map, window_problem.observations, *known, window_problem.problem);
+    if (!calibration && map.keyframes().size() >= known->min_keyframes) {
+      calibration = recalibrate(map, window_problem.observations, *known, window_problem.problem);
+    }
   }
   const BundleResult result = adjust_bundle(window_problem.problem, options);
   WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};
@@ -197,6 +201,14 @@ WindowAdjustment compute_adjustment(const Map& map,
     if (result.is_outlier[i]) adjustment.outliers.push_back(window_problem.observations[i]);
   }
   return adjustment;
+}
+
+std::optional<KnownCalibration> look_for_readout(const Map& map,
+                                                 const BundleWindow& window,
+                                                 const KnownCalibration& known) {
+  if (window.moving.empty() || window.landmarks.empty()) return std::nullopt;
+  WindowProblem window_problem = make_problem(map, window);
+  return find_readout(map, window_problem.observations, known, window_problem.problem);
 }
 
 std::vector<LandmarkId> drop_outliers(Map& map,

@@ -42,6 +42,11 @@ WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleOptions& options,
                                     const KnownCalibration* known = nullptr);
 
+/// Looks for the readout of a rolling shutter in what a window sees: see find_readout().
+std::optional<KnownCalibration> look_for_readout(const Map& map,
+                                                 const BundleWindow& window,
+                                                 const KnownCalibration& known);
+
 /// Removes observations, where they still exist, and of the landmarks those without support.
 /// Returns the erased landmarks.
 std::vector<LandmarkId> drop_outliers(Map& map,

@@ -324,6 +324,7 @@ KnownCalibration KnownCalibration::as_given(std::shared_ptr<const Rig> rig,
     known.sigma[i] = known.parameters[static_cast<std::size_t>(i)].prior_sigma;
   }
   known.is_always_refined = is_always_refined;
+  known.given_readout_s = known.given->cameras[0].readout_s;
   return known;
 }
 
@@ -336,6 +337,14 @@ std::vector<CalibrationEstimate> KnownCalibration::estimates() const {
                          change[at],
                          parameters[i].prior_sigma,
                          sigma[at]});
+  }
+  if (readout_sigma_s > 0.0) {
+    const double readout_s = rig->cameras[0].readout_s;
+    estimates.push_back({"readout_ms",
+                         1e3 * given_readout_s,
+                         1e3 * (readout_s - given_readout_s),
+                         1e3 * kReadoutPriorS,
+                         1e3 * readout_sigma_s});
   }
   return estimates;
 }

@@ -14,6 +14,9 @@
 
 namespace waymark {
 
+/// Readouts are that long: around what was given or, where nothing was, around none.
+inline constexpr double kReadoutPriorS = 0.02;
+
 /// What is known of the calibration of the cameras in use.
 struct KnownCalibration {
   std::shared_ptr<const Rig> given;  ///< By the user: the prior of every estimate.
@@ -25,6 +28,11 @@ struct KnownCalibration {
   std::vector<CalibrationParameter> parameters;
   /// Whether every parameter becomes its estimate, also where the images do not contradict it.
   bool is_always_refined = false;
+  /// Of a rolling shutter, as the user says; that in use is in `rig`, and in `given`, too.
+  double given_readout_s = 0.0;
+  double readout_sigma_s = 0.0;  ///< Standard deviation of the estimate; 0 where there is none.
+  /// Before a map has so many keyframes only the readout is estimated, which few tell.
+  std::size_t min_keyframes = 0;
 
   /// The same, parameter by parameter.
   std::vector<CalibrationEstimate> estimates() const;

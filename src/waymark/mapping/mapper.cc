@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/mapper.h"
 
+#include <algorithm>
+#include <array>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -12,13 +14,25 @@
 #include "waymark/mapping/triangulate.h"
 
 namespace waymark {
+namespace {
+
+/// To tell a camera from how it moves takes that many.
+constexpr std::size_t kMinCalibrationKeyframes = 10;
+/// A rolling shutter, which bends all that the map is made of, shows at so few, or when they turned
+/// more.
+constexpr std::array<std::size_t, 5> kReadoutKeyframes = {5, 7, 10, 14, 20};
+
+}  // namespace
 
 Mapper::Mapper(std::shared_ptr<const Rig> rig,
                const MappingSettings& settings,
                const CalibrationSettings& calibration)
     : settings_(settings),
+      is_calibrating_(calibration.is_refined() && CalibrationParameters(*rig).size() > 0),
       calibration_(KnownCalibration::as_given(rig, calibration.refine == "on")),
-      projection_(std::move(rig)) {}
+      projection_(std::move(rig)) {
+  calibration_.min_keyframes = kMinCalibrationKeyframes;
+}
 
 Mapper::Changes Mapper::add(const NewSubmap& message) {
   const SubmapId submap = map_.add_submap(message.is_metric);
@@ -63,7 +77,20 @@ Mapper::Changes Mapper::add(const NewKeyframe& message) {
   adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 8}, dirty_);
   std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_);
   refresh_appearances();
+  look_for_readout(id);
   return {{id}, std::move(erased)};
+}
+
+void Mapper::look_for_readout(KeyframeId newest) {
+  const std::size_t count = map_.keyframes().size();
+  if (!is_calibrating_ || std::ranges::find(kReadoutKeyframes, count) == kReadoutKeyframes.end()) {
+    return;
+  }
+  const SubmapId submap = map_.keyframes().at(newest).submap;
+  const auto found = waymark::look_for_readout(map_, whole_submap(map_, submap), calibration_);
+  if (!found) return;
+  look_with(*found);
+  apply(adjust_globally(map_, submap));
 }
 
 KeyframeId Mapper::insert(const NewKeyframe& message) {
@@ -118,6 +145,11 @@ void Mapper::look_with(const KnownCalibration& calibration) {
   calibration_ = calibration;
 }
 
+void Mapper::set_motion(KeyframeId id, const RigMotion& motion) {
+  const Keyframe& keyframe = map_.keyframes().at(id);
+  map_.measure_keyframe(id, keyframe.rig, moved(keyframe.features, *keyframe.rig, motion));
+}
+
 void Mapper::apply(const GlobalAdjustment& adjustment) {
   if (adjustment.calibration) look_with(*adjustment.calibration);
   apply_adjustment(map_, adjustment, dirty_);
@@ -134,8 +166,12 @@ void Mapper::refresh_appearances() {
 void Mapper::refine_globally(bool with_calibration) {
   const std::vector<SubmapId> submaps = submaps_by_size(map_);
   for (const SubmapId submap : submaps) {
-    const bool is_largest = submap == submaps.front();
-    apply(adjust_globally(map_, submap, with_calibration && is_largest ? &calibration_ : nullptr));
+    const bool is_calibrating = with_calibration && submap == submaps.front();
+    const double readout_s = calibration_.rig->cameras[0].readout_s;
+    apply(adjust_globally(map_, submap, is_calibrating ? &calibration_ : nullptr));
+    // What else is wrong shows once images are no longer bent.
+    if (readout_s == calibration_.rig->cameras[0].readout_s) continue;
+    apply(adjust_globally(map_, submap, &calibration_));
   }
 }
 

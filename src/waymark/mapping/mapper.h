@@ -36,6 +36,8 @@ class Mapper {
   Changes add(const NewKeyframe& message);
   /// Adjusts every sub-map as a whole, the largest of them with the calibration.
   void refine_globally(bool with_calibration);
+  /// How the rig moved while it saw a keyframe, known better now.
+  void set_motion(KeyframeId id, const RigMotion& motion);
   /// Takes in what adjusting a whole sub-map gave.
   void apply(const GlobalAdjustment& adjustment);
 
@@ -55,10 +57,12 @@ class Mapper {
   KeyframeId insert(const NewKeyframe& message);
   std::shared_ptr<const Features> measured(const std::shared_ptr<const Features>& features,
                                            const std::shared_ptr<const Rig>& rig) const;
+  void look_for_readout(KeyframeId newest);
   void look_with(const KnownCalibration& calibration);
   void refresh_appearances();
 
   const MappingSettings settings_;
+  const bool is_calibrating_;
   KnownCalibration calibration_;
   Map map_;
   DirtyLandmarks dirty_;

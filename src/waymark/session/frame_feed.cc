@@ -63,6 +63,7 @@ FrameImages borrow(const InputFrame& frame) {
   input.image0 = frame.images.at(0).view();
   if (frame.images.size() > 1) input.image1 = frame.images[1].view();
   if (frame.depth) input.depth = frame.depth->view();
+  input.depth_lag_ns = frame.depth_lag_ns;
   if (frame.mask) input.mask = frame.mask->view();
   return input;
 }

@@ -111,6 +111,7 @@ class System::Impl {
   void add(const MapperMessage& message);
   bool is_due(FrameId frame) const;
   void finish_adjustment();
+  void tell_motions();
   PublishedMap publish();
 
   // Fixed after construction.
@@ -156,7 +157,8 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   const FrameId id = memory_.next();
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
   look_with_calibration();
-  const Frame frame{id, images.timestamp_ns, builder_.build(images)};
+  const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
+  const Frame frame{id, images.timestamp_ns, builder_.build(images, motion)};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
   {
@@ -296,6 +298,7 @@ void System::Impl::finish() {
     throw;
   }
   if (adjuster_.is_busy()) finish_adjustment();
+  tell_motions();
   mapper_.finish();
   published_ = mapper_.snapshot();
   visible_ = publish();
@@ -303,6 +306,20 @@ void System::Impl::finish() {
   memory_.settle(*map());
   const bool is_long = memory_.entries().size() >= kFramesToCheck;
   if (is_long && !is_focal_checked_) focal_check_ = check_focal_length(*map());
+}
+
+/// Of keyframes by the frames around them, of which those after them were not there yet.
+void System::Impl::tell_motions() {
+  if (!settings_.calibration.is_refined() && given_rig_->cameras[0].readout_s == 0.0) return;
+  const std::shared_ptr<const Map> map = mapper_.snapshot().map;
+  map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.frame < memory_.first()) return;
+    if (auto motion = memory_.motion_in(keyframe.frame, *map)) {
+      motion->inverse_range =
+          median_inverse_range(*map, keyframe.rig_from_world, keyframe.landmarks);
+      mapper_.set_motion(id, *motion);
+    }
+  });
 }
 
 std::vector<TrajectoryFrame> System::Impl::trajectory() const {

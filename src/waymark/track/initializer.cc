@@ -7,6 +7,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/two_view.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
 #include "waymark/track/search_radius.h"
@@ -150,6 +151,20 @@ LandmarkSet landmark_set(const NewSubmap& submap) {
   return set;
 }
 
+/// How the rig moved in a keyframe of a start, by the nearest of the frames that have a pose.
+RigMotion motion_at(const InitialKeyframe& keyframe, const std::vector<InitialKeyframe>& posed) {
+  const auto distance_ns = [&](const InitialKeyframe& other) {
+    const std::int64_t gap_ns = std::abs(other.timestamp_ns - keyframe.timestamp_ns);
+    return gap_ns == 0 ? INT64_MAX : gap_ns;
+  };
+  const InitialKeyframe& other = *std::ranges::min_element(posed, {}, distance_ns);
+  const double seconds = 1e-9 * static_cast<double>(other.timestamp_ns - keyframe.timestamp_ns);
+  const Rigid3 other_from_keyframe = other.rig_from_world * keyframe.rig_from_world.inverse();
+  const Eigen::Vector<float, 6> rate = (other_from_keyframe.log() / seconds).cast<float>();
+  constexpr float kMedianDistance = 1.0f;  // The unit of length of a start.
+  return {rate.tail<3>(), rate.head<3>(), 1.0f / kMedianDistance};
+}
+
 }  // namespace
 
 Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed)
@@ -197,8 +212,7 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
       reason_ = FrameReason::kTooLittleParallax;
       continue;
     }
-    if (std::optional<Initialization> start = try_pair(reference, frame)) {
-      fill(reference, *start);
+    if (std::optional<Initialization> start = start_from_pair(reference, frame)) {
       reason_ = FrameReason::kNone;
       return start;
     }
@@ -237,6 +251,22 @@ bool Initializer::has_moved(const Reference& reference, const Frame& frame) cons
   return std::count_if(reference.matches.begin(), reference.matches.end(), moved) >= kMinLandmarks;
 }
 
+std::optional<Initialization> Initializer::start_from_pair(const Reference& reference,
+                                                           const Frame& frame) {
+  std::optional<Initialization> start = try_pair(reference, frame);
+  if (!start) return std::nullopt;
+  fill(reference, *start);
+  if (rig_->cameras[0].readout_s == 0.0) return start;
+  // Again, from what the rolling shutter would have seen at once, now that the motion is known.
+  Reference straight = reference;
+  straight.frame.features = start->submap.keyframes[0].features;
+  auto again =
+      try_pair(straight, {frame.id, frame.timestamp_ns, start->submap.keyframes[1].features});
+  if (!again) return start;
+  fill(straight, *again);
+  return again;
+}
+
 std::optional<Initialization> Initializer::try_pair(const Reference& reference,
                                                     const Frame& frame) {
   const MatchedBearings bearings(*reference.frame.features, *frame.features, reference.matches);
@@ -272,6 +302,7 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
 
 void Initializer::fill(const Reference& reference, Initialization& start) {
   const LandmarkSet landmarks = landmark_set(start.submap);
+  std::vector<InitialKeyframe> posed = start.submap.keyframes;
   start.filled.push_back(
       {reference.frame.id, {KeyframeId{0}, 1.0, Rigid3{}}, reference.frame.features});
   // Each pose is the guess for the next one, from the reference outwards. Where the frames next to
@@ -288,6 +319,7 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
     if (!rig_from_world) return;
     guess = *rig_from_world;
     start.filled.push_back({passed.id, {KeyframeId{0}, 1.0, *rig_from_world}, passed.features});
+    posed.push_back({passed.id, passed.timestamp_ns, *rig_from_world, nullptr});
   };
   Rigid3 guess;
   for (auto it = middle; it != passed_.end(); ++it) {
@@ -295,6 +327,9 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
   }
   guess = reaches_reference ? Rigid3{} : start.rig_from_world;
   for (auto it = middle; it != passed_.begin(); --it) try_fill(*std::prev(it), guess);
+  for (InitialKeyframe& keyframe : start.submap.keyframes) {
+    keyframe.features = moved(keyframe.features, *rig_, motion_at(keyframe, posed));
+  }
 }
 
 std::optional<Rigid3> Initializer::locate(const Frame& frame,

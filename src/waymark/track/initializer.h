@@ -54,7 +54,9 @@ class Initializer {
   void match(Reference& reference, const Frame& frame);
   /// Whether as many features as a map needs moved; if not, the pair has no parallax to look for.
   bool has_moved(const Reference& reference, const Frame& frame) const;
+  std::optional<Initialization> start_from_pair(const Reference& reference, const Frame& frame);
   std::optional<Initialization> try_pair(const Reference& reference, const Frame& frame);
+  /// Locates the frames between, which also tell how the rig moved in the keyframes.
   void fill(const Reference& reference, Initialization& start);
   std::optional<Rigid3> locate(const Frame& frame,
                                const Rigid3& guess,

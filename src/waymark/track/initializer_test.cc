@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include <algorithm>
+#include <cmath>
 #include <functional>
 #include <set>
 
@@ -116,6 +117,23 @@ TEST(Initializer, MonoFillsTheFramesItSkipped) {
     EXPECT_LT(error.tail<3>().norm(), 0.012) << filled.frame.value;
   }
   EXPECT_EQ(std::count(is_filled.begin(), is_filled.end(), false), 0);
+}
+
+TEST(Initializer, MonoTellsHowTheRigMovedInItsKeyframes) {
+  const Scene scene = mono_scene(
+      [](std::uint32_t i) { return pose_at(0.06 * i, 0.002 * i, 0.0, 0.02 * i + 0.001 * i * i); });
+  const Started started = run(scene, false, 40);
+  ASSERT_TRUE(started.start);
+  for (const InitialKeyframe& keyframe : started.start->submap.keyframes) {
+    const RigMotion& motion = keyframe.features->motion;
+    const double yaw_rad_s = (0.02 + 0.002 * keyframe.frame.value) / 0.05;
+    EXPECT_NEAR(std::abs(motion.turn_rad_s.y()), yaw_rad_s, 0.1) << keyframe.frame.value;
+    EXPECT_GT(motion.shift_per_s.norm(), 0.05f);
+    EXPECT_EQ(motion.inverse_range, 1.0f);
+    EXPECT_EQ(keyframe.features->keypoints[3].x_px,
+              scene.look(keyframe.frame.value).features->keypoints[3].x_px)
+        << "a global shutter";
+  }
 }
 
 TEST(Initializer, MonoWaitsWhileTheCameraOnlyTurns) {

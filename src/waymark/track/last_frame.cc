@@ -2,7 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/last_frame.h"
 
+#include "waymark/base/median.h"
+
 namespace waymark {
+
+float median_inverse_range(const Map& map,
+                           const Rigid3& rig_from_world,
+                           std::span<const LandmarkId> landmarks) {
+  std::vector<float> inverse;
+  for (const LandmarkId id : landmarks) {
+    const Landmark* const landmark = id.is_valid() ? map.landmarks().find(id) : nullptr;
+    if (!landmark) continue;
+    const double distance = (rig_from_world * landmark->position_in_world).norm();
+    inverse.push_back(static_cast<float>(1.0 / distance));
+  }
+  return inverse.empty() ? 0.0f : median(inverse);
+}
 
 void LastFrame::set(const Frame& frame,
                     const RelativePose& pose,
@@ -12,6 +27,25 @@ void LastFrame::set(const Frame& frame,
   features_ = frame.features;
   landmarks_.assign(landmarks.begin(), landmarks.end());
   motion_.update(frame.timestamp_ns, rig_from_world);
+}
+
+RigMotion LastFrame::predict_motion(const Map& map) const {
+  RigMotion motion = motion_.mean_motion();
+  if (motion != RigMotion{}) {
+    motion.inverse_range = median_inverse_range(map, motion_.pose(), landmarks_);
+  }
+  return motion;
+}
+
+RigMotion LastFrame::motion_in(const Map& map,
+                               std::int64_t timestamp_ns,
+                               const Rigid3& rig_from_world,
+                               std::span<const LandmarkId> landmarks) const {
+  MotionModel model = motion_;
+  model.update(timestamp_ns, rig_from_world);
+  RigMotion motion = model.last_motion();
+  motion.inverse_range = median_inverse_range(map, rig_from_world, landmarks);
+  return motion;
 }
 
 void LastFrame::carry_over(const Map& map) {

@@ -21,10 +21,17 @@ class MotionModel {
   void reset() { has_velocity_ = false, has_pose_ = false; }
 
   void update(std::int64_t timestamp_ns, const Rigid3& rig_from_world) {
+    const bool has_turn_before = has_velocity_;
     has_velocity_ = has_pose_ && timestamp_ns > timestamp_ns_;
     if (has_velocity_) {
+      const double before_s = seconds_;
+      const Eigen::Vector3d turn_before = motion_.tail<3>() / before_s;
       seconds_ = 1e-9 * static_cast<double>(timestamp_ns - timestamp_ns_);
       motion_ = (rig_from_world * rig_from_world_.inverse()).log();
+      turn_change_.setZero();
+      if (has_turn_before) {
+        turn_change_ = (motion_.tail<3>() / seconds_ - turn_before) / (0.5 * (seconds_ + before_s));
+      }
     }
     timestamp_ns_ = timestamp_ns;
     rig_from_world_ = rig_from_world;
@@ -36,6 +43,21 @@ class MotionModel {
     rig_from_world_ = rig_from_world;
     motion_.head<3>() *= scale;
   }
+
+  /// Motion between the last two poses, without what is seen; 0 where it is not known.
+  RigMotion mean_motion() const {
+    if (!has_velocity_) return {};
+    const Eigen::Vector<float, 6> rate = (motion_ / seconds_).cast<float>();
+    return {rate.tail<3>(), rate.head<3>()};
+  }
+  /// The same at the last of them: hands turn faster and slower within frames.
+  RigMotion last_motion() const {
+    RigMotion motion = mean_motion();
+    motion.turn_rad_s += (0.5 * seconds_ * turn_change_).cast<float>();
+    return motion;
+  }
+
+  const Rigid3& pose() const { return rig_from_world_; }
 
   Rigid3 predict(std::int64_t timestamp_ns) const {
     if (!has_velocity_) return rig_from_world_;
@@ -50,7 +72,13 @@ class MotionModel {
   double seconds_ = 0.0;
   Rigid3 rig_from_world_;
   Vector6d motion_ = Vector6d::Zero();
+  Eigen::Vector3d turn_change_ = Eigen::Vector3d::Zero();  ///< In rad/s^2.
 };
+
+/// Median of the inverse distances of landmarks from a rig; 0 without any. Of ids that live.
+float median_inverse_range(const Map& map,
+                           const Rigid3& rig_from_world,
+                           std::span<const LandmarkId> landmarks);
 
 /// The newest frame that has a pose: what the next one is looked for from. Keeps its buffers.
 class LastFrame {
@@ -79,6 +107,15 @@ class LastFrame {
 
   /// Pose of a frame at this time if the motion goes on.
   Rigid3 predict(std::int64_t timestamp_ns) const { return motion_.predict(timestamp_ns); }
+
+  /// How the rig moves in the next frame if it goes on as before; 0 where that is not known. Were
+  /// the change of the turn to go on, too, errors of poses would come back larger in each frame.
+  RigMotion predict_motion(const Map& map) const;
+  /// How it moves in the next frame, whose pose and landmarks are known.
+  RigMotion motion_in(const Map& map,
+                      std::int64_t timestamp_ns,
+                      const Rigid3& rig_from_world,
+                      std::span<const LandmarkId> landmarks) const;
 
   /// Its landmarks with the looks that they had in it; after carry_over().
   const LandmarkSet& landmarks(const Map& map);

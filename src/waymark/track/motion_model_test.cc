@@ -37,6 +37,22 @@ TEST(MotionModel, KeepsTheVelocityWhenTheMapMoves) {
   EXPECT_TRUE(model.predict(200).matrix().isApprox((Rigid3::exp(larger) * moved).matrix(), 1e-12));
 }
 
+TEST(MotionModel, TellsHowFastTheRigTurns) {
+  MotionModel model;
+  const auto turned_by = [](double angle) {
+    return Rigid3::exp((Vector6d() << 0.0, 0.0, 0.0, 0.0, angle, 0.0).finished());
+  };
+  model.update(0, turned_by(0.0));
+  EXPECT_EQ(model.mean_motion(), RigMotion{});
+  model.update(100'000'000, turned_by(0.1));
+  EXPECT_FLOAT_EQ(model.mean_motion().turn_rad_s.y(), 1.0f);
+  EXPECT_FLOAT_EQ(model.last_motion().turn_rad_s.y(), 1.0f);
+  // By now it is an angle of 10 t^2, which is a turn of 20 t.
+  model.update(200'000'000, turned_by(0.4));
+  EXPECT_NEAR(model.mean_motion().turn_rad_s.y(), 3.0f, 1e-5f);
+  EXPECT_NEAR(model.last_motion().turn_rad_s.y(), 4.0f, 1e-5f);
+}
+
 TEST(MotionModel, ForgetsOnReset) {
   MotionModel model;
   model.update(0, Rigid3());

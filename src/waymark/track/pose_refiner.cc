@@ -3,6 +3,7 @@
 #include "waymark/track/pose_refiner.h"
 
 #include "waymark/image/pyramid.h"
+#include "waymark/image/rolling_shutter.h"
 
 namespace waymark {
 namespace {
@@ -50,7 +51,31 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
   return estimate.rig_from_world;
 }
 
-void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
+std::vector<SeenLandmark> PoseRefiner::seen_at_once(const Map& map,
+                                                    std::span<const SeenLandmark> seen,
+                                                    const Rigid3& rig_from_world,
+                                                    const RigMotion& motion,
+                                                    float readout_s) {
+  const TangentArrays& tangents = linearize(map, seen);
+  const RigCamera& camera = rig_->cameras[0];
+  std::vector<SeenLandmark> at_once;
+  for (std::size_t i = 0; i < living_.size(); ++i) {
+    if (!tangents.is_valid[i]) continue;
+    SeenLandmark& one = at_once.emplace_back(*living_[i]);
+    const Eigen::Vector3d point =
+        rig_from_world * map.landmarks().at(map.resolve(one.landmark)).position_in_world;
+    const auto inverse_range = static_cast<float>(1.0 / (camera.cam_from_rig * point).norm());
+    const Eigen::Vector3f moved = readout_s * row_delay(*camera.camera, one.y_px) *
+                                  bearing_rate(motion, camera, tangents.bearings[i], inverse_range);
+    const Eigen::Vector2f moved_px =
+        level_scales_[i] * (tangents.level_pixel_from_bearing[i] * moved);
+    one.x_px -= moved_px.x();
+    one.y_px -= moved_px.y();
+  }
+  return at_once;
+}
+
+const TangentArrays& PoseRefiner::linearize(const Map& map, std::span<const SeenLandmark> seen) {
   living_.clear();
   pixels_.clear();
   level_scales_.clear();
@@ -60,8 +85,11 @@ void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
     pixels_.emplace_back(one.x_px, one.y_px);
     level_scales_.push_back(static_cast<float>(Pyramid::scale(one.level)));
   }
-  const TangentArrays& tangents =
-      tangents_.compute(*rig_->cameras[0].camera, pixels_, level_scales_);
+  return tangents_.compute(*rig_->cameras[0].camera, pixels_, level_scales_);
+}
+
+void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
+  const TangentArrays& tangents = linearize(map, seen);
   observations_.clear();
   for (std::size_t i = 0; i < living_.size(); ++i) {
     if (!tangents.is_valid[i]) continue;

@@ -46,6 +46,15 @@ class PoseRefiner {
                                std::span<const SeenLandmark> seen,
                                const Rigid3& rig_from_world);
 
+  /// The living of the same, moved to where a rolling shutter would have seen them had it read all
+  /// rows at the time of the frame, by this motion there and this readout. rig_from_world: about
+  /// the pose of the frame.
+  std::vector<SeenLandmark> seen_at_once(const Map& map,
+                                         std::span<const SeenLandmark> seen,
+                                         const Rigid3& rig_from_world,
+                                         const RigMotion& motion,
+                                         float readout_s);
+
   /// What a frame near a keyframe sees of that keyframe's landmarks, given about its pose.
   std::vector<SeenLandmark> find(const Map& map,
                                  KeyframeId keyframe,
@@ -53,6 +62,7 @@ class PoseRefiner {
                                  const Rigid3& rig_from_world);
 
  private:
+  const TangentArrays& linearize(const Map& map, std::span<const SeenLandmark> seen);
   void measure(const Map& map, std::span<const SeenLandmark> seen);
 
   std::shared_ptr<const Rig> rig_;

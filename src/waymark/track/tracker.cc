@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "waymark/image/feature_geometry.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {
@@ -74,7 +75,19 @@ void Tracker::continue_in(const Map& map, TrackingPurpose purpose) {
   if (had_pose && !last_.has_pose()) mode_ = Mode::kLost;
 }
 
-TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, StageTimes& times) {
+RigMotion Tracker::predict_motion() const {
+  return mode_ == Mode::kTracking ? last_.predict_motion(*map_) : RigMotion{};
+}
+
+Frame Tracker::straightened(const Frame& frame, const LocatedFrame& located) const {
+  if (mode_ != Mode::kTracking || rig_->cameras[0].readout_s == 0.0) return frame;
+  const RigMotion motion =
+      last_.motion_in(*map_, frame.timestamp_ns, located.rig_from_world, located.landmarks);
+  return {frame.id, frame.timestamp_ns, moved(frame.features, *rig_, motion)};
+}
+
+TrackOutcome Tracker::track(const Frame& seen, const MapSnapshot& visible, StageTimes& times) {
+  Frame frame = seen;
   map_ = visible.map;
   places_ = visible.places;
   if (mode_ == Mode::kInitializing) return initialize(frame, times);
@@ -83,6 +96,7 @@ TrackOutcome Tracker::track(const Frame& frame, const MapSnapshot& visible, Stag
   }
   std::optional<LocatedFrame> first = locate_from_last(frame, times);
   if (!first) first = recover(frame, times);
+  if (first) frame = straightened(frame, *first);
   std::optional<LocatedFrame> located = locate_in_local_map(frame, std::move(first), times);
   if (!located) located = locate_in_local_map(frame, relocalize(frame, times), times);
   if (!located) return lose(frame, relocalizer_.diagnosis(), times);
@@ -217,10 +231,12 @@ TrackOutcome Tracker::accept(const Frame& frame, LocatedFrame located, StageTime
   outcome.is_relocalized = mode_ == Mode::kLost;
   outcome.details = {frame.id, frame.features, {}, pose, {}};
   if (is_keyframe(frame, located)) {
+    const RigMotion motion =
+        last_.motion_in(*map_, frame.timestamp_ns, located.rig_from_world, located.landmarks);
     outcome.message = NewKeyframe{frame.id,
                                   frame.timestamp_ns,
                                   pose,
-                                  frame.features,
+                                  moved(frame.features, *rig_, motion),
                                   located.landmarks,
                                   sightings_.take(),
                                   rig_};

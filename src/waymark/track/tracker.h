@@ -61,12 +61,17 @@ class Tracker {
   /// far, or nothing. What is not in it is forgotten.
   void continue_in(const Map& map, TrackingPurpose purpose);
 
+  /// How the rig should move in the frame to come; 0 where that is not known.
+  RigMotion predict_motion() const;
+
   /// visible: the newest map that this frame may see; empty before the first sub-map.
   TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
 
  private:
   enum class Mode { kInitializing, kTracking, kLost };
 
+  /// The frame as it would be with the motion that its pose shows; of a rolling shutter alone.
+  Frame straightened(const Frame& frame, const LocatedFrame& located) const;
   std::optional<LocatedFrame> locate_from_last(const Frame& frame, StageTimes& times);
   /// Among the keyframes where it was last, or while mapping the newest ones of that sub-map.
   std::optional<LocatedFrame> recover(const Frame& frame, StageTimes& times);

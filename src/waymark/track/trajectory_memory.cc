@@ -19,14 +19,16 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
   if (outcome.message) newest_sent_ = frame.id;
   // Long after the map has changed last it has settled, and the frame with it.
   const bool is_settled = frame.id.value - newest_sent_.value > kMaxSinceKeyframe;
-  if (!outcome.seen.empty() && !is_settled) unsettled_.push_back({frame.id, outcome.seen, nullptr});
+  if (!outcome.seen.empty() && !is_settled) {
+    unsettled_.push_back({frame.id, outcome.seen, nullptr, outcome.details.features->readout_s[0]});
+  }
   if (outcome.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
   for (const FilledPose& filled : outcome.details.filled) {
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
     entry.pose = filled.pose;
-    unsettled_.push_back({filled.frame, {}, filled.features});
+    unsettled_.push_back({filled.frame, {}, filled.features, filled.features->readout_s[0]});
   }
   while (unsettled_.size() > kMaxUnsettled) {
     settle(unsettled_.front(), map);
@@ -49,12 +51,35 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
   if (keyframe.frame == unsettled.frame) return;  // Adjusted with the map.
   const Rigid3 guess =
       map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
-  const auto refined =
-      unsettled.features
-          ? refiner_.refine(map, refiner_.find(map, living, *unsettled.features, guess), guess)
-          : refiner_.refine(map, unsettled.seen, guess);
+  std::vector<SeenLandmark> seen =
+      unsettled.features ? refiner_.find(map, living, *unsettled.features, guess) : unsettled.seen;
+  const float readout_s = static_cast<float>(rig_->cameras[0].readout_s) - unsettled.readout_s;
+  if (const auto motion = readout_s == 0.0f ? std::nullopt : motion_in(unsettled.frame, map)) {
+    seen = refiner_.seen_at_once(map, seen, guess, *motion, readout_s);
+  }
+  const auto refined = refiner_.refine(map, seen, guess);
   if (!refined) return;
   pose = {living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()};
+}
+
+std::optional<RigMotion> TrajectoryMemory::motion_in(FrameId frame, const Map& map) const {
+  const std::int64_t index = std::int64_t{frame.value} - std::int64_t{first_.value};
+  if (index < 0 || index >= std::ssize(entries_)) return std::nullopt;
+  const Entry& entry = entries_[static_cast<std::size_t>(index)];
+  if (!has_pose(entry)) return std::nullopt;
+  const SubmapId submap = map.keyframes().at(map.resolve(entry.pose.reference)).submap;
+  std::int64_t from = index, to = index;
+  if (rig_from_world(index - 1, submap, map)) --from;
+  if (rig_from_world(index + 1, submap, map)) ++to;
+  if (from == to) return std::nullopt;
+  const Rigid3 motion =
+      *rig_from_world(to, submap, map) * rig_from_world(from, submap, map)->inverse();
+  const auto time_ns = [&](std::int64_t i) {
+    return entries_[static_cast<std::size_t>(i)].timestamp_ns;
+  };
+  const double seconds = 1e-9 * static_cast<double>(time_ns(to) - time_ns(from));
+  const Vector6d rate = motion.log() / seconds;
+  return RigMotion{rate.tail<3>().cast<float>(), rate.head<3>().cast<float>()};
 }
 
 void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {

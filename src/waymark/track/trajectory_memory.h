@@ -31,10 +31,13 @@ class TrajectoryMemory {
 
   /// first: the id of the first frame; those of the others follow.
   explicit TrajectoryMemory(std::shared_ptr<const Rig> rig, FrameId first = FrameId{0})
-      : first_(first), newest_sent_(first), refiner_(std::move(rig)) {}
+      : first_(first), newest_sent_(first), rig_(rig), refiner_(rig) {}
 
   /// From now on the frames are of the same cameras calibrated otherwise.
-  void look_with(std::shared_ptr<const Rig> rig) { refiner_ = PoseRefiner(std::move(rig)); }
+  void look_with(std::shared_ptr<const Rig> rig) {
+    rig_ = rig;
+    refiner_ = PoseRefiner(std::move(rig));
+  }
 
   FrameId first() const { return first_; }
   /// The id of the frame after those added so far.
@@ -48,6 +51,10 @@ class TrajectoryMemory {
   /// frames before and after them that had none.
   void settle(const Map& map);
 
+  /// How the rig moved in a frame, without what it saw, by the poses of the frames before and after
+  /// it; nothing where neither has one.
+  std::optional<RigMotion> motion_in(FrameId frame, const Map& map) const;
+
   /// In the order of the frames.
   const std::deque<Entry>& entries() const { return entries_; }
 
@@ -57,6 +64,7 @@ class TrajectoryMemory {
     FrameId frame;
     std::vector<SeenLandmark> seen;            ///< Of a tracked frame.
     std::shared_ptr<const Features> features;  ///< Of a frame filled in later.
+    float readout_s = 0.0f;                    ///< That pixels are corrected for.
   };
 
   /// A frame that had no pose when it was tracked.
@@ -77,6 +85,7 @@ class TrajectoryMemory {
   std::deque<Entry> entries_;  ///< Grows without copies of its own.
   std::deque<Unsettled> unsettled_;
   std::deque<Unposed> unposed_;
+  std::shared_ptr<const Rig> rig_;
   PoseRefiner refiner_;
 };
 

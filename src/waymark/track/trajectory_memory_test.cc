@@ -26,6 +26,7 @@ class TrajectoryMemoryTest : public ::testing::Test {
     if (is_keyframe) outcome.message = NewKeyframe{};
     outcome.state = FrameState::kTracked;
     outcome.details.pose = RelativePose{KeyframeId{0}, 1.0, stale()};
+    outcome.details.features = view_.features;
     outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
     memory_.add(frame(number), outcome, scene_.map);
   }
@@ -40,8 +41,10 @@ class TrajectoryMemoryTest : public ::testing::Test {
     return pose;
   }
 
-  double error_m(std::uint32_t number) const {
-    const RelativePose& pose = memory_.entries().at(number).pose;
+  double error_m(std::uint32_t number) const { return error_m(memory_, number); }
+
+  double error_m(const TrajectoryMemory& memory, std::uint32_t number) const {
+    const RelativePose& pose = memory.entries().at(number).pose;
     const Rigid3 rig_from_world =
         scene_.map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
     return (rig_from_world.origin_in_source() - truth_.translation).norm();
@@ -104,10 +107,50 @@ TEST_F(TrajectoryMemoryTest, MeasuresWhatFramesSawAsCalibratedSince) {
   EXPECT_LT(error_m(1), 0.01);
 }
 
+TEST_F(TrajectoryMemoryTest, StraightensWhatARollingShutterBentBeforeThatWasKnown) {
+  auto rolling = std::make_shared<Rig>(*scene_.rig);
+  rolling->cameras[0].readout_s = 0.03;
+  Rig upwards = *rolling;  // Corrected for that, an image is bent.
+  upwards.cameras[0].readout_s = -0.03;
+  RigMotion motion;
+  motion.turn_rad_s = {1.0f, -0.8f, 0.5f};
+  Features bent = *moved(view_.features, upwards, motion);
+  bent.readout_s = {};
+  bent.motion = {};
+  view_.features = std::make_shared<const Features>(bent);
+  const auto pose_ms = [&](double ms) {
+    const Eigen::Vector3d turn = 1e-3 * ms * motion.turn_rad_s.cast<double>();
+    return Rigid3::exp((Vector6d() << 0.0, 0.0, 0.0, turn).finished()) * truth_.inverse();
+  };
+  const auto settled_error_m = [&](const std::shared_ptr<const Rig>& rig) {
+    TrajectoryMemory memory(scene_.rig);
+    memory.add(frame(0), TrackOutcome{}, scene_.map);
+    for (const double ms : {-30.0, 0.0, 50.0}) {
+      TrackOutcome outcome;
+      outcome.state = FrameState::kTracked;
+      outcome.details.pose = RelativePose{KeyframeId{0}, 1.0, pose_ms(ms)};
+      outcome.details.features = view_.features;
+      if (ms == 0.0) outcome.seen = seen_landmarks(bent, scene_.true_associations(view_));
+      Frame moment = frame(memory.next().value);
+      moment.timestamp_ns = static_cast<std::int64_t>(1e6 * (1000.0 + ms));
+      memory.add(moment, outcome, scene_.map);
+    }
+    const auto seen = memory.motion_in(FrameId{2}, scene_.map);
+    EXPECT_TRUE(seen && (seen->turn_rad_s - motion.turn_rad_s).norm() < 1e-3f);
+    EXPECT_FALSE(memory.motion_in(FrameId{7}, scene_.map));
+    memory.look_with(rig);
+    memory.settle(scene_.map);
+    return error_m(memory, 2);
+  };
+  EXPECT_LT(settled_error_m(rolling), 0.01);
+  EXPECT_GT(settled_error_m(scene_.rig), 0.02);
+}
+
 TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
   outcome.details.pose = RelativePose{KeyframeId{1}, 1.0, Rigid3{}};
+  outcome.details.features = view_.features;
   outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
   memory_.add(frame(1), outcome, scene_.map);  // The second keyframe was made from frame 1.
   memory_.settle(scene_.map);
