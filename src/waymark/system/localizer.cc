@@ -91,8 +91,9 @@ class Localizer::Impl {
   TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint);
 
  private:
-  Frame build(const FrameImages& images, TrackingResult& result);
-  std::shared_ptr<const Features> find_features(const FrameImages& images);
+  /// motion: of a stream, see Tracker::predict_motion; images by themselves have none.
+  Frame build(const FrameImages& images, const RigMotion& motion, TrackingResult& result);
+  std::shared_ptr<const Features> find_features(const FrameImages& images, const RigMotion& motion);
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
   /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
   void bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns);
@@ -112,10 +113,12 @@ class Localizer::Impl {
   std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
 };
 
-Frame Localizer::Impl::build(const FrameImages& images, TrackingResult& result) {
+Frame Localizer::Impl::build(const FrameImages& images,
+                             const RigMotion& motion,
+                             TrackingResult& result) {
   FrameImages used = images;
   if (!uses_range_) used.image1 = {}, used.depth = {};
-  Frame frame{FrameId{num_frames_}, images.timestamp_ns, find_features(used)};
+  Frame frame{FrameId{num_frames_}, images.timestamp_ns, find_features(used, motion)};
   ++num_frames_;
   result.frame = frame.id;
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
@@ -123,8 +126,9 @@ Frame Localizer::Impl::build(const FrameImages& images, TrackingResult& result) 
   return frame;
 }
 
-std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages& images) {
-  if (reduction_ == 1.0) return builder_.build(images);
+std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages& images,
+                                                               const RigMotion& motion) {
+  if (reduction_ == 1.0) return builder_.build(images, motion);
   check_sizes(images, full_rig_);
   const Image image0 = reduce(images.image0, reduction_);
   Image image1, mask;
@@ -132,8 +136,10 @@ std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages
   if (!images.image1.is_empty()) image1 = reduce(images.image1, reduction_);
   if (!images.depth.is_empty()) depth = pick_reduced(images.depth, reduction_);
   if (!images.mask.is_empty()) mask = pick_reduced(images.mask, reduction_);
-  return builder_.build(
-      {images.timestamp_ns, image0.view(), image1.view(), depth.view(), mask.view()});
+  FrameImages smaller = images;
+  smaller.image0 = image0.view(), smaller.image1 = image1.view();
+  smaller.depth = depth.view(), smaller.mask = mask.view();
+  return builder_.build(smaller, motion);
 }
 
 TrackingResult Localizer::Impl::track(const FrameImages& images) {
@@ -142,7 +148,8 @@ TrackingResult Localizer::Impl::track(const FrameImages& images) {
                      "time stamp is not later than that of the frame before");
   }
   TrackingResult result;
-  const Frame frame = build(images, result);
+  const RigMotion motion = builder_.needs_motion(images) ? tracker_.predict_motion() : RigMotion{};
+  const Frame frame = build(images, motion, result);
   last_timestamp_ns_ = images.timestamp_ns;
   const TrackOutcome outcome = tracker_.track(frame, temporary_.visible(), result.stages);
   bridge_gaps(outcome, images.timestamp_ns);
@@ -174,7 +181,7 @@ void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t time
 TrackingResult Localizer::Impl::locate(const FrameImages& images,
                                        const std::optional<PoseHint>& hint) {
   TrackingResult result;
-  const Frame frame = build(images, result);
+  const Frame frame = build(images, {}, result);
   StageTimer timer(result.stages, Stage::kRecover);
   if (frame.features->num_primary == 0) {
     result.reason = FrameReason::kNoFeatures;

@@ -143,6 +143,35 @@ TEST(Localizer, BridgesWhatTheMapDoesNotShow) {
   }
 }
 
+TEST(Localizer, StraightensWhatARollingShutterSeesInAStream) {
+  SequenceSpec spec = spec_of(pinhole(160.0, 240, 180));
+  spec.motion = "inspect";
+  SimulatedSequence sequence(spec);
+  System system(sequence.rig(), localizer_settings(), Timing::kInline);
+  for (int i = 0; i < spec.num_frames; ++i) system.feed(depth_input_of(sequence.frame(i)));
+  system.finish();
+  spec.readout_s = 0.03;
+  SimulatedSequence walk(spec);
+  Rig rolling = walk.rig();
+  rolling.cameras[0].readout_s = spec.readout_s;
+  Localizer as_global(walk.rig(), localizer_settings(), system.map());
+  Localizer localizer(rolling, localizer_settings(), system.map());
+  const auto error_m = [&](const TrackingResult& result, int i) {
+    const Rigid3 truth = sequence.world_from_rig(0).inverse() * walk.world_from_rig(i);
+    return result.world_from_rig ? (truth.inverse() * *result.world_from_rig).translation.norm()
+                                 : 1.0;
+  };
+  double sum_global_m = 0.0, sum_m = 0.0;
+  for (int i = 0; i < spec.num_frames; ++i) {
+    const SimulatedFrame frame = walk.frame(i);
+    const TrackingResult alone = localizer.locate(depth_input_of(frame));
+    EXPECT_EQ(error_m(alone, i), error_m(as_global.locate(depth_input_of(frame)), i));
+    sum_global_m += error_m(as_global.track(depth_input_of(frame)), i);
+    sum_m += error_m(localizer.track(depth_input_of(frame)), i);
+  }
+  EXPECT_LT(sum_m, 0.6 * sum_global_m);
+}
+
 TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
   Localizer localizer(scene().query.rig(), localizer_settings(), scene().map);
   for (const std::size_t i : {20u, 3u, 11u}) {
