@@ -125,56 +125,13 @@ void start_viewer(const RunOptions& options,
   reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
-EstimatedCalibrationSummary summarize(const EstimatedCalibration& calibration) {
-  EstimatedCalibrationSummary summary;
-  summary.model = to_string(calibration.model);
-  if (!calibration.camera.intrinsics.empty()) {
-    summary.focal_px = calibration.camera.intrinsics[0];
-    summary.focal_sigma_px = calibration.sigmas[0] * summary.focal_px;
-  }
-  summary.fov_deg = calibration.fov_deg;
-  summary.is_sure = calibration.is_sure;
-  return summary;
-}
-
-/// Nothing where it was given and the images do not contradict it.
-void write_calibration(const Session& session, const std::filesystem::path& folder) {
-  if (!session.estimated && session.system->calibration().empty()) return;
-  CameraChain chain;
-  for (const RigCamera& camera : session.system->rig()->cameras) {
-    if (!camera.description) return;
-    chain.cameras.push_back({*camera.description, camera.cam_from_rig, camera.readout_s});
-  }
-  if (session.input->info().setup == Setup::kRgbd) {
-    chain.depth_factor = session.settings.depth.factor;
-  }
-  write_file_atomically(folder / "calibration.yaml", format_camchain(chain));
-}
-
-/// What the images have changed beyond doubt, in one line; empty if nothing.
-std::string describe_refined(const std::vector<CalibrationEstimate>& calibration) {
-  std::string changes;
-  for (const CalibrationEstimate& estimate : calibration) {
-    if (!estimate.is_changed()) continue;
-    changes += fmt::format("{}{} {:.6g} -> {:.6g} +- {:.2g}",
-                           changes.empty() ? "calibration changed: " : ", ",
-                           estimate.name,
-                           estimate.given,
-                           estimate.given + estimate.change,
-                           estimate.sigma);
-  }
-  return changes;
-}
-
 int run(RunOptions options, Reporter& reporter) {
   const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
   options.session.timing = options.timing.value_or(suitable);
   options.session.calibrate = reported(options.calibrate, reporter);
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
-  if (session.estimated && !session.estimated->is_sure) {
-    reporter.warning("calibration: " + session.estimated->reason + "; expect a bent map");
-  }
+  warn_unless_sure(reporter, session, "expect a bent map");
   prepare_results(options.report.out);
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) {
@@ -206,19 +163,21 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
-  if (session.estimated) results.summary.calibration = summarize(*session.estimated);
   results.summary.refined_calibration = session.system->calibration();
+  add_calibration(session, results.summary);
   // What ended the session early is told together with what could not be saved.
   save_each({[&] { write_results(options.report.out, results); },
-             [&] { write_calibration(session, options.report.out); },
+             [&] {
+               write_calibration(
+                   options.report.out, session, *session.system->rig(), results.summary);
+             },
              [&] {
                if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
              },
              [&] {
                if (live) live->finish();
                report_results(reporter, results, options);
-               const std::string refined = describe_refined(results.summary.refined_calibration);
-               if (!refined.empty()) reporter.info(refined);
+               report_calibration(reporter, results.summary);
                check_finished(results);
              }});
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;

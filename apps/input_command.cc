@@ -14,9 +14,11 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
 #include "waymark/base/frame_state.h"
+#include "waymark/camera/calibration.h"
 #include "waymark/input/decode.h"
 
 namespace waymark {
@@ -80,6 +82,51 @@ CalibrateOptions reported(CalibrateOptions options, Reporter& reporter) {
   options.should_stop = is_interrupted;
   options.on_progress = [&reporter](const std::string& text) { reporter.info(text); };
   return options;
+}
+
+void warn_unless_sure(Reporter& reporter, const PreparedInput& prepared, std::string_view what) {
+  if (!prepared.estimated || prepared.estimated->is_sure) return;
+  reporter.warning(fmt::format("calibration: {}; {}", prepared.estimated->reason, what));
+}
+
+void add_calibration(const PreparedInput& prepared, RunSummary& summary) {
+  if (!prepared.estimated) return;
+  const EstimatedCalibration& calibration = *prepared.estimated;
+  EstimatedCalibrationSummary& told = summary.calibration.emplace();
+  told.model = to_string(calibration.model);
+  if (!calibration.camera.intrinsics.empty()) {
+    told.focal_px = calibration.camera.intrinsics[0];
+    told.focal_sigma_px = calibration.sigmas[0] * told.focal_px;
+  }
+  told.fov_deg = calibration.fov_deg;
+  told.is_sure = calibration.is_sure;
+}
+
+void report_calibration(Reporter& reporter, const RunSummary& summary) {
+  std::string changes;
+  for (const CalibrationEstimate& estimate : summary.refined_calibration) {
+    if (!estimate.is_changed()) continue;
+    changes += fmt::format("{}{} {:.6g} -> {:.6g} +- {:.2g}",
+                           changes.empty() ? "calibration changed: " : ", ",
+                           estimate.name,
+                           estimate.given,
+                           estimate.given + estimate.change,
+                           estimate.sigma);
+  }
+  if (!changes.empty()) reporter.info(changes);
+}
+
+void write_calibration(const std::filesystem::path& folder,
+                       const PreparedInput& prepared,
+                       const Rig& rig,
+                       const RunSummary& summary) {
+  if (!prepared.estimated && summary.refined_calibration.empty()) return;
+  std::optional<CameraChain> chain = chain_of(rig, summary.refined_calibration);
+  if (!chain) return;
+  if (prepared.input->info().setup == Setup::kRgbd) {
+    chain->depth_factor = prepared.settings.depth.factor;
+  }
+  write_file_atomically(folder / "calibration.yaml", format_camchain(*chain));
 }
 
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed) {

@@ -4,6 +4,7 @@
 
 #include <filesystem>
 #include <functional>
+#include <string_view>
 
 #include "reporter.h"
 #include "waymark/calibrate/calibrate.h"
@@ -42,6 +43,20 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
 
 /// Lets a calibration tell what it does, and be interrupted.
 CalibrateOptions reported(CalibrateOptions options, Reporter& reporter);
+
+/// Warns where the images of an input without a calibration do not tell it. what: to expect.
+void warn_unless_sure(Reporter& reporter, const PreparedInput& prepared, std::string_view what);
+
+/// What became of the calibration, beside what the summary says already.
+void add_calibration(const PreparedInput& prepared, RunSummary& summary);
+/// Tells what the images have changed beyond doubt, in one line, if anything.
+void report_calibration(Reporter& reporter, const RunSummary& summary);
+/// Writes calibration.yaml, for -c: the rig in use. Nothing where it was given and the images do
+/// not contradict it.
+void write_calibration(const std::filesystem::path& folder,
+                       const PreparedInput& prepared,
+                       const Rig& rig,
+                       const RunSummary& summary);
 
 /// Tells of every frame.
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info);

@@ -69,6 +69,7 @@ class Refine(unittest.TestCase):
         for each in told:
             self.assertEqual(each, {key: found[each["name"]][key] for key in ("name", "given", "change", "sigma")})
 
+        self.told_how_sure((refined / "calibration.yaml").read_text(), found)
         again, summary, _ = self.run_with("again", "-c", refined / "calibration.yaml")
         self.assertNotIn("refined_calibration", summary, "what was found is right")
         self.assertLess(self.error_m(again), 0.3 * self.error_m(as_told))
@@ -93,6 +94,18 @@ class Refine(unittest.TestCase):
         self.assertLess(abs(found["change"] - 30), 2)
         self.assertLess(self.error_m(refined, walk), 0.8 * self.error_m(as_told, walk))
         self.assertIn("  readout_ms: ", (refined / "calibration.yaml").read_text())
+
+    def told_how_sure(self, camchain, found):
+        """The file says the same of its numbers as the summary."""
+        lists = re.findall(r"(\w+): \[([^][]*)\]", camchain)
+        sigmas = [float(each) for key, numbers in lists if key in (
+            "intrinsics_sigma", "distortion_coeffs_sigma", "rotation_mrad", "baseline_direction_mrad")
+                  for each in numbers.split(", ")]
+        self.assertEqual(len(sigmas), len(found))
+        for sigma, (name, each) in zip(sigmas, found.items()):
+            unit = 1e-3 if "turn" in name or "baseline" in name else 1.0
+            self.assertAlmostEqual(unit * sigma / each["sigma"], 1.0, 3, name)
+        self.assertEqual(found["cam0.pu"]["sigma"], found["cam0.pu"]["given_sigma"], "not looked for")
 
     def test_words_that_mean_nothing(self):
         done = waymark("run", self.room, "-o", self.folder / "none", "--set", "calibration.refine=maybe")

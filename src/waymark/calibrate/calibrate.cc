@@ -188,6 +188,7 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOp
   EstimatedCalibration calibration = full_size(stretch, refined ? refined->description : lens);
   calibration.model = assumed.model;
   calibration.reason = "the motion does not tell, the likeliest is taken";
+  calibration.sigmas = lens_sigmas(calibration.camera.width_px, options.fov_deg.has_value());
   calibration.sigmas[0] = 0.3;
   if (!refined) return calibration;
   calibration.num_keyframes = refined->num_keyframes;
@@ -203,7 +204,15 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOp
 
 CameraChain EstimatedCalibration::chain() const {
   CameraChain chain;
-  chain.cameras.push_back({camera, Rigid3()});
+  ChainCamera& estimated = chain.cameras.emplace_back(ChainCamera{camera, Rigid3()});
+  if (camera.intrinsics.empty() || !sigmas.allFinite()) return chain;
+  estimated.sigmas.intrinsics = {sigmas[0] * camera.intrinsics[0],
+                                 std::hypot(sigmas[0], sigmas[1]) * camera.intrinsics[1],
+                                 sigmas[2],
+                                 sigmas[3]};
+  // The others are not looked for.
+  const double other = model == LensModel::kFisheye ? 0.01 : 5e-4;
+  estimated.sigmas.distortion_coeffs = {sigmas[4], sigmas[5], other, other};
   return chain;
 }
 

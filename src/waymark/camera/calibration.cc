@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <string_view>
@@ -28,15 +29,17 @@ constexpr double kSensorSigma = 0.05;  // px
 /// Models with more numbers are taken as they are.
 constexpr std::size_t kMaxIntrinsics = 27;
 
-/// What is held may change by this part of its standard deviation.
+/// What is held may change by this part of its usual standard deviation; what is surer than that is
+/// exact.
 constexpr double kHeld = 1e-4;
 
-/// Differences are taken over this part of a standard deviation to either side.
+/// Differences are taken over this part of a usual standard deviation to either side.
 constexpr double kStep = 0.01;
 
 constexpr std::array<const char*, 4> kPlaneNames = {"fu", "fv", "pu", "pv"};
 constexpr std::array<const char*, 5> kTurnNames = {
     "turn_x", "turn_y", "turn_z", "baseline_a", "baseline_b"};
+constexpr std::size_t kNumTurns = 3;
 
 std::string distortion_name(const CameraDescription& description, std::size_t i) {
   if (description.distortion_model != "radtan") return fmt::format("k{}", i + 1);
@@ -79,9 +82,10 @@ Eigen::MatrixXd CalibrationParameters::prior_information(
     const Eigen::VectorXd& change, const std::vector<std::uint8_t>& is_free) const {
   Eigen::MatrixXd information = ties_;
   for (Eigen::Index i = 0; i < change.size(); ++i) {
-    const double sigma = list_[static_cast<std::size_t>(i)].prior_sigma;
-    const double held = kHeld * sigma;
-    information(i, i) += is_free[static_cast<std::size_t>(i)]
+    const CalibrationParameter& parameter = list_[static_cast<std::size_t>(i)];
+    const double sigma = parameter.prior_sigma;
+    const double held = kHeld * parameter.usual_sigma;
+    information(i, i) += is_free[static_cast<std::size_t>(i)] && sigma > 0.0
                              ? 1.0 / (sigma * sigma + change[i] * change[i])
                              : 1.0 / (held * held);
   }
@@ -104,6 +108,16 @@ void CalibrationParameters::tie(std::size_t a, std::size_t b, double ratio, doub
   ties_ += difference * difference.transpose();
 }
 
+/// Appends a parameter, whose prior is what the calibration says or, without that, as usual.
+/// sigmas: what it says of all numbers of this kind; i: which of them this is.
+void CalibrationParameters::add(CalibrationParameter parameter,
+                                const std::vector<double>& sigmas,
+                                std::size_t i) {
+  const double sigma = i < sigmas.size() ? sigmas[i] : parameter.usual_sigma;
+  parameter.prior_sigma = sigma < kHeld * parameter.usual_sigma ? 0.0 : sigma;
+  list_.push_back(std::move(parameter));
+}
+
 void CalibrationParameters::add_intrinsics(std::size_t camera) {
   RigCamera& calibrated = given_.cameras[camera];
   if (!calibrated.description || !calibrated.remake) return;
@@ -114,37 +128,66 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
   const std::size_t num_shape = intrinsics.size() < 4 ? intrinsics.size() : intrinsics.size() - 4;
   const std::string prefix = fmt::format("cam{}.", camera);
   for (std::size_t i = 0; i < intrinsics.size(); ++i) {
-    const double pixels_sigma = kPixelsSigma * std::abs(intrinsics[i]);
+    const double pixels_sigma = kPixelsSigma * std::max(std::abs(intrinsics[i]), kMinPixels);
+    CalibrationParameter parameter;
+    parameter.given = intrinsics[i];
+    parameter.usual_sigma = pixels_sigma;
     if (i < num_shape) {
-      const bool is_length = std::abs(intrinsics[i]) >= kMinPixels;
-      list_.push_back({prefix + fmt::format("shape{}", i + 1),
-                       intrinsics[i],
-                       CalibrationGroup::kRadial,
-                       is_length ? pixels_sigma : kShapeSigma});
+      parameter.name = prefix + fmt::format("shape{}", i + 1);
+      parameter.group = CalibrationGroup::kRadial;
+      if (std::abs(intrinsics[i]) < kMinPixels) parameter.usual_sigma = kShapeSigma;
     } else {
-      const std::size_t of_plane = i - num_shape;
-      list_.push_back({prefix + kPlaneNames[of_plane],
-                       intrinsics[i],
-                       of_plane < 2 ? CalibrationGroup::kFocalLength : CalibrationGroup::kCentre,
-                       pixels_sigma});
+      parameter.name = prefix + kPlaneNames[i - num_shape];
+      if (i - num_shape >= 2) parameter.group = CalibrationGroup::kCentre;
     }
+    add(std::move(parameter), calibrated.sigmas.intrinsics, i);
   }
   for (std::size_t i = 0; i < description.distortion_coeffs.size(); ++i) {
     const bool is_tangential = description.distortion_model == "radtan" && (i == 2 || i == 3);
-    list_.push_back({prefix + distortion_name(description, i),
-                     description.distortion_coeffs[i],
-                     is_tangential ? CalibrationGroup::kTangential : CalibrationGroup::kRadial,
-                     is_tangential ? kTangentialSigma : kRadialSigma});
+    add({.name = prefix + distortion_name(description, i),
+         .given = description.distortion_coeffs[i],
+         .group = is_tangential ? CalibrationGroup::kTangential : CalibrationGroup::kRadial,
+         .usual_sigma = is_tangential ? kTangentialSigma : kRadialSigma},
+        calibrated.sigmas.distortion_coeffs,
+        i);
   }
   blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
 }
 
 void CalibrationParameters::add_extrinsics(std::size_t camera) {
   blocks_[camera].has_extrinsics = true;
-  for (const char* name : kTurnNames) {
-    list_.push_back(
-        {fmt::format("cam{}.{}", camera, name), 0.0, CalibrationGroup::kExtrinsics, kTurnSigma});
+  const CalibrationSigmas& sigmas = given_.cameras[camera].sigmas;
+  for (std::size_t i = 0; i < kTurnNames.size(); ++i) {
+    const bool is_turn = i < kNumTurns;
+    add({.name = fmt::format("cam{}.{}", camera, kTurnNames[i]),
+         .group = CalibrationGroup::kExtrinsics,
+         .usual_sigma = kTurnSigma},
+        is_turn ? sigmas.rotation_rad : sigmas.baseline_direction_rad,
+        is_turn ? i : i - kNumTurns);
   }
+}
+
+std::vector<CalibrationSigmas> CalibrationParameters::by_camera(
+    const std::vector<double>& sigmas) const {
+  WAYMARK_CHECK(sigmas.size() == size());
+  std::vector<CalibrationSigmas> by_camera;
+  for (std::size_t c = 0; c < blocks_.size(); ++c) {
+    auto next = sigmas.begin() + static_cast<std::ptrdiff_t>(blocks_[c].first);
+    const auto take = [&next](std::size_t count) {
+      const auto first = std::exchange(next, next + static_cast<std::ptrdiff_t>(count));
+      return std::vector<double>(first, next);
+    };
+    CalibrationSigmas& of_camera = by_camera.emplace_back();
+    if (blocks_[c].num_intrinsics > 0) {
+      const CameraDescription& description = *given_.cameras[c].description;
+      of_camera.intrinsics = take(description.intrinsics.size());
+      of_camera.distortion_coeffs = take(description.distortion_coeffs.size());
+    }
+    if (!blocks_[c].has_extrinsics) continue;
+    of_camera.rotation_rad = take(kNumTurns);
+    of_camera.baseline_direction_rad = take(kTurnNames.size() - kNumTurns);
+  }
+  return by_camera;
 }
 
 CameraDescription CalibrationParameters::description_at(std::size_t camera,
@@ -195,7 +238,7 @@ std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
   };
   for (std::size_t p = 0; p < block.num_intrinsics; ++p) {
     const std::size_t parameter = block.first + p;
-    const double step = kStep * list_[parameter].prior_sigma;
+    const double step = kStep * list_[parameter].usual_sigma;
     try {
       project(parameter, step, above, is_above);
       project(parameter, -step, below, is_below);
@@ -209,6 +252,28 @@ std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
     }
   }
   return derivatives;
+}
+
+std::optional<CameraChain> chain_of(const Rig& rig,
+                                    std::span<const CalibrationEstimate> estimates) {
+  const CalibrationParameters parameters(rig);
+  std::vector<double> sigmas;
+  // After these the readout is told.
+  for (const CalibrationEstimate& estimate : estimates) {
+    if (sigmas.size() < parameters.size()) sigmas.push_back(estimate.sigma);
+  }
+  std::vector<CalibrationSigmas> told;
+  if (!estimates.empty()) told = parameters.by_camera(sigmas);
+  CameraChain chain;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const RigCamera& camera = rig.cameras[c];
+    if (!camera.description) return std::nullopt;
+    chain.cameras.push_back({*camera.description,
+                             camera.cam_from_rig,
+                             camera.readout_s,
+                             told.empty() ? camera.sigmas : told[c]});
+  }
+  return chain;
 }
 
 Eigen::Matrix<double, 3, 2> across_baseline(const Eigen::Vector3d& baseline) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/camera/camchain.h"
 #include "waymark/camera/rig.h"
 
 namespace waymark {
@@ -30,7 +31,9 @@ struct CalibrationParameter {
   std::string name;    ///< For example "cam0.fu", "cam1.turn_y".
   double given = 0.0;  ///< As the calibration says; 0 for turns, which count from it.
   CalibrationGroup group = CalibrationGroup::kFocalLength;  ///< What it is about.
-  double prior_sigma = 0.0;  ///< How far the truth may lie from that, in its unit (px, rad, 1).
+  /// How far the truth may lie from that, in its unit (px, rad, 1); 0: it is exact.
+  double prior_sigma = 0.0;
+  double usual_sigma = 0.0;  ///< The same of calibrations in general.
 };
 
 /// What the images told of one number of a calibration.
@@ -73,9 +76,12 @@ class CalibrationParameters {
   /// Inverse covariance of the change from what was given, as it counts for a change of about this:
   /// calibrations are good, or wrong by anything, so that the prior has the tails of Cauchy's
   /// distribution, by reweighting.
-  /// is_free: per parameter; those that are not are held as given.
+  /// is_free: per parameter; those that are not are held as given, as are exact ones.
   Eigen::MatrixXd prior_information(const Eigen::VectorXd& change,
                                     const std::vector<std::uint8_t>& is_free) const;
+
+  /// Standard deviations in the order of list(), per camera as its calibration carries them.
+  std::vector<CalibrationSigmas> by_camera(const std::vector<double>& sigmas) const;
 
   /// The rig whose parameters differ by `change` from what was given; nothing where there is no
   /// such camera.
@@ -91,6 +97,7 @@ class CalibrationParameters {
       std::span<const Eigen::Vector3d> bearings) const;
 
  private:
+  void add(CalibrationParameter parameter, const std::vector<double>& sigmas, std::size_t i);
   void add_intrinsics(std::size_t camera);
   void add_extrinsics(std::size_t camera);
   std::vector<std::size_t> find(std::string_view ending) const;
@@ -102,6 +109,11 @@ class CalibrationParameters {
   std::vector<Block> blocks_;
   Eigen::MatrixXd ties_;  ///< What is known of differences between parameters, as information.
 };
+
+/// The calibration of a rig with its standard deviations, for a file. estimates: of all parameters
+/// of the rig, which is measured with them; empty: it is as sure as it says. Nothing where a camera
+/// has no description.
+std::optional<CameraChain> chain_of(const Rig& rig, std::span<const CalibrationEstimate> estimates);
 
 /// Two unit vectors across a baseline, as columns: the directions in which it may turn.
 Eigen::Matrix<double, 3, 2> across_baseline(const Eigen::Vector3d& baseline);

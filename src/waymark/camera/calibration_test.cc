@@ -95,6 +95,31 @@ TEST(CalibrationParameters, GiveTheDerivativeOfThePixel) {
   for (std::size_t i = 16; i < 32; ++i) EXPECT_EQ((*derivatives)[i], 0.0) << "behind the camera";
 }
 
+TEST(CalibrationParameters, AreAsSureAsTheCalibrationSays) {
+  CameraChain chain;
+  const CameraDescription camera = described("pinhole", {400.0, 400.0, 320.0, 240.0});
+  chain.cameras.push_back({camera, Rigid3()});
+  chain.cameras.push_back({camera, {Eigen::Quaterniond::Identity(), {-0.1, 0.0, 0.0}}});
+  chain.cameras[0].sigmas.intrinsics = {0.1, 0.2, 0.0, 4.0};
+  chain.cameras[1].sigmas.baseline_direction_rad = {0.01, 0.02};
+  const CalibrationParameters parameters(make_rig(chain));
+  std::vector<double> sigmas;
+  for (const CalibrationParameter& each : parameters.list()) sigmas.push_back(each.prior_sigma);
+  EXPECT_EQ(sigmas[0], 0.1);
+  EXPECT_EQ(sigmas[2], 0.0);
+  EXPECT_EQ(sigmas[4], 0.01) << "nothing is said of distortion";
+  EXPECT_EQ(sigmas[16], 5e-4) << "nor of the turn";
+  EXPECT_EQ(sigmas[20], 0.02);
+  const std::vector<CalibrationSigmas> again = parameters.by_camera(sigmas);
+  EXPECT_EQ(again[0].intrinsics, chain.cameras[0].sigmas.intrinsics);
+  EXPECT_EQ(again[1].distortion_coeffs.size(), 4u);
+  EXPECT_EQ(again[1].rotation_rad, (std::vector<double>{5e-4, 5e-4, 5e-4}));
+  EXPECT_EQ(again[1].baseline_direction_rad, chain.cameras[1].sigmas.baseline_direction_rad);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(21);
+  const std::vector<std::uint8_t> all_free(21, 1);
+  EXPECT_GT(parameters.prior_information(zero, all_free)(2, 2), 1e6) << "it is exact";
+}
+
 TEST(CalibrationParameters, AreHeldLessTheFurtherTheyAreOff) {
   const CalibrationParameters parameters(
       rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0})));

@@ -3,6 +3,7 @@
 #include "waymark/camera/camchain.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <Eigen/SVD>
 #include <algorithm>
@@ -19,6 +20,10 @@ constexpr double kMaxRotationError = 1e-3;
 constexpr double kMaxLastRowError = 1e-9;
 constexpr std::size_t kMaxCameras = 16;
 constexpr std::size_t kMaxUsedCameras = 2;  // Of a stereo pair.
+/// Who is less sure than that need not say so.
+constexpr double kMaxSigma = 1e5;
+constexpr double kMaxSigmaMrad = 1e3;
+constexpr double kRadPerMrad = 1e-3;
 
 bool is_camera_key(std::string_view key) {
   return key.size() > 3 && key.starts_with("cam") &&
@@ -33,10 +38,13 @@ bool is_ignored_key(std::string_view key) {
 void check_keys(const ConfigNode& camera, const std::string& name, CameraChain& chain) {
   const std::vector<std::string> known = {name + ".camera_model",
                                           name + ".intrinsics",
+                                          name + ".intrinsics_sigma",
                                           name + ".distortion_model",
                                           name + ".distortion_coeffs",
+                                          name + ".distortion_coeffs_sigma",
                                           name + ".resolution",
                                           name + ".T_cn_cnm1",
+                                          name + ".T_cn_cnm1_sigma",
                                           name + ".readout_ms"};
   for (std::size_t i = 0; i < camera.items.size(); ++i) {
     const std::string key = name + "." + camera.keys[i];
@@ -106,17 +114,73 @@ Rigid3 read_transform(const ConfigNode& node, const std::string& key) {
 }
 
 Rigid3 read_cam_from_rig(const ConfigNode& camera, const std::string& name, CameraChain& chain) {
-  const ConfigNode* node = camera.find("T_cn_cnm1");
   if (chain.cameras.empty()) {
-    if (node == nullptr) return Rigid3();
-    throw InputError(node->where(),
-                     fmt::format("{}.T_cn_cnm1 is given, expected none, for camera 0 is the origin "
-                                 "of the rig",
-                                 name));
+    for (const char* key : {"T_cn_cnm1", "T_cn_cnm1_sigma"}) {
+      const ConfigNode* node = camera.find(key);
+      if (node == nullptr) continue;
+      throw InputError(
+          node->where(),
+          fmt::format(
+              "{}.{} is given, expected none, for camera 0 is the origin of the rig", name, key));
+    }
+    return Rigid3();
   }
   const Rigid3 cam_from_previous =
       read_transform(require(camera, name, "T_cn_cnm1"), name + ".T_cn_cnm1");
   return cam_from_previous * chain.cameras.back().cam_from_rig;
+}
+
+void expect_section(const ConfigNode& node, const std::string& key) {
+  if (node.kind == ConfigNode::Kind::kMap) return;
+  throw InputError(
+      node.where(),
+      fmt::format("{} is {}, expected a section of KEY: VALUE", key, describe_value(node)));
+}
+
+/// A list of standard deviations, as many as there are numbers; none where there is no such key.
+std::vector<double> read_sigmas(const ConfigNode& section,
+                                const std::string& name,
+                                const char* key,
+                                std::size_t count,
+                                double highest) {
+  const ConfigNode* node = section.find(key);
+  if (node == nullptr) return {};
+  const std::string full_key = name + "." + key;
+  std::vector<double> sigmas = config_doubles(*node, full_key, {.low = 0.0, .high = highest});
+  if (sigmas.size() == count) return sigmas;
+  throw InputError(node->where(),
+                   fmt::format("{} has {} numbers, expected {}, a standard deviation for each",
+                               full_key,
+                               sigmas.size(),
+                               count));
+}
+
+/// How sure the calibration of a camera is, that was read before.
+CalibrationSigmas read_all_sigmas(const ConfigNode& camera,
+                                  const std::string& name,
+                                  const CameraDescription& description) {
+  CalibrationSigmas sigmas;
+  sigmas.intrinsics =
+      read_sigmas(camera, name, "intrinsics_sigma", description.intrinsics.size(), kMaxSigma);
+  sigmas.distortion_coeffs = read_sigmas(
+      camera, name, "distortion_coeffs_sigma", description.distortion_coeffs.size(), kMaxSigma);
+  const ConfigNode* turns = camera.find("T_cn_cnm1_sigma");
+  if (turns == nullptr) return sigmas;
+  const std::string key = name + ".T_cn_cnm1_sigma";
+  expect_section(*turns, key);
+  const std::vector<std::string> known = {key + ".rotation_mrad", key + ".baseline_direction_mrad"};
+  for (std::size_t i = 0; i < turns->items.size(); ++i) {
+    const std::string given = key + "." + turns->keys[i];
+    if (std::ranges::find(known, given) == known.end()) {
+      fail_unknown_key(turns->items[i], given, known);
+    }
+  }
+  sigmas.rotation_rad = read_sigmas(*turns, key, "rotation_mrad", 3, kMaxSigmaMrad);
+  sigmas.baseline_direction_rad =
+      read_sigmas(*turns, key, "baseline_direction_mrad", 2, kMaxSigmaMrad);
+  for (double& sigma : sigmas.rotation_rad) sigma *= kRadPerMrad;
+  for (double& sigma : sigmas.baseline_direction_rad) sigma *= kRadPerMrad;
+  return sigmas;
 }
 
 /// Every cam... key must be one of cam0 to the last of those read.
@@ -137,6 +201,53 @@ void check_numbering(const ConfigNode& config, std::size_t num_cameras) {
   }
 }
 
+std::string format_list(const std::vector<double>& values) {
+  return fmt::format("[{}]", fmt::join(values, ", "));
+}
+
+/// "KEY: [...]" with the digits that mean something; nothing where there is nothing to say.
+std::string format_sigmas(const char* key, std::vector<double> sigmas, double unit = 1.0) {
+  if (sigmas.empty()) return "";
+  for (double& sigma : sigmas) sigma /= unit;
+  return fmt::format("{}: [{:.4g}]", key, fmt::join(sigmas, ", "));
+}
+
+std::string format_camera(const ChainCamera& camera) {
+  const CameraDescription& description = camera.description;
+  const CalibrationSigmas& sigmas = camera.sigmas;
+  std::string text;
+  const auto add = [&text](const std::string& line) {
+    if (!line.empty()) text += "  " + line + "\n";
+  };
+  add("camera_model: " + description.camera_model);
+  if (!description.intrinsics.empty()) add("intrinsics: " + format_list(description.intrinsics));
+  add(format_sigmas("intrinsics_sigma", sigmas.intrinsics));
+  add("distortion_model: " + description.distortion_model);
+  if (!description.distortion_coeffs.empty()) {
+    add("distortion_coeffs: " + format_list(description.distortion_coeffs));
+  }
+  add(format_sigmas("distortion_coeffs_sigma", sigmas.distortion_coeffs));
+  add(fmt::format("resolution: [{}, {}]", description.width_px, description.height_px));
+  if (camera.readout_s != 0.0) add(fmt::format("readout_ms: {:.6g}", 1e3 * camera.readout_s));
+  return text;
+}
+
+std::string format_transform(const ChainCamera& camera, const ChainCamera& previous) {
+  const Eigen::Matrix4d from_previous =
+      (camera.cam_from_rig * previous.cam_from_rig.inverse()).matrix();
+  std::string text = "  T_cn_cnm1:\n";
+  for (int row = 0; row < 4; ++row) {
+    text += fmt::format("  - [{}]\n", fmt::join(from_previous.row(row), ", "));
+  }
+  const CalibrationSigmas& sigmas = camera.sigmas;
+  const std::string turn = format_sigmas("rotation_mrad", sigmas.rotation_rad, kRadPerMrad);
+  const std::string baseline =
+      format_sigmas("baseline_direction_mrad", sigmas.baseline_direction_rad, kRadPerMrad);
+  if (turn.empty() && baseline.empty()) return text;
+  const char* comma = turn.empty() || baseline.empty() ? "" : ", ";
+  return text + fmt::format("  T_cn_cnm1_sigma: {{{}{}{}}}\n", turn, comma, baseline);
+}
+
 }  // namespace
 
 std::optional<CameraChain> read_camchain(const ConfigNode& config) {
@@ -145,22 +256,19 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
     const std::string name = fmt::format("cam{}", chain.cameras.size());
     const ConfigNode* camera = config.find(name);
     if (camera == nullptr) break;
-    if (camera->kind != ConfigNode::Kind::kMap) {
-      throw InputError(
-          camera->where(),
-          fmt::format("{} is {}, expected a section of KEY: VALUE", name, describe_value(*camera)));
-    }
+    expect_section(*camera, name);
     check_keys(*camera, name, chain);
     if (chain.cameras.size() >= kMaxUsedCameras) {
       chain.notes.push_back(
           fmt::format("{}: {} is ignored, cam0 and cam1 at most are used", camera->where(), name));
     }
     const CameraDescription description = read_description(*camera, name);
-    chain.cameras.push_back({description, read_cam_from_rig(*camera, name, chain)});
+    const Rigid3 cam_from_rig = read_cam_from_rig(*camera, name, chain);
+    ChainCamera& read = chain.cameras.emplace_back(
+        ChainCamera{description, cam_from_rig, 0.0, read_all_sigmas(*camera, name, description)});
     if (const ConfigNode* readout = camera->find("readout_ms")) {
-      const double readout_ms =
-          config_double(*readout, name + ".readout_ms", {.low = -1e3, .high = 1e3});
-      chain.cameras.back().readout_s = 1e-3 * readout_ms;
+      read.readout_s =
+          1e-3 * config_double(*readout, name + ".readout_ms", {.low = -1e3, .high = 1e3});
     }
   }
   check_numbering(config, chain.cameras.size());
@@ -176,25 +284,8 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
 std::string format_camchain(const CameraChain& chain) {
   std::string text;
   for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
-    const CameraDescription& camera = chain.cameras[i].description;
-    text += fmt::format("cam{}:\n  camera_model: {}\n", i, camera.camera_model);
-    if (!camera.intrinsics.empty()) {
-      text += fmt::format("  intrinsics: [{}]\n", fmt::join(camera.intrinsics, ", "));
-    }
-    text += fmt::format("  distortion_model: {}\n", camera.distortion_model);
-    if (!camera.distortion_coeffs.empty()) {
-      text += fmt::format("  distortion_coeffs: [{}]\n", fmt::join(camera.distortion_coeffs, ", "));
-    }
-    text += fmt::format("  resolution: [{}, {}]\n", camera.width_px, camera.height_px);
-    const double readout_s = chain.cameras[i].readout_s;
-    if (readout_s != 0.0) text += fmt::format("  readout_ms: {:.6g}\n", 1e3 * readout_s);
-    if (i == 0) continue;
-    const Eigen::Matrix4d from_previous =
-        (chain.cameras[i].cam_from_rig * chain.cameras[i - 1].cam_from_rig.inverse()).matrix();
-    text += "  T_cn_cnm1:\n";
-    for (int row = 0; row < 4; ++row) {
-      text += fmt::format("  - [{}]\n", fmt::join(from_previous.row(row), ", "));
-    }
+    text += fmt::format("cam{}:\n", i) + format_camera(chain.cameras[i]);
+    if (i > 0) text += format_transform(chain.cameras[i], chain.cameras[i - 1]);
   }
   if (chain.depth_factor) text += fmt::format("depth: {{factor: {}}}\n", *chain.depth_factor);
   return text;
@@ -210,7 +301,8 @@ Rig make_rig(const CameraChain& chain, const CameraRegistry& registry) {
          camera.cam_from_rig,
          camera.description,
          [models](const CameraDescription& other) { return models->make_camera(other); },
-         camera.readout_s});
+         camera.readout_s,
+         camera.sigmas});
   }
   return rig;
 }

@@ -20,6 +20,7 @@ struct ChainCamera {
   CameraDescription description;  ///< Model and numbers, not checked yet.
   Rigid3 cam_from_rig;            ///< Identity for camera 0; translation in metres.
   double readout_s = 0.0;         ///< See RigCamera.
+  CalibrationSigmas sigmas = {};  ///< How sure that is.
 };
 
 /// The calibration of a rig, as written: cameras are made of it by make_rig().
@@ -34,7 +35,8 @@ struct CameraChain {
 /// malformed, with its line; models and their numbers are checked by make_rig().
 std::optional<CameraChain> read_camchain(const ConfigNode& config);
 
-/// The text of a camchain file of a chain; read_camchain() gives the chain again.
+/// The chain in Kalibr's format, as read_camchain() reads it, with the standard deviations that it
+/// has.
 std::string format_camchain(const CameraChain& chain);
 
 /// Makes the cameras. Throws InputError for what a model refuses.

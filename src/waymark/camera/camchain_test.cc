@@ -13,10 +13,12 @@
 namespace waymark {
 namespace {
 
+using ::testing::DoubleEq;
 using ::testing::ElementsAre;
 using ::testing::EndsWith;
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
+using ::testing::Not;
 using ::testing::StartsWith;
 
 // What Kalibr writes for the stereo camera of the EuRoC data set.
@@ -125,18 +127,53 @@ TEST(Camchain, TransformationsChain) {
   EXPECT_LT((point - Eigen::Vector3d(-0.5, -1.5, 3.0)).norm(), 1e-12);
 }
 
-TEST(Camchain, IsReadAsWritten) {
-  CameraChain chain = *read(kKalibrStereo);
+TEST(Camchain, ReadsBackWhatItWrites) {
+  CameraChain chain = read(kKalibrStereo).value();
+  EXPECT_THAT(format_camchain(chain), Not(HasSubstr("sigma")));
   chain.depth_factor = 5000.0;
-  const CameraChain again = *read(format_camchain(chain));
-  ASSERT_EQ(again.cameras.size(), 2u);
-  EXPECT_EQ(again.depth_factor, chain.depth_factor);
+  chain.cameras[0].sigmas.intrinsics = {0.5, 0.25, 0.0, 3.0};
+  chain.cameras[1].sigmas.distortion_coeffs = {0.01, 0.02, 1.5e-4, 0.0};
+  chain.cameras[1].sigmas.rotation_rad = {1e-4, 2e-4, 0.0};
+  chain.cameras[1].sigmas.baseline_direction_rad = {3e-4, 5e-4};
+  const CameraChain again = read(format_camchain(chain)).value();
   for (std::size_t i = 0; i < 2; ++i) {
-    EXPECT_TRUE(again.cameras[i].description.is_same(chain.cameras[i].description)) << i;
-    const Eigen::Matrix4d off =
-        again.cameras[i].cam_from_rig.matrix() - chain.cameras[i].cam_from_rig.matrix();
-    EXPECT_LT(off.norm(), 1e-12) << i;
+    const ChainCamera& camera = again.cameras[i];
+    EXPECT_TRUE(camera.description.is_same(chain.cameras[i].description));
+    EXPECT_LT((camera.cam_from_rig.matrix() - chain.cameras[i].cam_from_rig.matrix()).norm(), 1e-9);
   }
+  EXPECT_EQ(again.depth_factor, 5000.0);
+  const Rig rig = make_rig(again);
+  EXPECT_THAT(rig.cameras[0].sigmas.intrinsics, ElementsAre(0.5, 0.25, 0.0, 3.0));
+  EXPECT_THAT(rig.cameras[0].sigmas.distortion_coeffs, IsEmpty());
+  const CalibrationSigmas& sigmas = rig.cameras[1].sigmas;
+  EXPECT_THAT(sigmas.distortion_coeffs, ElementsAre(0.01, 0.02, 1.5e-4, 0.0));
+  EXPECT_THAT(sigmas.rotation_rad, ElementsAre(DoubleEq(1e-4), DoubleEq(2e-4), 0.0));
+  EXPECT_THAT(sigmas.baseline_direction_rad, ElementsAre(DoubleEq(3e-4), DoubleEq(5e-4)));
+}
+
+TEST(Camchain, StandardDeviationsAreChecked) {
+  EXPECT_EQ(error_of(one_camera(", intrinsics_sigma: [1, 1, 1]")),
+            "a.yaml:1: cam0.intrinsics_sigma has 3 numbers, expected 4, a standard deviation for "
+            "each");
+  EXPECT_THAT(error_of(one_camera(", intrinsics_sigma: [1, -1, 1, 1]")),
+              EndsWith("cam0.intrinsics_sigma[1] is -1, expected a number from 0 to 100000"));
+  EXPECT_THAT(error_of(one_camera(", intrinsics_sigma: [1, .inf, 1, 1]")),
+              HasSubstr("intrinsics_sigma[1] is .inf, expected a number"));
+  EXPECT_THAT(error_of(one_camera(", distortion_coeffs_sigma: [0.1]")),
+              HasSubstr("has 1 numbers, expected 0"));
+  const auto turn_error = [](const std::string& sigma) {
+    return error_of(one_camera("") + "cam1: {" + kPlain +
+                    ", T_cn_cnm1: [[1, 0, 0, -0.1], [0, 1, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]], "
+                    "T_cn_cnm1_sigma: " +
+                    sigma + "}\n");
+  };
+  EXPECT_EQ(turn_error("{rotation_mrad: [1, 1, 0]}"), "no error");
+  EXPECT_THAT(turn_error("0.5"), EndsWith("is 0.5, expected a section of KEY: VALUE"));
+  EXPECT_THAT(turn_error("{rotation_mrad: [1]}"), HasSubstr("has 1 numbers, expected 3"));
+  EXPECT_THAT(turn_error("{rotation: [1, 1, 1]}"),
+              EndsWith("expected one of rotation_mrad, baseline_direction_mrad"));
+  EXPECT_THAT(error_of(one_camera(", T_cn_cnm1_sigma: {rotation_mrad: [1, 1, 1]}")),
+              HasSubstr("cam0.T_cn_cnm1_sigma is given, expected none"));
 }
 
 TEST(Camchain, DepthFactor) {

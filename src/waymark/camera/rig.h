@@ -12,6 +12,16 @@
 
 namespace waymark {
 
+/// How sure a camera's calibration is: standard deviations, 0 of what is exact. Empty lists: as
+/// good as calibrations usually are (see CalibrationParameters).
+struct CalibrationSigmas {
+  std::vector<double> intrinsics;         ///< Of each of them, in its unit.
+  std::vector<double> distortion_coeffs;  ///< Of each of them.
+  std::vector<double> rotation_rad;       ///< Of the camera about its own x, y and z.
+  /// Of the baseline along the columns of across_baseline(), as a turn.
+  std::vector<double> baseline_direction_rad;
+};
+
 /// One camera of a rig. cam_from_rig is fixed; camera 0 is the rig's origin.
 struct RigCamera {
   /// Shared by everything that looks through it; never null.
@@ -26,6 +36,8 @@ struct RigCamera {
   /// Rolling shutter: from reading the first row to reading the last. A frame's time is that of the
   /// row in the middle. 0: all rows are read at once.
   double readout_s = 0.0;
+  /// How sure the calibration is.
+  CalibrationSigmas sigmas = {};
 };
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.

@@ -205,12 +205,16 @@ bool adjust_once(const CalibrationParameters& parameters,
   const BundleResult result =
       adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 2});
   const BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
-  const std::optional<Rig> rig = parameters.rig_at(trial.change + found.change);
+  Eigen::VectorXd change = trial.change + found.change;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    if (parameters.list()[i].prior_sigma == 0.0) change[static_cast<Eigen::Index>(i)] = 0.0;
+  }
+  const std::optional<Rig> rig = parameters.rig_at(change);
   if (!rig || found.evidence.information.size() == 0) return false;
   auto next = std::make_shared<const Rig>(*rig);
   use_rig(*trial.rig, *next, problem);
   trial.rig = std::move(next);
-  trial.change += found.change;
+  trial.change = std::move(change);
   trial.noise_px = result.noise_px;
   judge(found.evidence, prior, trial);
   return true;
@@ -381,7 +385,11 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   KnownCalibration found = known;
   found.rig = std::move(trial.rig);
   found.change = std::move(trial.change);
-  found.sigma = std::move(trial.sigma);
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const bool is_estimated = is_free[i] && parameters.list()[i].prior_sigma > 0.0;
+    const auto at = static_cast<Eigen::Index>(i);
+    found.sigma[at] = is_estimated ? trial.sigma[at] : parameters.list()[i].prior_sigma;
+  }
   return found;
 }
 

@@ -59,6 +59,19 @@ TEST_F(CalibrateTest, FindsTheTurnOfTheSecondCamera) {
   EXPECT_LT(std::abs(error_in_sigmas(found, "cam1.turn_y", 2e-3)), 3.0);
 }
 
+TEST_F(CalibrateTest, LeavesWhatIsExact) {
+  const auto truth = make_described(1, make_test_pinhole(420.0, {-0.2, 0.03, 0.0, 0.0}));
+  Rig told = *make_described(1, make_test_pinhole(420.0));
+  told.cameras[0].sigmas.intrinsics = {0.0, 0.0, 0.0, 0.0};
+  const GlobalAdjustment found = adjust(truth, std::make_shared<const Rig>(told));
+  ASSERT_TRUE(found.calibration);
+  const CameraDescription& camera = *found.calibration->rig->cameras[0].description;
+  EXPECT_EQ(camera.intrinsics, told.cameras[0].description->intrinsics);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.k1", -0.2)), 3.0);
+  EXPECT_EQ(found.calibration->sigma[0], 0.0);
+  EXPECT_EQ(found.calibration->sigma[6], 5e-4) << "nothing is told of p1";
+}
+
 TEST_F(CalibrateTest, LeavesWhatIsRight) {
   for (const int num_cameras : {1, 2}) {
     const auto truth = make_described(num_cameras, make_test_pinhole(420.0));

@@ -114,22 +114,6 @@ TEST(Dataset, StereoIsEuroc) {
   }
 }
 
-TEST(Dataset, CamchainReadsBack) {
-  CameraChain chain = stereo_chain(small_camera(0.0), small_camera(3.0), kCam1FromCam0);
-  chain.depth_factor = 5000.0;
-  const YAML::Node yaml = YAML::Load(format_camchain(chain));
-  EXPECT_EQ(yaml["cam1"]["intrinsics"][2].as<double>(), 62.5);
-  EXPECT_EQ(yaml["cam0"]["distortion_model"].as<std::string>(), "radtan");
-  EXPECT_EQ(yaml["depth"]["factor"].as<double>(), 5000.0);
-  for (int row = 0; row < 4; ++row) {
-    for (int column = 0; column < 4; ++column) {
-      EXPECT_NEAR(yaml["cam1"]["T_cn_cnm1"][row][column].as<double>(),
-                  kCam1FromCam0.matrix()(row, column),
-                  1e-12);
-    }
-  }
-}
-
 TEST(Dataset, RgbdIsTum) {
   const testing::TemporaryFolder folder;
   SimulatedSequence sequence(small_spec(rgbd_chain(small_camera(0.0), 5000.0)));
