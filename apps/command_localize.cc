@@ -4,6 +4,8 @@
 
 #include <memory>
 #include <string>
+#include <utility>
+#include <vector>
 
 #include "commands.h"
 #include "input_command.h"
@@ -17,6 +19,7 @@ namespace {
 struct LocalizeOptions {
   std::filesystem::path map;
   SessionOptions session;
+  CalibrateOptions calibrate;
   ReportOptions report;
   bool is_unordered = false;
 };
@@ -36,10 +39,46 @@ void report_results(Reporter& reporter,
                             options.report.out.string()));
 }
 
-int localize(const LocalizeOptions& options, Reporter& reporter) {
+/// Finds all images. Once the calibration turns out to be another, those of a file are found from
+/// the start with what it is.
+SessionResults localize_all(const LocalizeOptions& options,
+                            const std::shared_ptr<const Map>& map,
+                            PreparedInput& prepared,
+                            Reporter& reporter) {
+  const ImageOrder order = options.is_unordered ? ImageOrder::kUnordered : ImageOrder::kStream;
+  const auto localize_with = [&](Localizer& localizer) {
+    SessionResults results = localize_input(*prepared.input,
+                                            localizer,
+                                            order,
+                                            is_interrupted,
+                                            report_frames(reporter, prepared.input->info()));
+    reporter.finish_progress();
+    return results;
+  };
+  Localizer localizer(prepared.rig, prepared.settings, map);
+  SessionResults results = localize_with(localizer);
+  std::vector<CalibrationEstimate> refined = localizer.calibration();
+  if (refined.empty()) return results;
+  prepared.rig = localizer.rig();
+  const bool is_done = prepared.input->info().is_live || is_interrupted() || results.failure;
+  if (!is_done) {
+    reporter.info("the calibration is another than stated: once more with what the images tell");
+    prepared.input.reset();
+    prepared.input = open_input(options.session.input, prepared.reading);
+    prepared.settings.calibration.refine = "off";
+    Localizer again(prepared.rig, prepared.settings, map);
+    results = localize_with(again);
+  }
+  results.summary.refined_calibration = std::move(refined);
+  return results;
+}
+
+int localize(LocalizeOptions options, Reporter& reporter) {
+  const StoredMap stored = load_map(options.map);
+  options.session.calibrate = reported(options.calibrate, reporter);
   PreparedInput prepared = prepare_input(options.session);
   for (const std::string& line : prepared.description) reporter.info(line);
-  const StoredMap stored = load_map(options.map);
+  warn_unless_sure(reporter, prepared, "the map may tell");
   reporter.info(describe(*stored.map, options.map));
   const bool has_range = prepared.input->info().setup != Setup::kMono;
   if (has_range && !is_metric(*stored.map)) {
@@ -47,24 +86,21 @@ int localize(const LocalizeOptions& options, Reporter& reporter) {
   }
   prepare_results(options.report.out);
 
-  Localizer localizer(prepared.rig, prepared.settings, stored.map);
-  SessionResults results =
-      localize_input(*prepared.input,
-                     localizer,
-                     options.is_unordered ? ImageOrder::kUnordered : ImageOrder::kStream,
-                     is_interrupted,
-                     report_frames(reporter, prepared.input->info()));
-  reporter.finish_progress();
+  SessionResults results = localize_all(options, stored.map, prepared, reporter);
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(prepared.input->info().setup);
   results.summary.timing = to_string(Timing::kInline);
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
   results.summary.version = WAYMARK_VERSION;
-  save_each({[&] { write_results(options.report.out, results); },
-             [&] {
-               report_results(reporter, results, options);
-               check_finished(results);
-             }});
+  add_calibration(prepared, results.summary);
+  save_each(
+      {[&] { write_results(options.report.out, results); },
+       [&] { write_calibration(options.report.out, prepared, prepared.rig, results.summary); },
+       [&] {
+         report_results(reporter, results, options);
+         report_calibration(reporter, results.summary);
+         check_finished(results);
+       }});
   return *results.summary.localized == 0 ? kNoPose : kDone;
 }
 
@@ -77,6 +113,7 @@ void add_localize_command(CLI::App& program, Command& command) {
   localize_command.add_option("MAP", options->map, "Map file (.wmap)")->required();
   add_input_options(localize_command, options->session);
   add_selection_options(localize_command, options->session.reading);
+  add_fov_option(localize_command, options->calibrate);
   localize_command.add_flag(
       "--unordered", options->is_unordered, "Each image by itself, rather than a stream [off]");
   add_report_options(localize_command, options->report, options->session.seed);

@@ -63,6 +63,29 @@ class Calibrate(unittest.TestCase):
         done = waymark("config", out)
         self.assertEqual(done.stdout, "valid: 1 cameras\n", done.stderr)
 
+    def test_a_map_tells_the_calibration_of_a_query(self):
+        camera, told = self.folder / "camera.yaml", self.folder / "told.yaml"
+        told.write_text(CAMERA.replace("[280, 280,", "[288.4, 288.4,"))
+        map_file, out = self.folder / "room.wmap", self.folder / "found"
+        done = waymark("run", self.images, "-c", camera, "--map-out", map_file, "-o", self.folder / "mapped")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        for options in (["-c", told, "--unordered"], ["-c", told], []):
+            done = waymark("localize", map_file, self.images, *options, "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            focal_px = self.check((out / "calibration.yaml").read_text())
+            summary = json.loads((out / "summary.json").read_text())
+            self.assertEqual(summary["localized"], 60)
+            self.assertEqual("calibration" in summary, not options)
+            if options:
+                self.assertLess(abs(focal_px / FOCAL_PX - 1), 0.005, options)
+                self.assertIn("calibration changed: cam0.fu 288.4 -> ", done.stderr)
+                self.assertEqual(summary["refined_calibration"][0]["given"], 288.4)
+            (out / "calibration.yaml").unlink()
+        for options in (["-c", told, "--set", "calibration.refine=off"], ["-c", camera]):
+            done = waymark("localize", map_file, self.images, *options, "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertFalse((out / "calibration.yaml").exists())
+
     def test_what_cannot_tell(self):
         done = waymark("calibrate", self.images, "--frames", 1)
         self.assertEqual(done.returncode, 0, done.stderr)
@@ -76,7 +99,7 @@ class Calibrate(unittest.TestCase):
                 (["calibrate", self.folder / "none"], "none: does not exist, expected"),
                 (["calibrate", self.images, "--fov", 1000], "--fov"),
                 (["calibrate", self.images, "-o", self.folder / "none/a.yaml"], "none/a.yaml"),
-                (["localize", "none.wmap", self.images], "carries no calibration, expected")):
+                (["localize", "none.wmap", self.images], "none.wmap: ")):
             done = waymark(*arguments)
             self.assertIn(done.returncode, (1, 2))
             self.assertRegex(done.stderr, "^error: .*" + message)

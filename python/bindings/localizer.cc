@@ -3,9 +3,11 @@
 #include "waymark/system/localizer.h"
 
 #include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "arguments.h"
 #include "arrays.h"
@@ -37,6 +39,11 @@ class PythonLocalizer {
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
     const ReleasedGil released;
     return localizer_.locate(frame.input(0), hint);
+  }
+
+  std::vector<CalibrationEstimate> calibration() {
+    const Turn turn(is_taken_, "Localizer");
+    return localizer_.calibration();
   }
 
  private:
@@ -145,6 +152,11 @@ map's frame. One thread at a time; a second one gets a RuntimeError.)");
 map: a Map. The rest as for System. Ranges of stereo and depth count only in maps in metres.)");
   bind_locate(localizer);
   bind_track(localizer);
+  localizer.def("calibration", &PythonLocalizer::calibration, R"(calibration(self)
+--
+
+What the images located so far told of each number of their calibration, which later ones are
+located with: a list of CalibrationEstimate, empty as long as they did not contradict it.)");
   localizer.get("map", "Map: the one given.", &PythonLocalizer::map);
 }
 

@@ -28,6 +28,7 @@ class Localizing(Test):
         self.assertIs(localizer.map, self.map)
         for index in (30, 3, 17):
             self.check(index, localizer.locate(self.frames[index].image0))
+        self.assertEqual(localizer.calibration(), [])
 
     def test_hint(self):
         localizer = waymark.Localizer(self.map, camchain(), setup="mono")

@@ -89,6 +89,7 @@ PreparedInput prepare_input(const SessionOptions& options) {
     prepared.input.reset();  // A camera is open once at a time.
     prepared.input = open_input(options.input, reading);
   }
+  prepared.reading = reading;
   const InputInfo& info = prepared.input->info();
   if (info.calibration->depth_factor) {
     prepared.settings.depth.factor = *info.calibration->depth_factor;

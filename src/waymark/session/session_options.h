@@ -38,6 +38,7 @@ struct PreparedInput {
   Rig rig;
   std::optional<EstimatedCalibration> estimated;  ///< Where the input carried no calibration.
   std::vector<std::string> description;           ///< What was understood, in words.
+  InputOptions reading = {};                      ///< What the input was opened with.
 };
 
 /// An input and the system to feed it to.

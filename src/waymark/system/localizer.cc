@@ -14,6 +14,7 @@
 #include "waymark/camera/scaled_camera.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/frame_builder.h"
+#include "waymark/system/query_calibration.h"
 #include "waymark/system/temporary_map.h"
 #include "waymark/track/keyframes_near.h"
 #include "waymark/track/relocalizer.h"
@@ -29,6 +30,9 @@ constexpr int kEnoughLandmarks = 100;
 /// One that has seen fewer than this for longer has left the map.
 constexpr int kMinLandmarks = 20;
 constexpr std::int64_t kMaxBridgeNs = 2'000'000'000;
+
+/// Frames of a stream that tell of its calibration: neighbours tell the same.
+constexpr std::uint32_t kCalibrationSpacing = 5;
 
 /// Images that are finer than those of the map by less are taken as they are.
 constexpr double kMinReduction = 0.8;
@@ -55,8 +59,15 @@ double reduction_for(const Rig& rig, const Map& map) {
 
 Rig reduced(Rig rig, double factor) {
   if (factor == 1.0) return rig;
+  const auto resized = [factor](std::shared_ptr<const Camera> camera) {
+    return std::make_shared<const ScaledCamera>(ScaledCamera::resized(std::move(camera), factor));
+  };
   for (RigCamera& camera : rig.cameras) {
-    camera.camera = std::make_shared<ScaledCamera>(ScaledCamera::resized(camera.camera, factor));
+    camera.camera = resized(camera.camera);
+    if (!camera.remake) continue;
+    camera.remake = [resized, remake = camera.remake](const CameraDescription& description) {
+      return resized(remake(description));
+    };
   }
   return rig;
 }
@@ -78,15 +89,19 @@ class Localizer::Impl {
         reduction_(reduction_for(full_rig_, *map)),
         rig_(std::make_shared<const Rig>(reduced(full_rig_, reduction_))),
         uses_range_(is_metric(*map)),
+        settings_(settings),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
         snapshot_(index_map(std::move(map))),
-        temporary_(rig_, snapshot_),
+        temporary_(std::in_place, rig_, snapshot_),
         tracker_(rig_, uses_range_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
-        relocalizer_(rig_, settings.tracking, static_cast<std::uint64_t>(settings.seed)) {
+        relocalizer_(rig_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
+        calibration_(rig_, settings.calibration, snapshot_.map) {
     tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   }
 
   const Map& map() const { return *snapshot_.map; }
+  Rig rig() const;
+  std::vector<CalibrationEstimate> calibration() const;
   TrackingResult track(const FrameImages& images);
   TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint);
 
@@ -97,19 +112,24 @@ class Localizer::Impl {
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
   /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
   void bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns);
+  /// From the next frame on.
+  void look_with(std::shared_ptr<const Rig> rig);
 
   const Rig full_rig_;
   const double reduction_;
-  const std::shared_ptr<const Rig> rig_;  ///< Of the reduced images.
+  std::shared_ptr<const Rig> rig_;  ///< Of the reduced images, as calibrated by now.
   const bool uses_range_;
+  const Settings settings_;
   FrameBuilder builder_;
   const MapSnapshot snapshot_;
-  TemporaryMap temporary_;  ///< For the stream.
+  std::optional<TemporaryMap> temporary_;  ///< For the stream; never empty.
   bool is_on_temporary_ = false;
   std::int64_t last_in_map_ns_ = 0;
   Tracker tracker_;
   Relocalizer relocalizer_;
+  QueryCalibration calibration_;
   std::uint32_t num_frames_ = 0;
+  std::uint32_t num_tracked_ = 0;                  ///< Of the stream.
   std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
 };
 
@@ -151,10 +171,41 @@ TrackingResult Localizer::Impl::track(const FrameImages& images) {
   const RigMotion motion = builder_.needs_motion(images) ? tracker_.predict_motion() : RigMotion{};
   const Frame frame = build(images, motion, result);
   last_timestamp_ns_ = images.timestamp_ns;
-  const TrackOutcome outcome = tracker_.track(frame, temporary_.visible(), result.stages);
+  const TrackOutcome outcome = tracker_.track(frame, temporary_->visible(), result.stages);
   bridge_gaps(outcome, images.timestamp_ns);
   static_cast<FrameVerdict&>(result) = outcome;
+  if (outcome.world_from_rig && ++num_tracked_ % kCalibrationSpacing == 0 &&
+      calibration_.add(frame, outcome.world_from_rig->inverse(), outcome.details.landmarks)) {
+    look_with(calibration_.known().rig);
+  }
   return result;
+}
+
+void Localizer::Impl::look_with(std::shared_ptr<const Rig> rig) {
+  rig_ = std::move(rig);
+  builder_.look_with(*rig_);
+  tracker_.look_with(rig_);
+  relocalizer_ = Relocalizer(rig_, settings_.tracking, static_cast<std::uint64_t>(settings_.seed));
+  temporary_.emplace(rig_, snapshot_);
+  if (std::exchange(is_on_temporary_, false)) {
+    tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
+  }
+}
+
+Rig Localizer::Impl::rig() const {
+  Rig rig = full_rig_;
+  for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
+    const RigCamera& now = rig_->cameras[c];
+    rig.cameras[c].cam_from_rig = now.cam_from_rig;
+    rig.cameras[c].description = now.description;
+    if (rig.cameras[c].remake) rig.cameras[c].camera = rig.cameras[c].remake(*now.description);
+  }
+  return rig;
+}
+
+std::vector<CalibrationEstimate> Localizer::Impl::calibration() const {
+  const KnownCalibration& known = calibration_.known();
+  return known.is_changed() ? known.estimates() : std::vector<CalibrationEstimate>{};
 }
 
 void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns) {
@@ -167,10 +218,10 @@ void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t time
   const bool has_left = timestamp_ns - last_in_map_ns_ > kMaxBridgeNs;
   if (is_on_temporary_ && outcome.world_from_rig && num_lasting < kEnoughLandmarks && !has_left) {
     if (!outcome.message) return;
-    temporary_.add(std::get<NewKeyframe>(*outcome.message));
+    temporary_->add(std::get<NewKeyframe>(*outcome.message));
   } else if (is_on_temporary_) {
     is_on_temporary_ = false;
-    temporary_.clear();
+    temporary_->clear();
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   } else if (outcome.world_from_rig && num_lasting < kFewLandmarks) {
     is_on_temporary_ = true;
@@ -196,6 +247,9 @@ TrackingResult Localizer::Impl::locate(const FrameImages& images,
   result.num_matches = located->num_matches;
   result.num_inliers = located->num_inliers;
   result.submap = submap_of(*snapshot_.map, located->landmarks);
+  if (calibration_.add(frame, located->rig_from_world, located->landmarks)) {
+    look_with(calibration_.known().rig);
+  }
   return result;
 }
 
@@ -215,6 +269,8 @@ Localizer::Localizer(Rig rig, const Settings& settings, std::shared_ptr<const Ma
     : impl_(std::make_unique<Impl>(std::move(rig), settings, std::move(map))) {}
 Localizer::~Localizer() = default;
 const Map& Localizer::map() const { return impl_->map(); }
+Rig Localizer::rig() const { return impl_->rig(); }
+std::vector<CalibrationEstimate> Localizer::calibration() const { return impl_->calibration(); }
 TrackingResult Localizer::track(const FrameImages& images) { return impl_->track(images); }
 TrackingResult Localizer::locate(const FrameImages& images, const std::optional<PoseHint>& hint) {
   return impl_->locate(images, hint);

@@ -4,7 +4,9 @@
 
 #include <memory>
 #include <optional>
+#include <vector>
 
+#include "waymark/camera/calibration.h"
 #include "waymark/camera/rig.h"
 #include "waymark/map/map.h"
 #include "waymark/system/settings.h"
@@ -22,6 +24,10 @@ struct PoseHint {
 /// than those the map was made with. Poses are in the map's frame. Ranges of stereo and depth count
 /// only in maps with a scale in metres.
 ///
+/// A calibration that does not fit is mended unless the settings say otherwise: frames that were
+/// located are looked at together (10, 20 and 40 images by themselves, or every fifth of a stream),
+/// and where they contradict it, later ones are located with what they tell.
+///
 /// A result without a pose tells how far the search got: how many places were compared
 /// (num_candidates), and of the one that came closest the matches, the inliers and why it was
 /// refused (reason). One thread at a time.
@@ -35,6 +41,10 @@ class Localizer {
 
   /// The map that was given.
   const Map& map() const;
+  /// The rig as calibrated by now, of the images as they are given.
+  Rig rig() const;
+  /// What the images told of each number of the calibration; empty where they have not changed it.
+  std::vector<CalibrationEstimate> calibration() const;
 
   /// The next image of a stream: looked for near the one before, and anywhere where it is not.
   /// Where the map shows too little, for two seconds at most, landmarks that the stream itself saw

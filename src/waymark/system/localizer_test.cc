@@ -238,5 +238,33 @@ TEST(Localizer, TheCameraMayChangeWhileAMapIsExtended) {
   }
 }
 
+/// The query's calibration after all frames were located one by one, told with another focal
+/// length.
+std::vector<CalibrationEstimate> refined_from(double factor, const char* refine) {
+  CameraChain told = scene().query.spec().chain;
+  for (int i = 0; i < 2; ++i)
+    told.cameras[0].description.intrinsics[static_cast<std::size_t>(i)] *= factor;
+  Settings settings = localizer_settings();
+  settings.calibration.refine = refine;
+  Localizer localizer(make_rig(told), settings, scene().map);
+  for (const SimulatedFrame& frame : scene().frames) localizer.locate(depth_input_of(frame));
+  const std::vector<CalibrationEstimate> estimates = localizer.calibration();
+  const Rig rig = localizer.rig();
+  const double change = estimates.empty() ? 0.0 : estimates[0].change;
+  EXPECT_DOUBLE_EQ(rig.cameras[0].description->intrinsics[0], factor * 260.0 + change);
+  EXPECT_EQ(rig.cameras[0].camera->width_px(), 400);
+  return estimates;
+}
+
+TEST(Localizer, MendsTheCalibrationOfTheQuery) {
+  const std::vector<CalibrationEstimate> estimates = refined_from(1.03, "auto");
+  ASSERT_FALSE(estimates.empty());
+  EXPECT_EQ(estimates[0].name, "cam0.fu");
+  EXPECT_NEAR(estimates[0].given + estimates[0].change, 260.0, 1.3);
+  EXPECT_LT(estimates[0].sigma, 1.0);
+  EXPECT_TRUE(refined_from(1.03, "off").empty());
+  EXPECT_TRUE(refined_from(1.0, "auto").empty());
+}
+
 }  // namespace
 }  // namespace waymark
