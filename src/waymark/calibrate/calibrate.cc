@@ -32,6 +32,12 @@ constexpr double kRepeatability = 0.004;
 /// Matches that are wrong together make the focal length less certain than the residuals tell.
 constexpr double kHonesty = 2.0;
 constexpr double kSure = 0.03;
+/// How far a focal length may be off, relatively: any, by a data sheet, as the camera noted it,
+/// that of most cameras.
+constexpr double kAnyFocalLength = 1.0;
+constexpr double kByDataSheet = 0.05;
+constexpr double kAsNoted = 0.1;
+constexpr double kOfMost = 0.3;
 
 /// Images of camera 0 in order, reduced.
 struct Stretch {
@@ -102,6 +108,28 @@ AssumedLens look_at(const Stretch& stretch) {
   return assumed;
 }
 
+/// What is known of the field of view before images tell, and how far the focal length that they
+/// tell may be from what is taken at first.
+struct KnownOfFov {
+  ExpectedFov expected;
+  double focal_sigma = kAnyFocalLength;
+  double untold_sigma = kOfMost;  ///< Of the focal length where images do not tell it.
+};
+
+KnownOfFov known_of_fov(const InputInfo& info, const CalibrateOptions& options) {
+  KnownOfFov known;
+  if (options.fov_deg) {
+    known.expected.rad = *options.fov_deg * kRadiansPerDegree;
+    known.expected.is_known = true;
+    known.focal_sigma = kByDataSheet;
+  } else if (info.focal_px) {
+    known.expected.rad = 2.0 * std::atan(0.5 * info.width_px / *info.focal_px);
+    known.expected.spread = kAsNoted;
+    known.focal_sigma = known.untold_sigma = kAsNoted;
+  }
+  return known;
+}
+
 /// How far off the axis the corner of the image is seen.
 double corner_angle(const DivisionLens& lens, const CameraDescription& size) {
   const double radius =
@@ -130,14 +158,14 @@ std::shared_ptr<const Map> map_stretch(const Stretch& stretch,
 /// Map and refinement in turns, until the focal length stays.
 std::optional<RefinedLens> refine_by_mapping(const Stretch& stretch,
                                              CameraDescription lens,
+                                             double focal_sigma,
                                              const CalibrateOptions& options) {
   CameraDescription assumed = lens;
   std::fill(assumed.distortion_coeffs.begin(), assumed.distortion_coeffs.end(), 0.0);
   std::optional<RefinedLens> refined;
   double change = 1.0;
   for (int round = 0; round < kMaxRounds && !is_stopped(options); ++round) {
-    auto next = refine_lens(
-        *map_stretch(stretch, lens, options), assumed, lens, options.fov_deg.has_value());
+    auto next = refine_lens(*map_stretch(stretch, lens, options), assumed, lens, focal_sigma);
     if (!next) break;
     change = std::abs(std::log(next->description.intrinsics[0] / lens.intrinsics[0]));
     lens = next->description;
@@ -165,7 +193,9 @@ EstimatedCalibration full_size(const Stretch& stretch, const CameraDescription& 
   return calibration;
 }
 
-EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOptions& options) {
+EstimatedCalibration calibrate_stretch(const Stretch& stretch,
+                                       const KnownOfFov& known,
+                                       const CalibrateOptions& options) {
   AssumedLens assumed = look_at(stretch);
   if (assumed.model == LensModel::kEquirectangular) {
     EstimatedCalibration calibration = full_size(stretch, assumed.description);
@@ -176,20 +206,17 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOp
   }
   const std::vector<PixelMatches> pairs =
       match_stretch(stretch.images, stretch.masks, assumed.description);
-  std::optional<double> fov_rad;
-  if (options.fov_deg) fov_rad = *options.fov_deg * kRadiansPerDegree;
-  const DivisionLens found = find_division_lens(pairs, assumed.description, fov_rad);
+  const DivisionLens found = find_division_lens(pairs, assumed.description, known.expected);
   if (corner_angle(found, assumed.description) > kFisheyeRad) assumed.model = LensModel::kFisheye;
   const CameraDescription lens = with_coefficients(assumed.model,
                                                    found.focal_px(assumed.description.width_px),
                                                    found.division,
                                                    assumed.description);
-  const auto refined = refine_by_mapping(stretch, lens, options);
+  const auto refined = refine_by_mapping(stretch, lens, known.focal_sigma, options);
   EstimatedCalibration calibration = full_size(stretch, refined ? refined->description : lens);
   calibration.model = assumed.model;
   calibration.reason = "the motion does not tell, the likeliest is taken";
-  calibration.sigmas = lens_sigmas(calibration.camera.width_px, options.fov_deg.has_value());
-  calibration.sigmas[0] = 0.3;
+  calibration.sigmas = lens_sigmas(calibration.camera.width_px, known.untold_sigma);
   if (!refined) return calibration;
   calibration.num_keyframes = refined->num_keyframes;
   calibration.reprojection_px = refined->reprojection_px;
@@ -263,6 +290,7 @@ std::vector<std::string> report(const EstimatedCalibration& calibration) {
 
 EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
   std::optional<EstimatedCalibration> best;
+  const KnownOfFov known = known_of_fov(input.info(), options);
   const int num_stretches = input.info().is_live ? 1 : kMaxStretches;
   for (int i = 0; i < num_stretches && !is_stopped(options); ++i) {
     if (options.on_progress) {
@@ -272,7 +300,7 @@ EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
     }
     const Stretch stretch = read_stretch(input, options);
     if (stretch.images.empty() || (best && stretch.images.size() < kMinFrames)) break;
-    EstimatedCalibration next = calibrate_stretch(stretch, options);
+    EstimatedCalibration next = calibrate_stretch(stretch, known, options);
     if (!best || next.sigmas[0] < best->sigmas[0]) best = std::move(next);
     if (best->is_sure) break;
   }

@@ -23,6 +23,12 @@ class RenderedInput : public Input {
   RenderedInput(const CameraDescription& camera, const std::string& motion, int num_frames)
       : sequence_(spec_of(camera, motion, num_frames)) {}
 
+  /// As cameras do in photos.
+  void note(double focal_px) {
+    info_.width_px = 400;
+    info_.focal_px = focal_px;
+  }
+
   const InputInfo& info() const override { return info_; }
   std::optional<InputFrame> next() override {
     if (next_ == sequence_.num_frames()) return std::nullopt;
@@ -81,6 +87,14 @@ TEST(Calibrate, SaysWhereNothingTells) {
   CalibrateOptions options;
   options.fov_deg = 80.0;
   EXPECT_NEAR(calibrate(again, options).fov_deg, 80.0, 0.5);
+}
+
+TEST(Calibrate, BeginsWithWhatTheCameraNoted) {
+  RenderedInput still(wide_lens(), "still", 12);
+  still.note(focal_length_of(LensModel::kPerspective, 85.0 * kRadiansPerDegree, 400));
+  const EstimatedCalibration taken = calibrate(still, {});
+  EXPECT_NEAR(taken.fov_deg, 85.0, 3.0);
+  EXPECT_EQ(taken.sigmas[0], 0.1);
 }
 
 TEST(Calibrate, SeesAllDirections) {

@@ -139,12 +139,10 @@ struct RankedLens {
 };
 
 /// What a lens costs for being unusual: it decides where the images hardly tell. Per match.
-double unlikeliness(const DivisionLens& lens) {
-  constexpr double kUsualRad = 65.0 * kRadiansPerDegree;
-  constexpr double kSpread = 0.35;
+double unlikeliness(const DivisionLens& lens, const ExpectedFov& expected) {
   constexpr double kSpreadOfDivision = 0.2;
   constexpr double kWeight = 0.002;
-  const double of_fov = std::log(lens.fov_rad / kUsualRad) / kSpread;
+  const double of_fov = std::log(lens.fov_rad / expected.rad) / expected.spread;
   const double of_division = lens.division / kSpreadOfDivision;
   return kWeight * (of_fov * of_fov + of_division * of_division);
 }
@@ -162,7 +160,8 @@ double stretch_in_corner(const DivisionLens& lens, const CameraDescription& size
 RankedLens better_of(const RankedLens& known,
                      const DivisionLens& lens,
                      std::span<const PixelMatches> pairs,
-                     const CameraDescription& assumed) {
+                     const CameraDescription& assumed,
+                     const ExpectedFov& expected) {
   CameraDescription description = assumed;
   const double focal_px = lens.focal_px(assumed.width_px);
   if (!(focal_px > 0.1 * assumed.width_px)) return known;
@@ -173,7 +172,7 @@ RankedLens better_of(const RankedLens& known,
   description.intrinsics[0] = description.intrinsics[1] = focal_px;
   const auto camera = make_if_possible(description);
   if (!camera) return known;
-  const double cost = two_view_cost(*camera, pairs) + unlikeliness(lens);
+  const double cost = two_view_cost(*camera, pairs) + unlikeliness(lens, expected);
   return cost < known.cost ? RankedLens{lens, cost} : known;
 }
 
@@ -218,25 +217,29 @@ double DivisionLens::focal_px(int width_px) const {
 
 DivisionLens find_division_lens(std::span<const PixelMatches> pairs,
                                 const CameraDescription& assumed,
-                                std::optional<double> fov_rad) {
+                                const ExpectedFov& expected) {
   std::vector<PixelMatches> half;
   for (std::size_t i = 0; i < pairs.size(); i += 2) half.push_back(pairs[i]);
+  std::vector<double> fovs_rad;
+  if (expected.is_known || expected.spread < ExpectedFov().spread) fovs_rad = {expected.rad};
+  if (!expected.is_known) {
+    for (double fov = kNarrowestRad; fov <= kWidestRad; fov *= kFovRatio) fovs_rad.push_back(fov);
+  }
   RankedLens best;
-  const double first_rad = fov_rad.value_or(kNarrowestRad);
-  for (double fov = first_rad; fov <= fov_rad.value_or(kWidestRad); fov *= kFovRatio) {
+  for (const double fov : fovs_rad) {
     for (const double division : kDivisions) {
-      best = better_of(best, {fov, division}, half, assumed);
+      best = better_of(best, {fov, division}, half, assumed, expected);
     }
   }
   best.cost = kNever;
-  double fov_ratio = fov_rad ? 1.0 : std::sqrt(kFovRatio);
+  double fov_ratio = expected.is_known ? 1.0 : std::sqrt(kFovRatio);
   double step = 0.06;
   for (int round = 0; round < kNumRefinements; ++round) {
     const DivisionLens center = best.lens;
     for (const double ratio : {1.0, 1.0 / fov_ratio, fov_ratio}) {
       for (const double offset : {0.0, -step, step}) {
         const DivisionLens lens{center.fov_rad * ratio, center.division + offset};
-        best = better_of(best, lens, pairs, assumed);
+        best = better_of(best, lens, pairs, assumed, expected);
       }
     }
     fov_ratio = std::sqrt(fov_ratio);

@@ -3,10 +3,10 @@
 #pragma once
 
 #include <cstdint>
-#include <optional>
 #include <span>
 #include <vector>
 
+#include "waymark/calibrate/lens.h"
 #include "waymark/camera/camera.h"
 #include "waymark/image/image.h"
 
@@ -40,11 +40,17 @@ struct DivisionLens {
   double focal_px(int width_px) const;
 };
 
-/// The lens that explains matches best, of all fields of view (or of the one that is known) and
-/// strengths of distortion; where nothing tells, the likeliest. Principal point and size are those
-/// of `assumed`.
+/// What is known of the horizontal field of view before images tell.
+struct ExpectedFov {
+  double rad = 65.0 * kRadiansPerDegree;  ///< Many cameras have about that.
+  double spread = 0.35;                   ///< Standard deviation of its logarithm.
+  bool is_known = false;                  ///< It is that, and no other is tried.
+};
+
+/// The lens that explains matches best, of all fields of view (unless it is known) and strengths of
+/// distortion; where nothing tells, the likeliest. Principal point and size are those of `assumed`.
 DivisionLens find_division_lens(std::span<const PixelMatches> pairs,
                                 const CameraDescription& assumed,
-                                std::optional<double> fov_rad);
+                                const ExpectedFov& expected = {});
 
 }  // namespace waymark

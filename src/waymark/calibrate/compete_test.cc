@@ -69,8 +69,10 @@ TEST(FindDivisionLens, FindsFieldOfViewAndDistortion) {
 TEST(FindDivisionLens, KeepsAFieldOfViewThatIsKnown) {
   const double focal_px = focal_length_of(LensModel::kPerspective, 60.0 * kRadiansPerDegree, 640);
   const auto pairs = see_points(make_lens(LensModel::kPerspective, focal_px, 640, 480), 4);
-  EXPECT_EQ(find_division_lens(pairs, any_lens(), 50.0 * kRadiansPerDegree).fov_rad,
-            50.0 * kRadiansPerDegree);
+  EXPECT_EQ(
+      find_division_lens(pairs, any_lens(), {.rad = 50.0 * kRadiansPerDegree, .is_known = true})
+          .fov_rad,
+      50.0 * kRadiansPerDegree);
 }
 
 TEST(FindDivisionLens, TakesTheLikeliestWhereNothingTells) {

@@ -27,14 +27,11 @@ std::string_view to_string(LensModel model) {
   return "unknown";
 }
 
-LensChange lens_sigmas(int width_px, bool is_fov_known) {
-  constexpr double kAnyFocalLength = 1.0;
-  constexpr double kByDataSheet = 0.05;
+LensChange lens_sigmas(int width_px, double focal_sigma) {
   constexpr double kAspect = 0.003;
   const double center_px = 0.015 * width_px;
   LensChange sigmas;
-  sigmas << (is_fov_known ? kByDataSheet : kAnyFocalLength), kAspect, center_px, center_px, 0.3,
-      0.2;
+  sigmas << focal_sigma, kAspect, center_px, center_px, 0.3, 0.2;
   return sigmas;
 }
 

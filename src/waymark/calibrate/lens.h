@@ -27,9 +27,9 @@ std::string_view to_string(LensModel model);
 using LensChange = Eigen::Matrix<double, 6, 1>;
 
 /// How far the truth of an unknown lens may lie from what is assumed, per number: square pixels,
-/// principal point at the image's centre and little distortion, but any focal length.
-/// is_fov_known: whether the horizontal field of view is known, as well as data sheets tell.
-LensChange lens_sigmas(int width_px, bool is_fov_known);
+/// principal point at the image's centre and little distortion. focal_sigma: of the logarithm of
+/// the focal length.
+LensChange lens_sigmas(int width_px, double focal_sigma);
 
 /// A camera of this kind without distortion, principal point at the image's centre. A fisheye image
 /// (equidistant) and a perspective one have the focal length, in px; a 360 degree image has none.

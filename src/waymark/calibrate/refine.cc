@@ -67,7 +67,7 @@ class LensProblem {
   LensProblem(const Map& map,
               const CameraDescription& assumed,
               const CameraDescription& lens,
-              bool is_fov_known);
+              double focal_sigma);
 
   bool is_large_enough() const {
     return state.cam_from_world.size() >= kMinKeyframes && points_.size() >= kMinLandmarks;
@@ -125,8 +125,8 @@ LensChange change_of(const CameraDescription& assumed, const CameraDescription& 
 LensProblem::LensProblem(const Map& map,
                          const CameraDescription& assumed,
                          const CameraDescription& lens,
-                         bool is_fov_known)
-    : assumed_(assumed), sigmas_(lens_sigmas(assumed.width_px, is_fov_known)) {
+                         double focal_sigma)
+    : assumed_(assumed), sigmas_(lens_sigmas(assumed.width_px, focal_sigma)) {
   state.change = change_of(assumed, lens);
   const std::vector<KeyframeId> keyframes = keyframes_of_largest(map);
   for (const KeyframeId id : keyframes) {
@@ -374,8 +374,8 @@ LensChange LensProblem::deviations() {
 std::optional<RefinedLens> refine_lens(const Map& map,
                                        const CameraDescription& assumed,
                                        const CameraDescription& lens,
-                                       bool is_fov_known) {
-  LensProblem problem(map, assumed, lens, is_fov_known);
+                                       double focal_sigma) {
+  LensProblem problem(map, assumed, lens, focal_sigma);
   if (!problem.is_large_enough()) return std::nullopt;
   if (!std::isfinite(problem.minimize())) return std::nullopt;
   problem.drop_outliers();

@@ -25,6 +25,6 @@ struct RefinedLens {
 std::optional<RefinedLens> refine_lens(const Map& map,
                                        const CameraDescription& assumed,
                                        const CameraDescription& lens,
-                                       bool is_fov_known);
+                                       double focal_sigma);
 
 }  // namespace waymark

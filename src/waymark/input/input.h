@@ -66,9 +66,12 @@ struct InputInfo {
   std::optional<std::size_t> num_frames;
   /// One camera per image of a frame: from the options, else from the data set, else nothing.
   std::optional<CameraChain> calibration;
-  bool is_live = false;            ///< A camera: frames come when they come.
-  int width_px = 0;                ///< Of the images of camera 0.
-  int height_px = 0;               ///< Of the images of camera 0.
+  bool is_live = false;  ///< A camera: frames come when they come.
+  int width_px = 0;      ///< Of the images of camera 0.
+  int height_px = 0;     ///< Of the images of camera 0.
+  /// About, as the camera noted it in the first image that can be read, where nothing calibrates
+  /// it.
+  std::optional<double> focal_px = std::nullopt;
   std::vector<std::string> lines;  ///< The same in words, for people.
 };
 

@@ -9,6 +9,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/input/decode.h"
+#include "waymark/input/exif.h"
 
 namespace waymark {
 namespace {
@@ -121,6 +122,7 @@ void ListingInput::check_first_frame(std::size_t index) {
   }
   info_.width_px = sizes_.front().width_px;
   info_.height_px = sizes_.front().height_px;
+  if (!info_.calibration) info_.focal_px = read_focal_px(listed.images.front(), sizes_.front());
   masks_.attach(stem_of(listed), frame);
   masks_.check_first(stem_of(listed), frame);
 }
@@ -156,6 +158,10 @@ void ListingInput::describe(const std::filesystem::path& path, const InputOption
   }
   info_.lines.push_back(fmt::format("images of {} px", sizes));
   for (const std::string& note : listing_.notes) info_.lines.push_back(note);
+  if (info_.focal_px) {
+    info_.lines.push_back(
+        fmt::format("focal length {:.0f} px, as the camera noted it (EXIF)", *info_.focal_px));
+  }
   info_.lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
   if (*info_.num_frames != listing_.frames.size()) {
     info_.lines.push_back(fmt::format("{} frames used, from {} on, every {}",
