@@ -158,6 +158,26 @@ TEST(SettingsEffect, DepthFactorIsTheUnitOfTheDepthImage) {
   EXPECT_GT(num_ranges, 100);
 }
 
+TEST(SettingsEffect, DepthLagAddsToThatOfTheTimeStamps) {
+  const auto ranges_m = [](const std::string& assignment, std::int64_t lag_ns) {
+    System system(small_rig(), settings_with({assignment}), Timing::kInline);
+    for (std::size_t i = 0; i < 3; ++i) {
+      FrameImages input = input_of(frames()[i]);
+      input.depth_lag_ns = lag_ns;
+      system.feed(input);
+    }
+    return system.details().features->range_m;
+  };
+  const auto share_alike = [](const std::vector<float>& a, const std::vector<float>& b) {
+    int num_alike = 0;
+    for (std::size_t i = 0; i < a.size(); ++i) num_alike += std::abs(a[i] - b.at(i)) < 1e-4f;
+    return num_alike / static_cast<double>(a.size());
+  };
+  const std::vector<float> later = ranges_m("depth.lag_ms=20", 0);
+  EXPECT_GT(share_alike(later, ranges_m("depth.lag_ms=0", 20'000'000)), 0.95);
+  EXPECT_LT(share_alike(later, ranges_m("depth.lag_ms=0", 0)), 0.5);
+}
+
 TEST(SettingsEffect, ViewSaysWhereFeaturesMayBe) {
   // Half the image's diagonal is 43 degrees off the axis, half its height 30.
   const auto extremes = [](const std::vector<std::string>& assignments) {
@@ -342,6 +362,7 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "features.min_contrast",
                                               "stereo.min_range_baselines",
                                               "depth.factor",
+                                              "depth.lag_ms",
                                               "view.max_angle_deg",
                                               "view.top_deg",
                                               "view.bottom_deg",
