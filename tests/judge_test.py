@@ -10,6 +10,7 @@ import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "script"))
 from cli_support import CliTest, waymark  # noqa: E402
+from evaluation.drift import drift  # noqa: E402
 from evaluation.kidnapped import Case, Verdict  # noqa: E402
 from evaluation.rotations import rotation_of  # noqa: E402
 from evaluation.splice import Part, SplicedFrame  # noqa: E402
@@ -132,6 +133,33 @@ class Comparing(CliTest):
         self.assertLess(metres, 0.1)
         self.assertGreater(metres, 0.005)
         self.assertLess(degrees, 1e-3)
+
+    def test_drift_is_that_of_stretches(self):
+        straight = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+        true = [Pose(straight, (0.5 * i, 0.0, 0.0)) for i in range(801)]
+
+        def estimate(metres, angle=lambda way: 0.0):
+            return [Pose(rotation_of(0, 0, math.sin(angle(p.position[0]) / 2), math.cos(angle(p.position[0]) / 2)),
+                         (metres(p.position[0]), 0.0, 0.0)) for p in true]
+
+        def found(poses, with_scale=False):
+            return drift(list(zip(poses, true)), with_scale)
+
+        exact = found(estimate(lambda way: 3.0 * way), True)
+        self.assertEqual(exact["stretch_m"], 100.0)
+        for key in ("translation_m", "rotation_deg", "scale_percent"):
+            self.assertAlmostEqual(exact[key], 0.0, places=6)
+        self.assertAlmostEqual(found(estimate(lambda way: 1.02 * way))["translation_m"], 2.0, places=6)
+        # The scale grows by 1 % of that at the start in each 100 m.
+        growing = found(estimate(lambda way: way + 0.5e-4 * way * way))
+        self.assertAlmostEqual(growing["scale_percent"], 1.0, delta=0.03)
+        turning = found(estimate(lambda way: way, lambda way: 1e-4 * way))
+        self.assertAlmostEqual(turning["rotation_deg"], math.degrees(0.01), places=6)
+        # 60 m: stretches of 30 m, figures still per 100 m.
+        short = drift(list(zip(estimate(lambda way: 1.02 * way), true))[:121], False)
+        self.assertAlmostEqual(short["stretch_m"], 30.0)
+        self.assertAlmostEqual(short["translation_m"], 2.0, places=6)
+        self.assertIsNone(drift(list(zip(true, true))[:90], False))
 
 
 if __name__ == "__main__":
