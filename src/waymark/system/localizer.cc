@@ -198,6 +198,7 @@ Rig Localizer::Impl::rig() const {
     const RigCamera& now = rig_->cameras[c];
     rig.cameras[c].cam_from_rig = now.cam_from_rig;
     rig.cameras[c].description = now.description;
+    rig.cameras[c].readout_s = now.readout_s;
     if (rig.cameras[c].remake) rig.cameras[c].camera = rig.cameras[c].remake(*now.description);
   }
   return rig;
@@ -247,7 +248,9 @@ TrackingResult Localizer::Impl::locate(const FrameImages& images,
   result.num_matches = located->num_matches;
   result.num_inliers = located->num_inliers;
   result.submap = submap_of(*snapshot_.map, located->landmarks);
-  if (calibration_.add(frame, located->rig_from_world, located->landmarks)) {
+  // Bent by a rolling shutter, and straightened by no motion, an image tells nothing.
+  if (rig_->cameras[0].readout_s == 0.0 &&
+      calibration_.add(frame, located->rig_from_world, located->landmarks)) {
     look_with(calibration_.known().rig);
   }
   return result;
