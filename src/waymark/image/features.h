@@ -35,7 +35,8 @@ struct RigMotion {
   Eigen::Vector3f turn_rad_s = Eigen::Vector3f::Zero();   ///< That of rig_from_world.
   Eigen::Vector3f shift_per_s = Eigen::Vector3f::Zero();  ///< In metres (map units for mono).
   float inverse_range = 0.0f;  ///< Of what is seen, in the median; 1/m (1 / map units).
-  bool operator==(const RigMotion&) const = default;
+
+  friend bool operator==(const RigMotion&, const RigMotion&) = default;
 };
 
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
