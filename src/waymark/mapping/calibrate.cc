@@ -5,14 +5,12 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <map>
 #include <memory>
 #include <utility>
 
-#include "waymark/camera/tangent.h"
 #include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/mapping/camera_measurements.h"
 
 namespace waymark {
 namespace {
@@ -33,76 +31,6 @@ constexpr double kMaxDisagreement = 6.0;
 constexpr double kStill = 0.1;
 /// More tell hardly more, and take longer.
 constexpr std::size_t kMaxObservations = 12000;
-
-/// Observations of the rig by one of its cameras.
-struct CameraMeasurements {
-  std::vector<std::size_t> indices;
-  std::vector<Eigen::Vector2d> pixels;
-  std::vector<float> level_scales;
-};
-
-/// Per camera.
-std::vector<CameraMeasurements> collect(const Map& map,
-                                        std::span<const Observation> observed,
-                                        const Rig& rig,
-                                        const BundleProblem& problem) {
-  std::vector<CameraMeasurements> cameras(rig.cameras.size());
-  for (std::size_t i = 0; i < observed.size(); ++i) {
-    if (problem.rigs[problem.observations[i].pose] != &rig) continue;
-    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
-    const Keypoint& keypoint = keyframe.features->keypoints[observed[i].feature];
-    CameraMeasurements& camera = cameras[keypoint.camera];
-    camera.indices.push_back(i);
-    camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
-    camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
-  }
-  return cameras;
-}
-
-/// Directions in which a camera should see the points of its observations.
-std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
-                                     const Rigid3& cam_from_rig,
-                                     const BundleProblem& problem) {
-  std::vector<Eigen::Vector3d> directions;
-  for (const std::size_t i : measured.indices) {
-    const BundleObservation& observation = problem.observations[i];
-    const Eigen::Vector3d point_in_rig =
-        problem.rig_from_world[observation.pose] * problem.points[observation.point];
-    directions.push_back((cam_from_rig * point_in_rig).normalized());
-  }
-  return directions;
-}
-
-/// Makes the residuals of a camera's observations those of pixels, linear around where the points
-/// should be seen. Around where they are seen, as elsewhere, noise would turn up in the
-/// derivatives, and the little that tells a focal length would drown in it: the bearing becomes the
-/// one that is as far from the prediction, in the plane that touches the sphere there, as the
-/// pixels are. What cannot be told so counts as an outlier.
-void linearize(const CameraMeasurements& measured,
-               const Camera& camera,
-               const std::vector<Eigen::Vector3d>& directions,
-               BundleProblem& problem) {
-  const std::size_t count = directions.size();
-  std::vector<Eigen::Vector2d> pixels(count);
-  std::vector<Matrix23d> jacobians(count);
-  std::vector<std::uint8_t> is_visible(count);
-  camera.project_with_jacobian(directions, pixels, jacobians, is_visible);
-  for (std::size_t k = 0; k < count; ++k) {
-    BundleObservation& observation = problem.observations[measured.indices[k]];
-    const Eigen::Vector3d& direction = directions[k];
-    const Matrix23d w = (jacobians[k] - jacobians[k] * direction * direction.transpose()) /
-                        measured.level_scales[k];
-    if (!is_visible[k] || TangentComputer::is_stretched(w)) {
-      observation.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
-      continue;
-    }
-    const Eigen::Vector2d off = (measured.pixels[k] - pixels[k]) / measured.level_scales[k];
-    const Eigen::Vector3d bearing =
-        direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
-    observation.bearing = bearing.cast<float>();
-    observation.level_pixel_from_bearing = w.cast<float>();
-  }
-}
 
 /// Appends the derivatives of the pixels of a camera's observations by its intrinsics.
 bool add_derivatives(const CalibrationParameters& parameters,

@@ -14,8 +14,9 @@ class CalibrateTest : public ::testing::Test {
  protected:
   GlobalAdjustment adjust(std::shared_ptr<const Rig> truth,
                           const std::shared_ptr<const Rig>& told,
-                          double pixel_sigma = 0.3) {
-    TestMap scene = look_around(std::move(truth), told, 16, pixel_sigma);
+                          double pixel_sigma = 0.3,
+                          double inverse_range_sigma = 0.0) {
+    TestMap scene = look_around(std::move(truth), told, 16, pixel_sigma, inverse_range_sigma);
     const KnownCalibration known = KnownCalibration::as_given(told);
     return adjust_globally(*scene.map.freeze(), scene.submap, &known);
   }
@@ -43,6 +44,15 @@ TEST_F(CalibrateTest, FindsTheFocalLength) {
     EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", -21.0)), 3.0) << num_cameras;
     EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fv", -21.0)), 3.0) << num_cameras;
   }
+}
+
+TEST_F(CalibrateTest, FindsTheFocalLengthThatADepthImageWasReadWith) {
+  const GlobalAdjustment found = adjust(make_described(1, make_test_pinhole(420.0)),
+                                        make_described(1, make_test_pinhole(441.0)),
+                                        0.3,
+                                        0.0005);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", -21.0)), 3.0);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fv", -21.0)), 3.0);
 }
 
 TEST_F(CalibrateTest, FindsDistortion) {

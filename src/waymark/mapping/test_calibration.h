@@ -30,15 +30,20 @@ inline std::shared_ptr<const Rig> make_described(int num_cameras,
 }
 
 /// Keyframes of a rig that looks around while it goes, measured as another calibration tells.
+/// inverse_range_sigma: of a depth image beside one camera, in 1/m; 0: there is none.
 inline TestMap look_around(std::shared_ptr<const Rig> truth,
                            const std::shared_ptr<const Rig>& told,
                            std::uint32_t num_keyframes,
-                           double pixel_sigma = 0.3) {
+                           double pixel_sigma = 0.3,
+                           double inverse_range_sigma = 0.0) {
   const int num_cameras = static_cast<int>(truth->cameras.size());
   TestMap scene(num_cameras,
                 scatter_in({-6.0, -4.0, 3.0}, {6.0, 4.0, 9.0}, 2000, 6.0, 3),
-                {.seed = 9, .pixel_sigma = pixel_sigma, .max_features = 500},
-                num_cameras > 1);
+                {.seed = 9,
+                 .pixel_sigma = pixel_sigma,
+                 .inverse_range_sigma = inverse_range_sigma,
+                 .max_features = 500},
+                num_cameras > 1 || inverse_range_sigma > 0.0);
   scene.rig = std::move(truth);
   for (std::uint32_t k = 0; k < num_keyframes; ++k) {
     const KeyframeId id = scene.add_keyframe(

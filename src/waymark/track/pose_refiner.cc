@@ -20,8 +20,9 @@ SeenLandmark see(const Features& features, std::uint32_t feature, LandmarkId lan
   seen.level = keypoint.level;
   if (features.partner[feature] != kNoFeature) return seen;
   const Measurement measured = features.measurement(feature);
-  seen.inverse_range = measured.inverse_range;
-  seen.inverse_range_sigma = measured.inverse_range_sigma;
+  if (measured.inverse_range_sigma == 0.0f) return seen;
+  seen.inverse_depth = measured.inverse_range / measured.bearing.z();
+  seen.inverse_depth_sigma = measured.inverse_range_sigma / measured.bearing.z();
   return seen;
 }
 
@@ -94,12 +95,13 @@ void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
   for (std::size_t i = 0; i < living_.size(); ++i) {
     if (!tangents.is_valid[i]) continue;
     const SeenLandmark& one = *living_[i];
+    const float along_z = tangents.bearings[i].z();
     observations_.add(map.landmarks().at(map.resolve(one.landmark)).position_in_world,
                       {0,
                        tangents.bearings[i],
                        tangents.level_pixel_from_bearing[i],
-                       one.inverse_range,
-                       one.inverse_range_sigma});
+                       along_z * one.inverse_depth,
+                       along_z * one.inverse_depth_sigma});
   }
 }
 

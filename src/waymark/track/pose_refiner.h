@@ -21,10 +21,10 @@ struct SeenLandmark {
   LandmarkId landmark;
   float x_px = 0.0f;  ///< Of level 0, as in Keypoint.
   float y_px = 0.0f;  ///< The same.
-  /// As in Measurement. Of the depth image only: those from stereo would be measured with the
-  /// calibration of then.
-  float inverse_range = 0.0f;
-  float inverse_range_sigma = 0.0f;  ///< The same.
+  /// Along z, in 1/m, by the depth image; ranges, and those from stereo all the more, would be
+  /// measured with the calibration of then.
+  float inverse_depth = 0.0f;
+  float inverse_depth_sigma = 0.0f;  ///< Its standard deviation; 0 where there is none.
   std::uint8_t level = 0;            ///< Of the pyramid.
 };
 

@@ -1,0 +1,84 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/camera_measurements.h"
+
+#include <Eigen/Cholesky>
+#include <limits>
+
+#include "waymark/camera/tangent.h"
+#include "waymark/image/pyramid.h"
+
+namespace waymark {
+namespace {
+
+/// The depth image measures along z: its ranges change with the calibration, which an adjustment
+/// learns after each pass only. Less sure by this factor they do not hold it where it was.
+constexpr float kDepthLooseness = 3.0f;
+
+}  // namespace
+
+std::vector<CameraMeasurements> collect(const Map& map,
+                                        std::span<const Observation> observed,
+                                        const Rig& rig,
+                                        const BundleProblem& problem) {
+  std::vector<CameraMeasurements> cameras(rig.cameras.size());
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    if (problem.rigs[problem.observations[i].pose] != &rig) continue;
+    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
+    const Keypoint& keypoint = keyframe.features->keypoints[observed[i].feature];
+    CameraMeasurements& camera = cameras[keypoint.camera];
+    camera.indices.push_back(i);
+    camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
+    camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
+    const Measurement& seen = problem.observations[i];
+    const bool has_depth = seen.inverse_range_sigma > 0.0f;
+    const float by_range = has_depth ? 1.0f / seen.bearing.z() : 0.0f;
+    camera.inverse_depths.push_back(by_range * seen.inverse_range);
+    camera.inverse_depth_sigmas.push_back(kDepthLooseness * by_range * seen.inverse_range_sigma);
+  }
+  return cameras;
+}
+
+std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
+                                     const Rigid3& cam_from_rig,
+                                     const BundleProblem& problem) {
+  std::vector<Eigen::Vector3d> directions;
+  for (const std::size_t i : measured.indices) {
+    const BundleObservation& observation = problem.observations[i];
+    const Eigen::Vector3d point_in_rig =
+        problem.rig_from_world[observation.pose] * problem.points[observation.point];
+    directions.push_back((cam_from_rig * point_in_rig).normalized());
+  }
+  return directions;
+}
+
+void linearize(const CameraMeasurements& measured,
+               const Camera& camera,
+               const std::vector<Eigen::Vector3d>& directions,
+               BundleProblem& problem) {
+  const std::size_t count = directions.size();
+  std::vector<Eigen::Vector2d> pixels(count);
+  std::vector<Matrix23d> jacobians(count);
+  std::vector<std::uint8_t> is_visible(count);
+  camera.project_with_jacobian(directions, pixels, jacobians, is_visible);
+  for (std::size_t k = 0; k < count; ++k) {
+    BundleObservation& observation = problem.observations[measured.indices[k]];
+    const Eigen::Vector3d& direction = directions[k];
+    const Matrix23d w = (jacobians[k] - jacobians[k] * direction * direction.transpose()) /
+                        measured.level_scales[k];
+    if (!is_visible[k] || TangentComputer::is_stretched(w)) {
+      observation.bearing.setConstant(std::numeric_limits<float>::quiet_NaN());
+      continue;
+    }
+    const Eigen::Vector2d off = (measured.pixels[k] - pixels[k]) / measured.level_scales[k];
+    const Eigen::Vector3d bearing =
+        direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
+    observation.bearing = bearing.cast<float>();
+    observation.level_pixel_from_bearing = w.cast<float>();
+    const auto along_z = static_cast<float>(bearing.normalized().z());
+    observation.inverse_range = along_z * measured.inverse_depths[k];
+    observation.inverse_range_sigma = along_z * measured.inverse_depth_sigmas[k];
+  }
+}
+
+}  // namespace waymark

@@ -1,0 +1,49 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <span>
+#include <vector>
+
+#include "waymark/camera/camera.h"
+#include "waymark/camera/rig.h"
+#include "waymark/map/map.h"
+#include "waymark/optimize/bundle.h"
+
+namespace waymark {
+
+/// What one of the rig's cameras measured in a bundle problem, in parallel arrays: what stays as it
+/// is when the camera is calibrated otherwise.
+struct CameraMeasurements {
+  std::vector<std::size_t> indices;     ///< Of the observations.
+  std::vector<Eigen::Vector2d> pixels;  ///< Of level 0.
+  std::vector<float> level_scales;      ///< Size of a pixel of the feature's level.
+  /// Along z in 1/m, by the depth image; 0 where it has nothing.
+  std::vector<float> inverse_depths;
+  std::vector<float> inverse_depth_sigmas;  ///< Their standard deviations, as they are to count.
+};
+
+/// Per camera of the rig. observed: of each observation of the problem, in the map.
+std::vector<CameraMeasurements> collect(const Map& map,
+                                        std::span<const Observation> observed,
+                                        const Rig& rig,
+                                        const BundleProblem& problem);
+
+/// Unit directions in which a camera should see the points of its observations.
+std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
+                                     const Rigid3& cam_from_rig,
+                                     const BundleProblem& problem);
+
+/// Makes the residuals of a camera's observations those of pixels, linear around where the points
+/// should be seen. Around where they are seen, as elsewhere, noise would turn up in the
+/// derivatives, and the little that tells a focal length would drown in it: the bearing becomes the
+/// one that is as far from the prediction, in the plane that touches the sphere there, as the
+/// pixels are. What cannot be told so counts as an outlier. directions: of predict().
+void linearize(const CameraMeasurements& measured,
+               const Camera& camera,
+               const std::vector<Eigen::Vector3d>& directions,
+               BundleProblem& problem);
+
+}  // namespace waymark
