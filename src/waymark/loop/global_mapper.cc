@@ -33,7 +33,6 @@ GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            const CalibrationSettings& calibration,
                            std::uint64_t seed)
     : settings_(loop),
-      is_calibrating_(calibration.is_refined() && CalibrationParameters(*rig).size() > 0),
       seed_(seed),
       next_calibration_(kFirstCalibration),
       mapper_(rig, mapping, calibration),
@@ -110,7 +109,7 @@ GlobalAdjustment AdjustmentTask::adjust() const {
 
 std::optional<AdjustmentTask> GlobalMapper::take_task() {
   const bool is_calibration_due =
-      is_calibrating_ && mapper_.map().keyframes().size() >= next_calibration_;
+      mapper_.is_calibrating() && mapper_.map().keyframes().size() >= next_calibration_;
   if (!unadjusted_.is_valid() && !is_calibration_due) return std::nullopt;
   AdjustmentTask task;
   task.is_for_calibration = !unadjusted_.is_valid();
@@ -118,7 +117,7 @@ std::optional<AdjustmentTask> GlobalMapper::take_task() {
                     ? submaps_by_size(mapper_.map()).front()
                     : mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
   task.num_closures = num_closures_;
-  if (is_calibrating_) {
+  if (mapper_.is_calibrating()) {
     task.calibration = mapper_.calibration();
     if (is_calibration_due) next_calibration_ *= 2;
   }
@@ -140,7 +139,7 @@ void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& befor
 
 void GlobalMapper::refine_globally(bool with_calibration) {
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
-  mapper_.refine_globally(with_calibration && is_calibrating_ &&
+  mapper_.refine_globally(with_calibration && mapper_.is_calibrating() &&
                           mapper_.map().keyframes().size() >= kFewestInTheEnd);
   look_with_calibration(before);
 }

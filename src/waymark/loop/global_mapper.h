@@ -78,7 +78,6 @@ class GlobalMapper {
   void refine_globally(bool with_calibration);
 
   const LoopSettings settings_;
-  const bool is_calibrating_;
   const std::uint64_t seed_;
   std::size_t next_calibration_;  ///< Keyframes of the map when the calibration is due again.
   Mapper mapper_;

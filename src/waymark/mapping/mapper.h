@@ -52,6 +52,8 @@ class Mapper {
   std::shared_ptr<const Map> freeze() { return map_.freeze(); }
   const Map& map() const { return map_; }
   const KnownCalibration& calibration() const { return calibration_; }
+  /// Whether the calibration may change: the settings let it, and there is something to estimate.
+  bool is_calibrating() const { return is_calibrating_; }
 
  private:
   KeyframeId insert(const NewKeyframe& message);
