@@ -125,9 +125,11 @@ void derive_anew(const Rig& rig, const Features& before, bool is_moved, Features
 
 }  // namespace
 
-std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig) {
+std::shared_ptr<const Features> measure_anew(const Features& features,
+                                             const Rig& rig,
+                                             const RigMotion& motion) {
   auto anew = std::make_shared<Features>(features);
-  const bool is_moved = correct_rolling(rig, features.motion, *anew);
+  const bool is_moved = correct_rolling(rig, motion, *anew);
   derive_anew(rig, features, is_moved, *anew);
   return anew;
 }

@@ -25,8 +25,10 @@ void measure_stereo_ranges(const Rig& rig, Features& features);
 
 /// The same features as a rig of the same cameras measures them that is calibrated otherwise:
 /// bearings, level_pixel_from_bearing, sizes and ranges anew. Where a pixel has no bearing any more
-/// all of that stays as it was.
-std::shared_ptr<const Features> measure_anew(const Features& features, const Rig& rig);
+/// all of that stays as it was. motion: of the rig while they were seen.
+std::shared_ptr<const Features> measure_anew(const Features& features,
+                                             const Rig& rig,
+                                             const RigMotion& motion);
 
 /// The same features of a rig that moved otherwise while they were seen.
 std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,

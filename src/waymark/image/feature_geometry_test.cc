@@ -112,7 +112,7 @@ TEST(FeatureGeometry, IsMeasuredAnewByAnotherCalibration) {
       Eigen::AngleAxisd(2e-3, Eigen::Vector3d::UnitY()) * rig.cameras[1].cam_from_rig.rotation;
   Features expected = before;
   measure_stereo_ranges(turned, expected);
-  const auto anew = measure_anew(before, turned);
+  const auto anew = measure_anew(before, turned, {});
   EXPECT_EQ(anew->range_m, expected.range_m);
   EXPECT_GT(std::abs(anew->range_m[0] / before.range_m[0] - 1.0f), 0.01f);
 }

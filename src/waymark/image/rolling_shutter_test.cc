@@ -135,7 +135,7 @@ TEST_F(RollingShutterTest, PointsBeyondInfinityOnlyTurn) {
 
 TEST_F(RollingShutterTest, IsUndoneByACalibrationWithoutReadout) {
   const auto corrected = moved(std::make_shared<const Features>(seen_), rolling_, motion_);
-  const auto back = measure_anew(*corrected, global_);
+  const auto back = measure_anew(*corrected, global_, corrected->motion);
   for (std::size_t i = 0; i < back->size(); ++i) {
     EXPECT_NEAR(back->keypoints[i].x_px, seen_.keypoints[i].x_px, 0.3f);
     EXPECT_NEAR(back->keypoints[i].y_px, seen_.keypoints[i].y_px, 0.3f);

@@ -31,6 +31,7 @@ struct Keyframe {
   double applied_scale = 1.0;
   std::shared_ptr<const Rig> rig;            ///< The cameras that saw it; never null.
   std::shared_ptr<const Features> features;  ///< Never null.
+  RigMotion motion;                          ///< At its time, as far as it is known.
   std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
 };
 
@@ -247,6 +248,8 @@ class Map {
   void measure_keyframe(KeyframeId id,
                         std::shared_ptr<const Rig> rig,
                         std::shared_ptr<const Features> features);
+  /// Notes how the rig moved at a keyframe; its features stay as they are.
+  void set_motion(KeyframeId id, const RigMotion& motion) { keyframes_.edit(id).motion = motion; }
   /// Notes that lengths around a keyframe were multiplied by a factor.
   void rescale_keyframe(KeyframeId id, double factor);
   /// Adds an edge between two living keyframes, measured in the units of now.

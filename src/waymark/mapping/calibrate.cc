@@ -69,7 +69,8 @@ void measure_anew(const Map& map,
     BundleObservation& observation = problem.observations[i];
     if (problem.rigs[observation.pose] != &before) continue;
     std::shared_ptr<const Features>& anew = features[observed[i].keyframe];
-    if (!anew) anew = measure_anew(*map.keyframes().at(observed[i].keyframe).features, rig);
+    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
+    if (!anew) anew = measure_anew(*keyframe.features, rig, keyframe.motion);
     const bool has_range = observation.inverse_range_sigma > 0.0f;
     static_cast<Measurement&>(observation) = anew->measurement(observed[i].feature);
     if (!has_range) observation.inverse_range_sigma = 0.0f;

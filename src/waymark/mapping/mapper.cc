@@ -45,6 +45,7 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
     keyframe.rig_from_world = initial.rig_from_world;
     keyframe.rig = calibration_.rig;
     keyframe.features = measured(initial.features, message.rig);
+    keyframe.motion = initial.features->motion;
     if (!ids.empty()) keyframe.parent = ids.back();
     ids.push_back(map_.add_keyframe(std::move(keyframe)));
   }
@@ -110,6 +111,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
       message.pose.reference, message.pose.rig_from_reference, message.pose.reference_scale);
   keyframe.rig = calibration_.rig;
   keyframe.features = measured(message.features, message.rig);
+  keyframe.motion = message.features->motion;
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
   for (std::uint32_t i = 0; i < message.features->num_primary; ++i) {
     const LandmarkId landmark = map_.resolve(message.landmarks[i]);
@@ -127,7 +129,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
 std::shared_ptr<const Features> Mapper::measured(const std::shared_ptr<const Features>& features,
                                                  const std::shared_ptr<const Rig>& rig) const {
   if (!rig || rig == calibration_.rig) return features;
-  return measure_anew(*features, *calibration_.rig);
+  return measure_anew(*features, *calibration_.rig, features->motion);
 }
 
 void Mapper::look_with(const KnownCalibration& calibration) {
@@ -137,7 +139,8 @@ void Mapper::look_with(const KnownCalibration& calibration) {
   });
   for (const KeyframeId id : seen_so) {
     const Keyframe& keyframe = map_.keyframes().at(id);
-    map_.measure_keyframe(id, calibration.rig, measure_anew(*keyframe.features, *calibration.rig));
+    map_.measure_keyframe(
+        id, calibration.rig, measure_anew(*keyframe.features, *calibration.rig, keyframe.motion));
     for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
       if (landmark.is_valid()) dirty_.insert(landmark);
     }
@@ -146,7 +149,10 @@ void Mapper::look_with(const KnownCalibration& calibration) {
 }
 
 void Mapper::set_motion(KeyframeId id, const RigMotion& motion) {
+  map_.set_motion(id, motion);
   const Keyframe& keyframe = map_.keyframes().at(id);
+  // That of a global shutter matters only once the shutter turns out to be none.
+  if (keyframe.rig->cameras[0].readout_s == 0.0) return;
   map_.measure_keyframe(id, keyframe.rig, moved(keyframe.features, *keyframe.rig, motion));
 }
 

@@ -31,12 +31,13 @@ std::vector<Eigen::Vector3f> bearings_by_readout(const Map& map,
   std::vector<Eigen::Vector3f> all(observed.size(), Eigen::Vector3f::Zero());
   for (std::size_t i = 0; i < observed.size(); ++i) {
     if (problem.rigs[problem.observations[i].pose] != &rig) continue;
-    const Features& features = *map.keyframes().at(observed[i].keyframe).features;
+    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
+    const Features& features = *keyframe.features;
     const std::uint32_t feature = observed[i].feature;
     const Keypoint& keypoint = features.keypoints[feature];
     const RigCamera& camera = rig.cameras[keypoint.camera];
     all[i] = row_delay(*camera.camera, keypoint.y_px) *
-             bearing_rate(features.motion, camera, features, feature);
+             bearing_rate(keyframe.motion, camera, features, feature);
   }
   return all;
 }

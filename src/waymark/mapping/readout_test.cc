@@ -41,7 +41,8 @@ class ReadoutTest : public ::testing::Test {
           moved(scene.map.keyframes().at(id).features, *make_rolling(-readout_s), motion);
       Features seen = *bent;
       seen.readout_s = {};
-      scene.map.measure_keyframe(id, told, measure_anew(seen, *told));
+      scene.map.measure_keyframe(id, told, measure_anew(seen, *told, motion));
+      scene.map.set_motion(id, motion);
     }
     const KnownCalibration known = KnownCalibration::as_given(told);
     return adjust_globally(*scene.map.freeze(), scene.submap, &known);

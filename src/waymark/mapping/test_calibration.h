@@ -50,7 +50,7 @@ inline TestMap look_around(std::shared_ptr<const Rig> truth,
         make_test_pose({0.15 * k, 0.1 * (k % 3), 0.1 * (k % 5)},
                        {0.1 * (k % 4 - 1.5), 0.12 * (k % 5 - 2.0), 0.2 * (k % 3)}));
     const Features& seen = *scene.map.keyframes().at(id).features;
-    scene.map.measure_keyframe(id, told, measure_anew(seen, *told));
+    scene.map.measure_keyframe(id, told, measure_anew(seen, *told, {}));
   }
   return scene;
 }

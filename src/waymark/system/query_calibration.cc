@@ -99,7 +99,8 @@ bool QueryCalibration::refine() {
   known_ = *std::move(found.calibration);
   for (const auto& move : found.correction.keyframes) {
     const Features& features = *map_.keyframes().at(move.keyframe).features;
-    map_.measure_keyframe(move.keyframe, known_.rig, measure_anew(features, *known_.rig));
+    map_.measure_keyframe(
+        move.keyframe, known_.rig, measure_anew(features, *known_.rig, features.motion));
     map_.move_keyframe(move.keyframe, move.rig_from_world);
   }
   return true;

@@ -99,7 +99,7 @@ TEST_F(TrajectoryMemoryTest, MeasuresWhatFramesSawAsCalibratedSince) {
   auto told = std::make_shared<Rig>(*scene_.rig);
   told->cameras[0].camera = std::make_shared<PerspectiveCamera>(
       PerspectiveModel({380.0, 380.0}, {319.5, 239.5}), 640, 480);
-  view_.features = measure_anew(*view_.features, *told);
+  view_.features = measure_anew(*view_.features, *told, {});
   memory_.look_with(told);
   add_stale(1);
   memory_.look_with(scene_.rig);
