@@ -123,10 +123,15 @@ void write_calibration(const std::filesystem::path& folder,
   if (!prepared.estimated && summary.refined_calibration.empty()) return;
   std::optional<CameraChain> chain = chain_of(rig, summary.refined_calibration);
   if (!chain) return;
+  std::string text = format_camchain(*chain);
   if (prepared.input->info().setup == Setup::kRgbd) {
-    chain->depth_factor = prepared.settings.depth.factor;
+    const DepthSettings& depth = prepared.settings.depth;
+    text += fmt::format("depth: {{factor: {:.6g}, lag_ms: {:.6g}, inverse_offset: {:.6g}}}\n",
+                        depth.factor,
+                        depth.lag_ms,
+                        rig.inverse_depth_offset);
   }
-  write_file_atomically(folder / "calibration.yaml", format_camchain(*chain));
+  write_file_atomically(folder / "calibration.yaml", text);
 }
 
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed) {

@@ -43,7 +43,16 @@ struct RigCamera {
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.
 struct Rig {
   std::vector<RigCamera> cameras;  ///< At least one.
+  /// Of the depth images of camera 0, in 1/m: their inverse depths are too large by this, as where
+  /// a projector and its camera have drifted apart.
+  double inverse_depth_offset = 0.0;
 };
+
+/// The same cameras with depth images that are off by this.
+inline Rig with_depth_offset(Rig rig, double inverse_depth_offset) {
+  rig.inverse_depth_offset = inverse_depth_offset;
+  return rig;
+}
 
 /// Whether two rigs have the same cameras at the same places, by their descriptions; a camera
 /// without one is the same as itself alone.

@@ -147,13 +147,14 @@ InverseRange fit_surface(std::span<const Sample> surface, double quantum_m, doub
 }
 
 std::optional<InverseRange> measure(DepthView depth,
-                                    double factor,
+                                    const DepthSettings& settings,
                                     const Keypoint& keypoint,
                                     const ZPerRange& z) {
-  const DepthSamples around = look_around(depth, factor, keypoint, z);
+  const DepthSamples around = look_around(depth, settings.factor, keypoint, z);
   const std::span<const Sample> surface = nearest_surface(around);
   if (surface.empty()) return std::nullopt;
-  const InverseRange fitted = fit_surface(surface, 1.0 / factor, z.at_keypoint);
+  InverseRange fitted = fit_surface(surface, 1.0 / settings.factor, z.at_keypoint);
+  fitted.value -= settings.inverse_offset * z.at_keypoint;
   if (!(fitted.value > 0.0)) return std::nullopt;
   return fitted;
 }
@@ -174,7 +175,7 @@ void sample_depth(DepthView depth,
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (bearings[i].z() < kMinZPerRange) continue;
     const ZPerRange z = z_per_range(keypoints[i], bearings[i], level_pixel_from_bearing[i]);
-    const std::optional<InverseRange> inverse = measure(depth, settings.factor, keypoints[i], z);
+    const std::optional<InverseRange> inverse = measure(depth, settings, keypoints[i], z);
     if (!inverse) continue;
     range_m[i] = static_cast<float>(1.0 / inverse->value);
     inverse_range_sigma[i] = static_cast<float>(inverse->sigma);

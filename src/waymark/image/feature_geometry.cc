@@ -109,6 +109,19 @@ void measure_stereo_ranges(const Rig& rig, Features& features) {
 
 namespace {
 
+/// Frees the ranges of a depth image of another offset than before.
+void correct_depth(double inverse_offset, Features& features) {
+  const auto offset = static_cast<float>(inverse_offset);
+  const float change = offset - std::exchange(features.inverse_depth_offset, offset);
+  if (change == 0.0f) return;
+  for (std::uint32_t i = 0; i < features.num_primary; ++i) {
+    if (features.inverse_range_sigma[i] == 0.0f) continue;
+    const float inverse_range = 1.0f / features.range_m[i] - change * features.bearings[i].z();
+    if (!(inverse_range > 0.0f)) features.inverse_range_sigma[i] = 0.0f;
+    features.range_m[i] = inverse_range > 0.0f ? 1.0f / inverse_range : 0.0f;
+  }
+}
+
 /// What follows from pixels that are elsewhere than before, or in other cameras.
 void derive_anew(const Rig& rig, const Features& before, bool is_moved, Features& features) {
   const std::vector<std::uint8_t> is_valid = derive_geometry(rig, features);
@@ -129,6 +142,7 @@ std::shared_ptr<const Features> measure_anew(const Features& features,
                                              const Rig& rig,
                                              const RigMotion& motion) {
   auto anew = std::make_shared<Features>(features);
+  if (rig.cameras.size() == 1) correct_depth(rig.inverse_depth_offset, *anew);
   const bool is_moved = correct_rolling(rig, motion, *anew);
   derive_anew(rig, features, is_moved, *anew);
   return anew;

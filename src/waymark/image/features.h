@@ -59,7 +59,8 @@ struct Features {
   std::vector<float> range_m;
   /// Standard deviation of the inverse range in 1/m; 0 where there is no range.
   std::vector<float> inverse_range_sigma;
-  RigMotion motion;  ///< At the frame's time.
+  float inverse_depth_offset = 0.0f;  ///< Rig::inverse_depth_offset that the ranges were freed of.
+  RigMotion motion;                   ///< At the frame's time.
   /// Per camera the readout that the keypoints are corrected for: they are where all of them would
   /// have been seen at the frame's time.
   std::array<float, 2> readout_s = {};

@@ -52,6 +52,27 @@ void resize(Image& image, int width_px, int height_px) {
   if (image.width_px != width_px || image.height_px != height_px) image = {width_px, height_px};
 }
 
+/// Moves keypoints and their bearings to where they were when the depth image was taken: lag_s
+/// after the frame's time, all rows at once.
+void move_to_depth(const RigCamera& camera,
+                   const RigMotion& motion,
+                   float lag_s,
+                   const Features& features,
+                   std::vector<Keypoint>& keypoints,
+                   std::vector<Eigen::Vector3f>& bearings) {
+  const auto readout_s = static_cast<float>(camera.readout_s);
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    Keypoint& keypoint = keypoints[i];
+    const float seconds = lag_s - readout_s * row_delay(*camera.camera, keypoint.y_px);
+    const Eigen::Vector3f shift = seconds * bearing_rate(motion, camera, features, i);
+    const Eigen::Vector2f shift_px = static_cast<float>(Pyramid::scale(keypoint.level)) *
+                                     (features.level_pixel_from_bearing[i] * shift);
+    keypoint.x_px += shift_px.x();
+    keypoint.y_px += shift_px.y();
+    bearings[i] = (bearings[i] + shift).normalized();
+  }
+}
+
 }  // namespace
 
 ImageView SeamPadding::widen(ImageView image) {
@@ -96,6 +117,7 @@ FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
 
 void FrameBuilder::look_with(const Rig& rig) {
   rig_ = rig;
+  settings_.depth.inverse_offset = rig.inverse_depth_offset;
   if (stereo_) stereo_.emplace(rig_, settings_.stereo);
 }
 
@@ -139,19 +161,9 @@ void FrameBuilder::add_depth(const FrameImages& images,
   const RigCamera& camera = rig_.cameras[0];
   const float lag_s = 1e-9f * static_cast<float>(images.depth_lag_ns) +
                       1e-3f * static_cast<float>(settings_.depth.lag_ms);
-  const auto readout_s = static_cast<float>(camera.readout_s);
   keypoints_ = features.keypoints;
   std::vector<Eigen::Vector3f> bearings = features.bearings;
-  for (std::size_t i = 0; i < keypoints_.size() && motion != RigMotion{}; ++i) {
-    Keypoint& keypoint = keypoints_[i];
-    const float seconds = lag_s - readout_s * row_delay(*camera.camera, keypoint.y_px);
-    const Eigen::Vector3f shift = seconds * bearing_rate(motion, camera, features, i);
-    const Eigen::Vector2f shift_px = static_cast<float>(Pyramid::scale(keypoint.level)) *
-                                     (features.level_pixel_from_bearing[i] * shift);
-    keypoint.x_px += shift_px.x();
-    keypoint.y_px += shift_px.y();
-    bearings[i] = (bearings[i] + shift).normalized();
-  }
+  if (motion != RigMotion{}) move_to_depth(camera, motion, lag_s, features, keypoints_, bearings);
   sample_depth(images.depth,
                settings_.depth,
                keypoints_,
@@ -159,6 +171,7 @@ void FrameBuilder::add_depth(const FrameImages& images,
                features.level_pixel_from_bearing,
                features.range_m,
                features.inverse_range_sigma);
+  features.inverse_depth_offset = static_cast<float>(settings_.depth.inverse_offset);
   const Eigen::Vector3f shift = lag_s * camera_shift(motion, camera);
   for (std::size_t i = 0; i < keypoints_.size(); ++i) {
     const float farther_m = bearings[i].dot(shift);

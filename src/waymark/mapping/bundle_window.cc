@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/mapping/depth_offset.h"
 #include "waymark/mapping/readout.h"
 #include "waymark/optimize/residual.h"
 
@@ -193,6 +194,10 @@ WindowAdjustment compute_adjustment(const Map& map,
     calibration = find_readout(map, window_problem.observations, *known, window_problem.problem);
     if (!calibration && map.keyframes().size() >= known->min_keyframes) {
       calibration = recalibrate(map, window_problem.observations, *known, window_problem.problem);
+    }
+    if (!calibration) {
+      calibration =
+          find_depth_offset(map, window_problem.observations, *known, window_problem.problem);
     }
   }
   const BundleResult result = adjust_bundle(window_problem.problem, options);

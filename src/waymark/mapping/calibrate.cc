@@ -5,11 +5,9 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
-#include <map>
 #include <memory>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
 #include "waymark/mapping/camera_measurements.h"
 
 namespace waymark {
@@ -50,32 +48,6 @@ bool add_derivatives(const CalibrationParameters& parameters,
     }
   }
   return true;
-}
-
-void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem) {
-  for (const Rig*& used : problem.rigs) {
-    if (used == &before) used = &rig;
-  }
-}
-
-/// The observations of a problem as a rig calibrated otherwise makes them.
-void measure_anew(const Map& map,
-                  std::span<const Observation> observed,
-                  const Rig& before,
-                  const Rig& rig,
-                  BundleProblem& problem) {
-  std::map<KeyframeId, std::shared_ptr<const Features>> features;
-  for (std::size_t i = 0; i < observed.size(); ++i) {
-    BundleObservation& observation = problem.observations[i];
-    if (problem.rigs[observation.pose] != &before) continue;
-    std::shared_ptr<const Features>& anew = features[observed[i].keyframe];
-    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
-    if (!anew) anew = measure_anew(*keyframe.features, rig, keyframe.motion);
-    const bool has_range = observation.inverse_range_sigma > 0.0f;
-    static_cast<Measurement&>(observation) = anew->measurement(observed[i].feature);
-    if (!has_range) observation.inverse_range_sigma = 0.0f;
-  }
-  use_rig(before, rig, problem);
 }
 
 /// A calibration that is being adjusted.
@@ -258,6 +230,7 @@ KnownCalibration KnownCalibration::as_given(std::shared_ptr<const Rig> rig,
   }
   known.is_always_refined = is_always_refined;
   known.given_readout_s = known.given->cameras[0].readout_s;
+  known.given_depth_offset = known.given->inverse_depth_offset;
   return known;
 }
 
@@ -278,6 +251,13 @@ std::vector<CalibrationEstimate> KnownCalibration::estimates() const {
                          1e3 * (readout_s - given_readout_s),
                          1e3 * kReadoutPriorS,
                          1e3 * readout_sigma_s});
+  }
+  if (depth_offset_sigma > 0.0) {
+    estimates.push_back({"depth.inverse_offset",
+                         given_depth_offset,
+                         rig->inverse_depth_offset - given_depth_offset,
+                         kDepthOffsetPrior,
+                         depth_offset_sigma});
   }
   return estimates;
 }

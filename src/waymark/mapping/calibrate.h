@@ -17,6 +17,9 @@ namespace waymark {
 /// Readouts are that long: around what was given or, where nothing was, around none.
 inline constexpr double kReadoutPriorS = 0.02;
 
+/// Offsets of inverse depths are that large, in 1/m.
+inline constexpr double kDepthOffsetPrior = 0.02;
+
 /// What is known of the calibration of the cameras in use.
 struct KnownCalibration {
   std::shared_ptr<const Rig> given;  ///< By the user: the prior of every estimate.
@@ -31,6 +34,9 @@ struct KnownCalibration {
   /// Of a rolling shutter, as the user says; that in use is in `rig`, and in `given`, too.
   double given_readout_s = 0.0;
   double readout_sigma_s = 0.0;  ///< Standard deviation of the estimate; 0 where there is none.
+  /// Of depth images, as the user says; that in use is in `rig`, and in `given`, too.
+  double given_depth_offset = 0.0;
+  double depth_offset_sigma = 0.0;  ///< Standard deviation of the estimate; 0 where there is none.
   /// Before a map has so many keyframes only the readout is estimated, which few tell.
   std::size_t min_keyframes = 0;
 

@@ -4,8 +4,11 @@
 
 #include <Eigen/Cholesky>
 #include <limits>
+#include <map>
+#include <memory>
 
 #include "waymark/camera/tangent.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
@@ -79,6 +82,31 @@ void linearize(const CameraMeasurements& measured,
     observation.inverse_range = along_z * measured.inverse_depths[k];
     observation.inverse_range_sigma = along_z * measured.inverse_depth_sigmas[k];
   }
+}
+
+void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem) {
+  for (const Rig*& used : problem.rigs) {
+    if (used == &before) used = &rig;
+  }
+}
+
+void measure_anew(const Map& map,
+                  std::span<const Observation> observed,
+                  const Rig& before,
+                  const Rig& rig,
+                  BundleProblem& problem) {
+  std::map<KeyframeId, std::shared_ptr<const Features>> features;
+  for (std::size_t i = 0; i < observed.size(); ++i) {
+    BundleObservation& observation = problem.observations[i];
+    if (problem.rigs[observation.pose] != &before) continue;
+    std::shared_ptr<const Features>& anew = features[observed[i].keyframe];
+    const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
+    if (!anew) anew = measure_anew(*keyframe.features, rig, keyframe.motion);
+    const bool has_range = observation.inverse_range_sigma > 0.0f;
+    static_cast<Measurement&>(observation) = anew->measurement(observed[i].feature);
+    if (!has_range) observation.inverse_range_sigma = 0.0f;
+  }
+  use_rig(before, rig, problem);
 }
 
 }  // namespace waymark

@@ -46,4 +46,15 @@ void linearize(const CameraMeasurements& measured,
                const std::vector<Eigen::Vector3d>& directions,
                BundleProblem& problem);
 
+/// Poses of a problem that were measured with one rig are with another from now on.
+void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem);
+
+/// The observations of a problem, `observed` in the map, as a rig calibrated otherwise makes them.
+/// Ranges that the problem leaves out stay left out.
+void measure_anew(const Map& map,
+                  std::span<const Observation> observed,
+                  const Rig& before,
+                  const Rig& rig,
+                  BundleProblem& problem);
+
 }  // namespace waymark

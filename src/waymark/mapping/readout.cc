@@ -9,6 +9,8 @@
 #include <vector>
 
 #include "waymark/image/rolling_shutter.h"
+#include "waymark/mapping/camera_measurements.h"
+#include "waymark/mapping/linear_calibration.h"
 
 namespace waymark {
 namespace {
@@ -42,56 +44,23 @@ std::vector<Eigen::Vector3f> bearings_by_readout(const Map& map,
   return all;
 }
 
-struct ReadoutTrial {
-  double readout_s = 0.0;
-  double sigma_s = 0.0;
-};
-
-/// As the spread of what parts of the way tell has it, where that is more than noise explains.
-double standard_deviation(const CalibrationEvidence& evidence, double noise_px) {
-  const double information = evidence.information(0, 0);
-  const double variance = std::max(noise_px * noise_px / information,
-                                   evidence.scatter(0, 0) / (information * information));
-  return std::sqrt(variance);
-}
-
-/// One adjustment from the readout reached; whether there is one.
-bool adjust_readout(const std::vector<Eigen::Vector3f>& by_readout,
-                    const Rig& rig,
-                    double given_s,
-                    BundleProblem& problem,
-                    ReadoutTrial& trial) {
-  BundleCalibration calibration;
-  calibration.rig = &rig;
-  calibration.blocks.assign(rig.cameras.size(), {0, 1, false});
-  for (std::size_t i = 0; i < by_readout.size(); ++i) {
-    calibration.first_derivative.push_back(2 * i);
-    const Eigen::Vector2f derivative =
-        problem.observations[i].level_pixel_from_bearing * by_readout[i];
-    for (const float by : derivative) calibration.level_pixel_by_intrinsics.push_back(by);
-  }
-  calibration.prior_information.setConstant(1, 1, 1.0 / (kReadoutPriorS * kReadoutPriorS));
-  calibration.prior_change.setConstant(1, given_s - trial.readout_s);
-  calibration.change.setZero(1);
-  problem.calibration = std::move(calibration);
-  const BundleResult result =
-      adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 4});
-  const BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
-  if (found.evidence.information.size() == 0) return false;
-  const double change_s = found.change[0];
-  trial.readout_s += change_s;
-  trial.sigma_s = standard_deviation(found.evidence, result.noise_px);
-  if (!(std::abs(trial.readout_s) < kMaxReadoutS)) return false;
-  for (std::size_t i = 0; i < by_readout.size(); ++i) {
-    problem.observations[i].bearing -= static_cast<float>(change_s) * by_readout[i];
-  }
-  return true;
-}
-
 std::shared_ptr<const Rig> with_readout(const Rig& rig, double readout_s) {
   auto changed = std::make_shared<Rig>(rig);
   for (RigCamera& camera : changed->cameras) camera.readout_s = readout_s;
   return changed;
+}
+
+LinearCalibration readout_of(const KnownCalibration& known,
+                             const std::vector<Eigen::Vector3f>& by_readout,
+                             const BundleProblem& problem) {
+  LinearCalibration readout{.given = Eigen::VectorXd::Constant(1, known.given_readout_s),
+                            .prior_sigma = Eigen::VectorXd::Constant(1, kReadoutPriorS),
+                            .value = Eigen::VectorXd::Constant(1, known.rig->cameras[0].readout_s)};
+  for (std::size_t i = 0; i < by_readout.size(); ++i) {
+    const Eigen::Vector2f by = problem.observations[i].level_pixel_from_bearing * by_readout[i];
+    readout.level_pixel_by.insert(readout.level_pixel_by.end(), by.begin(), by.end());
+  }
+  return readout;
 }
 
 }  // namespace
@@ -107,23 +76,24 @@ std::optional<KnownCalibration> find_readout(const Map& map,
     return std::nullopt;
   }
   BundleProblem adjusted = problem;
-  ReadoutTrial trial{used_s, 0.0};
+  LinearCalibration readout = readout_of(known, by_readout, problem);
   for (int pass = 0; pass < kNumPasses; ++pass) {
-    if (!adjust_readout(by_readout, *known.rig, given_s, adjusted, trial)) {
-      return std::nullopt;
+    const auto change = adjust_linear(*known.rig, adjusted, readout);
+    if (!change || !(std::abs(readout.value[0]) < kMaxReadoutS)) return std::nullopt;
+    if (given_s == 0.0 && readout.value[0] < 0.5 * kMinReadoutS) return std::nullopt;
+    for (std::size_t i = 0; i < by_readout.size(); ++i) {
+      adjusted.observations[i].bearing -= static_cast<float>((*change)[0]) * by_readout[i];
     }
-    if (given_s == 0.0 && trial.readout_s < 0.5 * kMinReadoutS) return std::nullopt;
   }
-  if (given_s == 0.0 && trial.readout_s < kMinReadoutS) return std::nullopt;
-  if (std::abs(trial.readout_s - given_s) < kMinReadoutSigmas * trial.sigma_s) return std::nullopt;
-  if (std::abs(trial.readout_s - used_s) < kMinReadoutChange * trial.sigma_s) return std::nullopt;
+  const double readout_s = readout.value[0], sigma_s = readout.sigma[0];
+  if (given_s == 0.0 && readout_s < kMinReadoutS) return std::nullopt;
+  if (std::abs(readout_s - given_s) < kMinReadoutSigmas * sigma_s) return std::nullopt;
+  if (std::abs(readout_s - used_s) < kMinReadoutChange * sigma_s) return std::nullopt;
   KnownCalibration found = known;
-  found.given = with_readout(*known.given, trial.readout_s);
-  found.rig = with_readout(*known.rig, trial.readout_s);
-  found.readout_sigma_s = trial.sigma_s;
-  for (const Rig*& rig : adjusted.rigs) {
-    if (rig == known.rig.get()) rig = found.rig.get();
-  }
+  found.given = with_readout(*known.given, readout_s);
+  found.rig = with_readout(*known.rig, readout_s);
+  found.readout_sigma_s = sigma_s;
+  use_rig(*known.rig, *found.rig, adjusted);
   problem = std::move(adjusted);
   return found;
 }

@@ -105,6 +105,20 @@ Eigen::Vector2d BundleCalibration::pixel_shift(std::size_t observation,
   return derivative.cast<double>() * change.segment(first, derivative.cols());
 }
 
+Eigen::Map<const Eigen::RowVectorXf> BundleCalibration::inverse_range_by(
+    std::size_t observation) const {
+  if (inverse_range_by_intrinsics.empty()) return {nullptr, 0};
+  const std::size_t count = blocks[0].num_intrinsics;
+  return {inverse_range_by_intrinsics.data() + observation * count,
+          static_cast<Eigen::Index>(count)};
+}
+
+double BundleCalibration::inverse_range_shift(std::size_t observation,
+                                              const Eigen::VectorXd& change) const {
+  const auto derivative = inverse_range_by(observation);
+  return derivative.cast<double>().dot(change.head(derivative.cols()));
+}
+
 Rigid3 BundleCalibration::cam_from_rig(std::size_t camera, const Eigen::VectorXd& change) const {
   const CalibrationParameters::Block& block = blocks[camera];
   const Rigid3& before = rig->cameras[camera].cam_from_rig;

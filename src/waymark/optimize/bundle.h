@@ -41,6 +41,9 @@ struct BundleCalibration {
   /// camera begin: 2 x num_intrinsics, column by column.
   std::vector<std::size_t> first_derivative;
   std::vector<float> level_pixel_by_intrinsics;
+  /// Of rigs of one camera with a depth image, whose measured inverse range changes as well: its
+  /// derivatives, num_intrinsics per observation in their order, 1/m per unit. Empty: none changes.
+  std::vector<float> inverse_range_by_intrinsics;
   /// The prior: half of (change - prior_change)^T prior_information (change - prior_change), in the
   /// units of the cost of residuals.
   Eigen::MatrixXd prior_information;
@@ -55,6 +58,10 @@ struct BundleCalibration {
   Eigen::Vector2d pixel_shift(std::size_t observation,
                               std::uint8_t camera,
                               const Eigen::VectorXd& change) const;
+  /// Derivative of what the depth image measures; zero where none changes.
+  Eigen::Map<const Eigen::RowVectorXf> inverse_range_by(std::size_t observation) const;
+  /// What a change moves the inverse range by that is measured of an observation, in 1/m.
+  double inverse_range_shift(std::size_t observation, const Eigen::VectorXd& change) const;
   /// cam_from_rig with a change of its turns.
   Rigid3 cam_from_rig(std::size_t camera, const Eigen::VectorXd& change) const;
 };

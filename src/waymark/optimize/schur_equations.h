@@ -56,6 +56,7 @@ struct NormalBlocks {
 template <int kRows>
 struct ResidualRows {
   double bearing_root;  // Of the weight of the first two.
+  double range_scale;   // Of the third: root of its weight over its standard deviation.
   Eigen::Matrix<double, kRows, 1> residual;
   Eigen::Matrix<double, kRows, 3> by_point_in_cam;
 };
@@ -100,6 +101,9 @@ class SchurSolver {
   Eigen::Vector2d residual_of(std::size_t i,
                               const InverseRangePoint& seen,
                               const BundleState& state) const;
+  double range_residual_of(std::size_t i,
+                           const InverseRangePoint& seen,
+                           const BundleState& state) const;
   void allocate();
   double cost(const BundleState& state) const;
   void linearize();
@@ -179,14 +183,15 @@ void SchurSolver::visit_rows(std::size_t i, const Visit& visit) const {
   const double root = std::sqrt(huber(residual.squaredNorm(), options_.huber_px).weight);
   const Matrix23d by_point = bearing_residual_by_point(seen, observation.level_pixel_from_bearing);
   if (!(observation.inverse_range_sigma > 0.0f)) {
-    visit(ResidualRows<2>{root, root * residual, root * by_point}, point_in_rig);
+    visit(ResidualRows<2>{root, 0.0, root * residual, root * by_point}, point_in_rig);
     return;
   }
   const double sigma = observation.inverse_range_sigma;
-  const double range = range_residual(seen, observation.inverse_range, sigma);
+  const double range = range_residual_of(i, seen, state_);
   const double range_root = std::sqrt(huber(range * range, options_.range_huber).weight);
   ResidualRows<3> rows;
   rows.bearing_root = root;
+  rows.range_scale = range_root / sigma;
   rows.residual << root * residual, range_root * range;
   rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(seen, sigma);
   visit(rows, point_in_rig);

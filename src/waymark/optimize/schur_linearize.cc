@@ -32,6 +32,16 @@ Eigen::Vector2d SchurSolver::residual_of(std::size_t i,
   return residual;
 }
 
+double SchurSolver::range_residual_of(std::size_t i,
+                                      const InverseRangePoint& seen,
+                                      const BundleState& state) const {
+  const BundleObservation& observation = problem_.observations[i];
+  const double sigma = observation.inverse_range_sigma;
+  const BundleCalibration* calibration = problem_.calibration_of(observation.pose);
+  const double shift = calibration ? calibration->inverse_range_shift(i, state.calibration) : 0.0;
+  return range_residual(seen, observation.inverse_range - shift, sigma);
+}
+
 double SchurSolver::cost(const BundleState& state) const {
   double sum = 0.0;
   for (const std::uint32_t i : plan_.observations) {
@@ -46,8 +56,7 @@ double SchurSolver::cost(const BundleState& state) const {
     }
     sum += huber(residual_of(i, seen, state).squaredNorm(), options_.huber_px).loss;
     if (observation.inverse_range_sigma > 0.0f) {
-      const double range =
-          range_residual(seen, observation.inverse_range, observation.inverse_range_sigma);
+      const double range = range_residual_of(i, seen, state);
       sum += huber(range * range, options_.range_huber).loss;
     }
   }
@@ -71,6 +80,10 @@ ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
   const auto by_intrinsics = calibration.by_intrinsics(i, observation.camera);
   by.topLeftCorner(2, by_intrinsics.cols()) =
       rows.bearing_root * by_intrinsics.template cast<double>();
+  if constexpr (kRows == 3) {
+    const auto by_range = calibration.inverse_range_by(i);
+    by.row(2).head(by_range.cols()) = rows.range_scale * by_range.template cast<double>();
+  }
   if (!block.has_extrinsics) return by;
   const Eigen::Vector3d& baseline =
       calibration.rig->cameras[observation.camera].cam_from_rig.translation;

@@ -85,7 +85,7 @@ SubmapId submap_of(const Map& map, const std::vector<LandmarkId>& landmarks) {
 class Localizer::Impl {
  public:
   Impl(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
-      : full_rig_(std::move(rig)),
+      : full_rig_(with_depth_offset(std::move(rig), settings.depth.inverse_offset)),
         reduction_(reduction_for(full_rig_, *map)),
         rig_(std::make_shared<const Rig>(reduced(full_rig_, reduction_))),
         uses_range_(is_metric(*map)),

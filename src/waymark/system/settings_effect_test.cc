@@ -158,6 +158,19 @@ TEST(SettingsEffect, DepthFactorIsTheUnitOfTheDepthImage) {
   EXPECT_GT(num_ranges, 100);
 }
 
+TEST(SettingsEffect, DepthOffsetIsTakenOffInverseDepths) {
+  const auto plain = features_with({});
+  const auto less = features_with({"depth.inverse_offset=0.02"});
+  int num_ranges = 0;
+  for (std::size_t i = 0; i < plain->num_primary; ++i) {
+    if (plain->range_m[i] == 0.0f) continue;
+    ++num_ranges;
+    EXPECT_NEAR(
+        1.0f / less->range_m[i], 1.0f / plain->range_m[i] - 0.02f * plain->bearings[i].z(), 1e-4f);
+  }
+  EXPECT_GT(num_ranges, 100);
+}
+
 TEST(SettingsEffect, DepthLagAddsToThatOfTheTimeStamps) {
   const auto ranges_m = [](const std::string& assignment, std::int64_t lag_ns) {
     System system(small_rig(), settings_with({assignment}), Timing::kInline);
@@ -363,6 +376,7 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "stereo.min_range_baselines",
                                               "depth.factor",
                                               "depth.lag_ms",
+                                              "depth.inverse_offset",
                                               "view.max_angle_deg",
                                               "view.top_deg",
                                               "view.bottom_deg",

@@ -67,7 +67,8 @@ bool has_pose(FrameState state) {
 class System::Impl {
  public:
   Impl(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
-      : given_rig_(std::make_shared<const Rig>(std::move(rig))),
+      : given_rig_(std::make_shared<const Rig>(
+            with_depth_offset(std::move(rig), settings.depth.inverse_offset))),
         settings_(settings),
         timing_(timing),
         rig_(given_rig_),

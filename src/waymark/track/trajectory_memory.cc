@@ -20,7 +20,9 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
   // Long after the map has changed last it has settled, and the frame with it.
   const bool is_settled = frame.id.value - newest_sent_.value > kMaxSinceKeyframe;
   if (!outcome.seen.empty() && !is_settled) {
-    unsettled_.push_back({frame.id, outcome.seen, nullptr, outcome.details.features->readout_s[0]});
+    const Features& features = *outcome.details.features;
+    unsettled_.push_back(
+        {frame.id, outcome.seen, nullptr, features.readout_s[0], features.inverse_depth_offset});
   }
   if (outcome.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
@@ -28,7 +30,11 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
     entry.pose = filled.pose;
-    unsettled_.push_back({filled.frame, {}, filled.features, filled.features->readout_s[0]});
+    unsettled_.push_back({filled.frame,
+                          {},
+                          filled.features,
+                          filled.features->readout_s[0],
+                          filled.features->inverse_depth_offset});
   }
   while (unsettled_.size() > kMaxUnsettled) {
     settle(unsettled_.front(), map);
@@ -57,6 +63,9 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
   if (const auto motion = readout_s == 0.0f ? std::nullopt : motion_in(unsettled.frame, map)) {
     seen = refiner_.seen_at_once(map, seen, guess, *motion, readout_s);
   }
+  const float offset =
+      static_cast<float>(rig_->inverse_depth_offset) - unsettled.inverse_depth_offset;
+  for (SeenLandmark& one : seen) one.inverse_depth -= offset;
   const auto refined = refiner_.refine(map, seen, guess);
   if (!refined) return;
   pose = {living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()};

@@ -65,6 +65,7 @@ class TrajectoryMemory {
     std::vector<SeenLandmark> seen;            ///< Of a tracked frame.
     std::shared_ptr<const Features> features;  ///< Of a frame filled in later.
     float readout_s = 0.0f;                    ///< That pixels are corrected for.
+    float inverse_depth_offset = 0.0f;         ///< That depths are freed of, in 1/m.
   };
 
   /// A frame that had no pose when it was tracked.
