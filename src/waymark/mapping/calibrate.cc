@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "waymark/mapping/camera_measurements.h"
+#include "waymark/optimize/residual.h"
 
 namespace waymark {
 namespace {
@@ -102,6 +103,7 @@ bool adjust_once(const CalibrationParameters& parameters,
   calibration.prior_information = trial.variance * prior;
   calibration.prior_change = -trial.change;
   calibration.change.setZero(trial.change.size());
+  calibration.has_depths = true;
   problem.calibration = std::move(calibration);
   const BundleResult result =
       adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 2});
@@ -193,14 +195,22 @@ struct CalibrationSample {
 };
 
 CalibrationSample sample(const Map& map,
+                         const Rig& rig,
                          const BundleProblem& problem,
                          std::span<const Observation> observed) {
   CalibrationSample sample{problem, {}};
   sample.problem.observations.clear();
   const auto add = [&](const BundleObservation& like, Observation seen) {
     const Features& features = *map.keyframes().at(seen.keyframe).features;
-    sample.problem.observations.push_back(
-        {features.measurement(seen.feature), like.pose, like.point});
+    Measurement measured = features.measurement(seen.feature);
+    if (problem.rigs[like.pose] == &rig) {
+      // As the depth image has it, along z, in which no calibration has a part.
+      const float along_z = measured.bearing.z();
+      measured.inverse_range /= along_z;
+      measured.inverse_range_sigma =
+          along_z > kLeastAlongZ ? measured.inverse_range_sigma / along_z : 0.0f;
+    }
+    sample.problem.observations.push_back({measured, like.pose, like.point});
     sample.observed.push_back(seen);
   };
   const std::size_t stride = 1 + observed.size() / kMaxObservations;
@@ -268,7 +278,7 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
                                             BundleProblem& problem) {
   const CalibrationParameters parameters(*known.given);
   if (parameters.size() == 0) return std::nullopt;
-  CalibrationSample part = sample(map, problem, observed);
+  CalibrationSample part = sample(map, *known.rig, problem, observed);
   const auto cameras = collect(map, part.observed, *known.rig, part.problem);
   const Trial start{known.rig, known.change, known.sigma};
   std::vector<std::uint8_t> is_free = known.is_always_refined

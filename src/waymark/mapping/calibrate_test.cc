@@ -47,12 +47,19 @@ TEST_F(CalibrateTest, FindsTheFocalLength) {
 }
 
 TEST_F(CalibrateTest, FindsTheFocalLengthThatADepthImageWasReadWith) {
-  const GlobalAdjustment found = adjust(make_described(1, make_test_pinhole(420.0)),
-                                        make_described(1, make_test_pinhole(441.0)),
-                                        0.3,
-                                        0.0005);
-  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", -21.0)), 3.0);
-  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fv", -21.0)), 3.0);
+  const auto fisheye = [](double focal_px) {
+    CameraDescription description = make_test_pinhole(focal_px, {0.003, 0.0007, -0.002, 0.0002});
+    description.distortion_model = "equidistant";
+    return description;
+  };
+  for (const auto& [truth, told] : {std::pair(make_test_pinhole(420.0), make_test_pinhole(441.0)),
+                                    std::pair(fisheye(200.0), fisheye(210.0))}) {
+    const double change = truth.intrinsics[0] - told.intrinsics[0];
+    const GlobalAdjustment found =
+        adjust(make_described(1, truth), make_described(1, told), 0.3, 0.0005);
+    EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", change)), 3.0) << told.distortion_model;
+    EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fv", change)), 3.0) << told.distortion_model;
+  }
 }
 
 TEST_F(CalibrateTest, FindsDistortion) {

@@ -12,13 +12,6 @@
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
-namespace {
-
-/// The depth image measures along z: its ranges change with the calibration, which an adjustment
-/// learns after each pass only. Less sure by this factor they do not hold it where it was.
-constexpr float kDepthLooseness = 3.0f;
-
-}  // namespace
 
 std::vector<CameraMeasurements> collect(const Map& map,
                                         std::span<const Observation> observed,
@@ -33,11 +26,6 @@ std::vector<CameraMeasurements> collect(const Map& map,
     camera.indices.push_back(i);
     camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
-    const Measurement& seen = problem.observations[i];
-    const bool has_depth = seen.inverse_range_sigma > 0.0f;
-    const float by_range = has_depth ? 1.0f / seen.bearing.z() : 0.0f;
-    camera.inverse_depths.push_back(by_range * seen.inverse_range);
-    camera.inverse_depth_sigmas.push_back(kDepthLooseness * by_range * seen.inverse_range_sigma);
   }
   return cameras;
 }
@@ -78,9 +66,6 @@ void linearize(const CameraMeasurements& measured,
         direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
     observation.bearing = bearing.cast<float>();
     observation.level_pixel_from_bearing = w.cast<float>();
-    const auto along_z = static_cast<float>(bearing.normalized().z());
-    observation.inverse_range = along_z * measured.inverse_depths[k];
-    observation.inverse_range_sigma = along_z * measured.inverse_depth_sigmas[k];
   }
 }
 

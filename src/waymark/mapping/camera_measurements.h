@@ -20,9 +20,6 @@ struct CameraMeasurements {
   std::vector<std::size_t> indices;     ///< Of the observations.
   std::vector<Eigen::Vector2d> pixels;  ///< Of level 0.
   std::vector<float> level_scales;      ///< Size of a pixel of the feature's level.
-  /// Along z in 1/m, by the depth image; 0 where it has nothing.
-  std::vector<float> inverse_depths;
-  std::vector<float> inverse_depth_sigmas;  ///< Their standard deviations, as they are to count.
 };
 
 /// Per camera of the rig. observed: of each observation of the problem, in the map.

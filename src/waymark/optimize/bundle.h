@@ -49,6 +49,7 @@ struct BundleCalibration {
   Eigen::MatrixXd prior_information;
   Eigen::VectorXd prior_change;
   Eigen::VectorXd change;        ///< Where to begin, and the result.
+  bool has_depths = false;       ///< The inverse ranges of `rig` are those of depths, along z.
   CalibrationEvidence evidence;  ///< The result.
 
   /// Derivative of the pixel of an observation's level by the intrinsics of its camera.

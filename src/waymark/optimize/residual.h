@@ -55,6 +55,23 @@ inline Eigen::RowVector3d range_residual_by_point(const InverseRangePoint& point
   return point.direction.transpose() * (-point.inverse_range * point.inverse_range / sigma);
 }
 
+/// Directions less along z than this, 84 degrees off, have no depth that tells anything.
+inline constexpr double kLeastAlongZ = 0.1;
+
+/// The same of a depth: (1 / z - measured) / sigma. No calibration has a part in it.
+inline double depth_residual(const InverseRangePoint& point, double inverse_depth, double sigma) {
+  const double along_z = std::max(point.direction.z(), kLeastAlongZ);
+  return (point.inverse_range / along_z - inverse_depth) / sigma;
+}
+
+inline Eigen::RowVector3d depth_residual_by_point(const InverseRangePoint& point, double sigma) {
+  if (point.direction.z() < kLeastAlongZ) {
+    return range_residual_by_point(point, kLeastAlongZ * sigma);
+  }
+  const double inverse_depth = point.inverse_range / point.direction.z();
+  return {0.0, 0.0, -inverse_depth * inverse_depth / sigma};
+}
+
 /// Value of a robust loss and its derivative, both by the squared residual s. The derivative is
 /// the weight of iteratively reweighted least squares (Triggs et al. 2000, 4.3).
 struct RobustValue {

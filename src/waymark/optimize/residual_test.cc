@@ -21,6 +21,8 @@ TEST(Residual, DerivativesMatchDifferences) {
     const Matrix23d by_point = bearing_residual_by_point(in_inverse_range(point), w);
     const Eigen::RowVector3d range_by_point =
         range_residual_by_point(in_inverse_range(point), 0.02);
+    const Eigen::RowVector3d depth_by_point =
+        depth_residual_by_point(in_inverse_range(point), 0.02);
     for (int axis = 0; axis < 3; ++axis) {
       const Eigen::Vector3d offset = step * Eigen::Vector3d::Unit(axis);
       const InverseRangePoint plus = in_inverse_range(point + offset);
@@ -32,6 +34,9 @@ TEST(Residual, DerivativesMatchDifferences) {
       const double range_numeric =
           (range_residual(plus, 0.1, 0.02) - range_residual(minus, 0.1, 0.02)) / (2.0 * step);
       EXPECT_NEAR(range_by_point[axis], range_numeric, 1e-4 * (1.0 + std::abs(range_numeric)));
+      const double depth_numeric =
+          (depth_residual(plus, 0.1, 0.02) - depth_residual(minus, 0.1, 0.02)) / (2.0 * step);
+      EXPECT_NEAR(depth_by_point[axis], depth_numeric, 1e-4 * (1.0 + std::abs(depth_numeric)));
     }
   }
 }

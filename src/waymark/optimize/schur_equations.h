@@ -101,9 +101,14 @@ class SchurSolver {
   Eigen::Vector2d residual_of(std::size_t i,
                               const InverseRangePoint& seen,
                               const BundleState& state) const;
+  /// The same of its range.
   double range_residual_of(std::size_t i,
                            const InverseRangePoint& seen,
                            const BundleState& state) const;
+  bool has_depth(const BundleObservation& observation) const {
+    const BundleCalibration* const calibration = problem_.calibration_of(observation.pose);
+    return calibration && calibration->has_depths;
+  }
   void allocate();
   double cost(const BundleState& state) const;
   void linearize();
@@ -193,7 +198,9 @@ void SchurSolver::visit_rows(std::size_t i, const Visit& visit) const {
   rows.bearing_root = root;
   rows.range_scale = range_root / sigma;
   rows.residual << root * residual, range_root * range;
-  rows.by_point_in_cam << root * by_point, range_root * range_residual_by_point(seen, sigma);
+  rows.by_point_in_cam << root * by_point,
+      range_root * (has_depth(observation) ? depth_residual_by_point(seen, sigma)
+                                           : range_residual_by_point(seen, sigma));
   visit(rows, point_in_rig);
 }
 

@@ -39,7 +39,8 @@ double SchurSolver::range_residual_of(std::size_t i,
   const double sigma = observation.inverse_range_sigma;
   const BundleCalibration* calibration = problem_.calibration_of(observation.pose);
   const double shift = calibration ? calibration->inverse_range_shift(i, state.calibration) : 0.0;
-  return range_residual(seen, observation.inverse_range - shift, sigma);
+  const auto residual = has_depth(observation) ? depth_residual : range_residual;
+  return residual(seen, observation.inverse_range - shift, sigma);
 }
 
 double SchurSolver::cost(const BundleState& state) const {
