@@ -15,7 +15,7 @@ namespace waymark {
 namespace {
 
 /// The intrinsics act linearly in an adjustment: it is repeated until they move no more.
-constexpr int kMaxPasses = 8;
+constexpr int kMaxPasses = 15;
 /// An estimate so many standard deviations from what was given is no chance: of exact calibrations
 /// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5 (docs/decisions.md).
 constexpr double kMinSigmas = 7.0;

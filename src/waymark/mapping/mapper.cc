@@ -17,7 +17,10 @@ namespace waymark {
 namespace {
 
 /// To tell a camera from how it moves takes that many.
-constexpr std::size_t kMinCalibrationKeyframes = 10;
+constexpr std::size_t kMinCalibrationKeyframes = 6;
+/// What else is wrong shows once the calibration is better: images are no longer bent, and what
+/// fits only a wrong calibration is gone.
+constexpr int kMaxRefinements = 4;
 /// A rolling shutter, which bends all that the map is made of, shows at so few, or when they turned
 /// more.
 constexpr std::array<std::size_t, 5> kReadoutKeyframes = {5, 7, 10, 14, 20};
@@ -173,11 +176,11 @@ void Mapper::refine_globally(bool with_calibration) {
   const std::vector<SubmapId> submaps = submaps_by_size(map_);
   for (const SubmapId submap : submaps) {
     const bool is_calibrating = with_calibration && submap == submaps.front();
-    const double readout_s = calibration_.rig->cameras[0].readout_s;
-    apply(adjust_globally(map_, submap, is_calibrating ? &calibration_ : nullptr));
-    // What else is wrong shows once images are no longer bent.
-    if (readout_s == calibration_.rig->cameras[0].readout_s) continue;
-    apply(adjust_globally(map_, submap, &calibration_));
+    for (int pass = 0; pass < kMaxRefinements; ++pass) {
+      const std::shared_ptr<const Rig> before = calibration_.rig;
+      apply(adjust_globally(map_, submap, is_calibrating ? &calibration_ : nullptr));
+      if (calibration_.rig == before) break;
+    }
   }
 }
 
