@@ -13,6 +13,7 @@
 #include "numbers.h"
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"
+#include "waymark/session/another_pass.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
 #include "waymark/session/image_keeper.h"
@@ -125,10 +126,62 @@ void start_viewer(const RunOptions& options,
   reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
-int run(RunOptions options, Reporter& reporter) {
-  const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
-  options.session.timing = options.timing.value_or(suitable);
-  options.session.calibrate = reported(options.calibrate, reporter);
+/// What the first pass over the input told, where there is a second.
+struct FirstPass {
+  CameraChain calibration;
+  RunSummary summary;
+};
+
+/// Whether the input is to be mapped once more, and what the pass until now told.
+std::optional<FirstPass> begin_again(const Session& session,
+                                     const RunOptions& options,
+                                     const SessionResults& results,
+                                     const LiveControl* live) {
+  const bool has_ended = is_interrupted() || results.failure || (live && live->is_stopped());
+  const bool is_paced = options.pace > 0.0 || options.session.timing == Timing::kRealtime;
+  // A map to go on in is another one by now where it is saved to the same file.
+  if (has_ended || is_paced || !options.session.map_in.empty()) return std::nullopt;
+  const auto calibration = calibration_for_another_pass(session);
+  return calibration ? std::optional<FirstPass>({*calibration, results.summary}) : std::nullopt;
+}
+
+/// Adds what an earlier pass told and took.
+void add_first(const RunSummary& first, RunSummary& summary) {
+  summary.refined_calibration =
+      join_passes(first.refined_calibration, std::move(summary.refined_calibration));
+  summary.mistakes = first.mistakes;  // Of the calibration as stated.
+  summary.wall_s += first.wall_s;
+  summary.cpu_s += first.cpu_s;
+}
+
+void save_results(const RunOptions& options,
+                  const Session& session,
+                  const SessionResults& results,
+                  Autosave& autosave,
+                  LiveControl* live,
+                  Reporter& reporter) {
+  // What ended the session early is told together with what could not be saved.
+  save_each({[&] { write_results(options.report.out, results); },
+             [&] {
+               write_calibration(
+                   options.report.out, session, *session.system->rig(), results.summary);
+             },
+             [&] {
+               if (options.map_out.empty()) return;
+               save_final_map(*session.system, options, autosave, reporter);
+             },
+             [&] {
+               if (live) live->finish();
+               report_results(reporter, results, options);
+               report_calibration(reporter, results.summary);
+               check_finished(results);
+             }});
+}
+
+/// Maps the input; the status of the program, or nothing where `first` says to do so once more.
+std::optional<int> map_once(const RunOptions& options,
+                            std::optional<FirstPass>& first,
+                            Reporter& reporter) {
   Session session = open_session(options.session);
   for (const std::string& line : session.description) reporter.info(line);
   warn_unless_sure(reporter, session, "expect a bent map");
@@ -156,7 +209,8 @@ int run(RunOptions options, Reporter& reporter) {
     start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
   }
 
-  SessionResults results = map_input(session, images, autosave, live ? &*live : nullptr, reporter);
+  LiveControl* const shown = live ? &*live : nullptr;
+  SessionResults results = map_input(session, images, autosave, shown, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.setup = to_string(session.input->info().setup);
@@ -165,22 +219,24 @@ int run(RunOptions options, Reporter& reporter) {
   results.summary.version = WAYMARK_VERSION;
   results.summary.refined_calibration = session.system->calibration();
   add_calibration(session, results.summary);
-  // What ended the session early is told together with what could not be saved.
-  save_each({[&] { write_results(options.report.out, results); },
-             [&] {
-               write_calibration(
-                   options.report.out, session, *session.system->rig(), results.summary);
-             },
-             [&] {
-               if (has_map_out) save_final_map(*session.system, options, autosave, reporter);
-             },
-             [&] {
-               if (live) live->finish();
-               report_results(reporter, results, options);
-               report_calibration(reporter, results.summary);
-               check_finished(results);
-             }});
+  if (first) {
+    add_first(first->summary, results.summary);
+  } else if ((first = begin_again(session, options, results, shown))) {
+    return std::nullopt;
+  }
+  save_results(options, session, results, autosave, shown, reporter);
   return results.summary.counts.tracked == 0 ? kNoPose : kDone;
+}
+
+int run(RunOptions options, Reporter& reporter) {
+  const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
+  options.session.timing = options.timing.value_or(suitable);
+  options.session.calibrate = reported(options.calibrate, reporter);
+  std::optional<FirstPass> first;
+  if (const auto status = map_once(options, first, reporter)) return *status;
+  reporter.info("the calibration is another than stated: once more with what the images tell");
+  options.session.calibration = first->calibration;
+  return *map_once(options, first, reporter);
 }
 
 void add_pace_option(CLI::App& command, RunOptions& options) {

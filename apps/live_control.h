@@ -42,6 +42,7 @@ class LiveControl {
   void show(const FrameRecord& record);
   /// Does what was asked for since; while paused it only returns to say that all is over.
   bool should_stop(const std::function<bool()>& is_interrupted);
+  bool is_stopped() const { return is_stopped_; }
   void finishing() { publisher_.set_phase(SessionPhase::kFinishing); }
   void finish() { publisher_.finish(system_); }
 

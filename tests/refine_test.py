@@ -74,11 +74,14 @@ class Refine(unittest.TestCase):
         self.assertNotIn("refined_calibration", summary, "what was found is right")
         self.assertLess(self.error_m(again), 0.3 * self.error_m(as_told))
 
-    def test_in_a_short_run_all_frames_are_located_with_what_its_end_finds(self):
+    def test_what_is_wrong_altogether_is_mapped_once_more(self):
         longer = self.folder / "longer.yaml"
         longer.write_text(CAMERA.replace("[290, 291,", "[305, 306,"))
-        out, summary, _ = self.run_with("short", "--frames", 40, "-c", longer)
-        self.assertIn("refined_calibration", summary)
+        out, summary, said = self.run_with("short", "--frames", 40, "-c", longer)
+        self.assertIn("the calibration is another than stated: once more with what the images tell", said)
+        focal = {each["name"]: each for each in summary["refined_calibration"]}["cam0.fu"]
+        self.assertEqual(focal["given"], 305)
+        self.assertLess(abs(focal["given"] + focal["change"] - 290), 0.003 * 290)
         self.assertLess(summary["keyframes"], 30, "is not calibrated before the end")
         self.assertLess(self.error_m(out), 1.5 * self.error_m(out, name="keyframes.txt"))
 

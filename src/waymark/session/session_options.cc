@@ -81,6 +81,7 @@ PreparedInput prepare_input(const SessionOptions& options) {
 
   InputOptions reading = options.reading;
   reading.calibration = read_camchain(config);
+  if (options.calibration) reading.calibration = options.calibration;
   prepared.input = open_input(options.input, reading);
 
   if (!prepared.input->info().calibration) {
