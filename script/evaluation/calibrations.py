@@ -5,6 +5,7 @@ the standard deviations that it states for them are honest."""
 import re
 
 from .program import PROGRAM, map_sequence, run
+from .projection import pixels_apart
 from .simulated import simulate
 from .tables import table
 
@@ -14,6 +15,7 @@ DISTORTED = ("perspective", "fisheye", "division")
 # Set-up, and what `waymark simulate --told` takes.
 ERRORS = (("mono", "focal=1.05"), ("mono", "focal=0.95"), ("stereo", "focal=1.05"), ("stereo", "turn_y=2"),
           ("rgbd", "focal=1.05"), ("mono", "distortion=0"))
+HELD = 1e-3
 TURNS = ("cam1.turn_x", "cam1.turn_y", "cam1.turn_z")
 
 
@@ -48,14 +50,16 @@ def row_of(work, camera, setup, told, exact_m):
     true_camchain = (folder / "camchain.yaml").read_text()
     is_refined = (out / "calibration.yaml").exists()
     camchain = (out / "calibration.yaml" if is_refined else wrong / "camchain.yaml").read_text()
-    sigma = {each["name"]: each["sigma"] for each in found.summary.get("refined_calibration", [])}
     off_px = focal_length(camchain) - focal_length(true_camchain)
-    normalised = [off_px / sigma["cam0.fu"]] if is_refined else []
     turns = turn_mrad(camchain, true_camchain) if setup == "stereo" else []
-    normalised += [1e-3 * turn / sigma[name] for turn, name in zip(turns, TURNS) if is_refined]
+    off = {"cam0.fu": off_px, **{name: 1e-3 * turn for name, turn in zip(TURNS, turns)}}
+    # What is held has not moved, and the standard deviation that was stated for it.
+    normalised = [off[each["name"]] / each["sigma"] for each in found.summary.get("refined_calibration", [])
+                  if each["name"] in off and abs(each["change"]) > HELD * each["sigma"]]
     size = sum(turn**2 for turn in turns)**0.5
     return [camera, setup, told, f"{100 * off_px / focal_length(true_camchain):.2f} %",
-            f"{size:.3f}" if turns else "", ", ".join(f"{each:.1f}" for each in normalised) or "not changed",
+            f"{pixels_apart(true_camchain, camchain):.2f}", f"{size:.3f}" if turns else "",
+            ", ".join(f"{each:.1f}" for each in normalised) or "held",
             f"{ate_m(folder, out, setup) / exact_m:.2f}"], normalised
 
 
@@ -77,11 +81,11 @@ def calibration_table(work, only=None):
             try:
                 row, normalised = row_of(work, camera, setup, told, exact_m[setup])
             except RuntimeError as error:
-                row, normalised = [camera, setup, told, str(error), "", "", ""], []
+                row, normalised = [camera, setup, told, str(error), "", "", "", ""], []
             rows.append(row)
             errors += normalised
     mean_square = sum(each**2 for each in errors) / max(1, len(errors))
     return ("Calibrations told wrong, after a run:\n\n" +
-            table(["camera", "set-up", "told", "focal length off by", "turn off by, mrad",
+            table(["camera", "set-up", "told", "focal length off by", "projection off by, px", "turn off by, mrad",
                    "errors in stated standard deviations", "ATE / ATE with the true one"], rows) +
             f"\n\nRoot mean square of the errors in stated standard deviations: {mean_square**0.5:.2f}")
