@@ -19,7 +19,8 @@ constexpr int kMaxPasses = 15;
 /// An estimate so many standard deviations from what was given is no chance: of exact calibrations
 /// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5 (docs/decisions.md).
 constexpr double kMinSigmas = 7.0;
-/// With fewer keyframes the scatter itself is known less well, and more is asked for.
+/// Parts of a way with fewer keyframes share most of what they see, err alike, and scatter by less
+/// than they err, in the ratio of the numbers.
 constexpr double kManyKeyframes = 30.0;
 /// A calibration is replaced by one that differs by this many.
 constexpr double kMinChange = 2.0;
@@ -284,14 +285,14 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   std::vector<std::uint8_t> is_free = known.is_always_refined
                                           ? std::vector<std::uint8_t>(parameters.size(), 1)
                                           : likely_wrong(known.parameters);
+  const auto num_keyframes = static_cast<double>(part.problem.rig_from_world.size());
+  const double inflation = std::max(1.0, kManyKeyframes / num_keyframes);
   Trial trial = start;
   BundleProblem adjusted = part.problem;
   if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
   // What the images do not tell stays as given, or it would take up errors of other kinds.
   if (!known.is_always_refined) {
-    const auto num_keyframes = static_cast<double>(part.problem.rig_from_world.size());
-    const double min_sigmas = kMinSigmas * std::max(1.0, kManyKeyframes / num_keyframes);
-    is_free = contradicted(known.parameters, trial, min_sigmas, is_free);
+    is_free = contradicted(known.parameters, trial, kMinSigmas * inflation, is_free);
     if (std::ranges::count(is_free, 1) == 0) return std::nullopt;
     adjusted = part.problem;
     trial = start;
@@ -307,7 +308,7 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     const bool is_estimated = is_free[i] && parameters.list()[i].prior_sigma > 0.0;
     const auto at = static_cast<Eigen::Index>(i);
-    found.sigma[at] = is_estimated ? trial.sigma[at] : parameters.list()[i].prior_sigma;
+    found.sigma[at] = is_estimated ? inflation * trial.sigma[at] : parameters.list()[i].prior_sigma;
   }
   return found;
 }
