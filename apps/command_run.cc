@@ -126,23 +126,23 @@ void start_viewer(const RunOptions& options,
   reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
-/// What the first pass over the input told, where there is a second.
+/// The first pass over the input, which is saved, where there is a second.
 struct FirstPass {
-  CameraChain calibration;
-  RunSummary summary;
+  CameraChain calibration;  ///< Found by it.
+  SessionResults results;
 };
 
-/// Whether the input is to be mapped once more, and what the pass until now told.
-std::optional<FirstPass> begin_again(const Session& session,
-                                     const RunOptions& options,
-                                     const SessionResults& results,
-                                     const LiveControl* live) {
-  const bool has_ended = is_interrupted() || results.failure || (live && live->is_stopped());
+/// Whether frames of the input were left out.
+bool has_ended_early(const SessionResults& results, const LiveControl* live) {
+  return is_interrupted() || results.failure || (live && live->is_stopped());
+}
+
+/// The calibration with which the input is to be mapped once more, if it is.
+std::optional<CameraChain> begin_again(const Session& session, const RunOptions& options) {
   const bool is_paced = options.pace > 0.0 || options.session.timing == Timing::kRealtime;
   // A map to go on in is another one by now where it is saved to the same file.
-  if (has_ended || is_paced || !options.session.map_in.empty()) return std::nullopt;
-  const auto calibration = calibration_for_another_pass(session);
-  return calibration ? std::optional<FirstPass>({*calibration, results.summary}) : std::nullopt;
+  if (is_paced || !options.session.map_in.empty()) return std::nullopt;
+  return calibration_for_another_pass(session);
 }
 
 /// Adds what an earlier pass told and took.
@@ -154,13 +154,13 @@ void add_first(const RunSummary& first, RunSummary& summary) {
   summary.cpu_s += first.cpu_s;
 }
 
+/// report: told last, together with what could not be saved.
 void save_results(const RunOptions& options,
                   const Session& session,
                   const SessionResults& results,
                   Autosave& autosave,
-                  LiveControl* live,
+                  const std::function<void()>& report,
                   Reporter& reporter) {
-  // What ended the session early is told together with what could not be saved.
   save_each({[&] { write_results(options.report.out, results); },
              [&] {
                write_calibration(
@@ -170,15 +170,46 @@ void save_results(const RunOptions& options,
                if (options.map_out.empty()) return;
                save_final_map(*session.system, options, autosave, reporter);
              },
-             [&] {
-               if (live) live->finish();
-               report_results(reporter, results, options);
-               report_calibration(reporter, results.summary);
-               check_finished(results);
-             }});
+             report});
 }
 
-/// Maps the input; the status of the program, or nothing where `first` says to do so once more.
+int status_of(const SessionResults& results) {
+  return results.summary.counts.tracked == 0 ? kNoPose : kDone;
+}
+
+/// Saves and reports; the status of the program, or nothing where the input is to be mapped once
+/// more, which `first` tells then.
+std::optional<int> finish(const RunOptions& options,
+                          const Session& session,
+                          SessionResults results,
+                          Autosave& autosave,
+                          LiveControl* live,
+                          std::optional<FirstPass>& first,
+                          Reporter& reporter) {
+  const auto report = [&](const SessionResults& told) {
+    if (live) live->finish();
+    report_results(reporter, told, options);
+    report_calibration(reporter, told.summary);
+    check_finished(told);  // What ended the session early is told with what could not be saved.
+  };
+  const bool has_ended = has_ended_early(results, live);
+  if (first && has_ended) {
+    reporter.info("the results are those of the first time");
+    report(first->results);
+    return status_of(first->results);
+  }
+  const auto again = first || has_ended ? std::nullopt : begin_again(session, options);
+  if (first) add_first(first->results.summary, results.summary);
+  const auto last = [&] {
+    if (!again) report(results);
+  };
+  save_results(options, session, results, autosave, last, reporter);
+  if (!again) return status_of(results);
+  first.emplace(*again, std::move(results));
+  return std::nullopt;
+}
+
+/// Maps the input; see finish().
 std::optional<int> map_once(const RunOptions& options,
                             std::optional<FirstPass>& first,
                             Reporter& reporter) {
@@ -200,7 +231,7 @@ std::optional<int> map_once(const RunOptions& options,
   ImageKeeper images(
       input.get(), [&] { return session.system->map(); }, std::move(session.images));
   Autosave autosave(options.map_out,
-                    has_map_out ? options.autosave_s : 0.0,
+                    has_map_out && !first ? options.autosave_s : 0.0,  // There is a whole map.
                     settings_as_yaml(session.settings),
                     images);
 
@@ -208,7 +239,6 @@ std::optional<int> map_once(const RunOptions& options,
   if (!options.viewer.empty()) {
     start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
   }
-
   LiveControl* const shown = live ? &*live : nullptr;
   SessionResults results = map_input(session, images, autosave, shown, reporter);
   reporter.finish_progress();
@@ -219,13 +249,7 @@ std::optional<int> map_once(const RunOptions& options,
   results.summary.version = WAYMARK_VERSION;
   results.summary.refined_calibration = session.system->calibration();
   add_calibration(session, results.summary);
-  if (first) {
-    add_first(first->summary, results.summary);
-  } else if ((first = begin_again(session, options, results, shown))) {
-    return std::nullopt;
-  }
-  save_results(options, session, results, autosave, shown, reporter);
-  return results.summary.counts.tracked == 0 ? kNoPose : kDone;
+  return finish(options, session, std::move(results), autosave, shown, first, reporter);
 }
 
 int run(RunOptions options, Reporter& reporter) {
