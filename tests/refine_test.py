@@ -5,6 +5,7 @@
 import json
 import pathlib
 import re
+import signal
 import subprocess
 import tempfile
 import unittest
@@ -84,6 +85,24 @@ class Refine(unittest.TestCase):
         self.assertLess(abs(focal["given"] + focal["change"] - 290), 0.003 * 290)
         self.assertLess(summary["keyframes"], 30, "is not calibrated before the end")
         self.assertLess(self.error_m(out), 1.5 * self.error_m(out, name="keyframes.txt"))
+
+    def test_the_first_time_stays_where_the_second_is_interrupted(self):
+        longer = self.folder / "longer_still.yaml"
+        longer.write_text(CAMERA.replace("[290, 291,", "[305, 306,"))
+        out, told = self.folder / "interrupted", self.folder / "interrupted.wmap"
+        with subprocess.Popen([PROGRAM, "run", self.room, "-o", out, "--map-out", told, "--frames", "40", "-c", longer],
+                              stderr=subprocess.PIPE, text=True) as program:
+            self.addCleanup(program.kill)
+            said = next(line for line in program.stderr if "once more" in line)
+            program.send_signal(signal.SIGINT)
+            said += program.stderr.read()
+        self.assertEqual(program.returncode, 0, said)
+        self.assertIn("the results are those of the first time", said)
+        summary = json.loads((out / "summary.json").read_text())
+        self.assertEqual(summary["frames"], 40)
+        self.assertIn("refined_calibration", summary)
+        self.assertEqual(len((out / "frames.csv").read_text().splitlines()), 41)
+        self.assertEqual(waymark("map", "check", told).returncode, 0)
 
     def test_a_rolling_shutter_is_found_and_kept(self):
         walk = self.folder / "walk"
