@@ -8,6 +8,7 @@
 #include "waymark/base/median.h"
 #include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/pose_kernel.h"
+#include "waymark/optimize/residual.h"
 
 namespace waymark {
 
@@ -86,6 +87,30 @@ class PoseSolver {
     return std::any_of(arrays_.segments.begin(), arrays_.segments.end(), [](const auto& segment) {
       return segment.has_ranges;
     });
+  }
+
+  /// Variance of the residuals of ranges: that which makes the inverse of their part of the Hessian
+  /// the covariance that they show, weighed as they are (White 1980). The assumed one counts as
+  /// kNoisePriorStrength ranges.
+  double measure_range_variance(const PoseRobust& robust, double assumed_variance) const {
+    double sum_of_weights = kNoisePriorStrength;
+    double sum = kNoisePriorStrength * assumed_variance;
+    const auto& fields = arrays_.fields;
+    for (const PoseSegment& segment : arrays_.segments) {
+      const Rigid3 cam_from_world = rig_.cameras[segment.camera].cam_from_rig * rig_from_world_;
+      for (std::size_t i = segment.begin; i < segment.end; ++i) {
+        const double scale = fields[kInverseRangeScale][i];
+        if (!(scale * fields[kWeight][i] > 0.0)) continue;
+        const Eigen::Vector3d point(fields[kPointX][i], fields[kPointY][i], fields[kPointZ][i]);
+        const InverseRangePoint seen = in_inverse_range(cam_from_world * point);
+        const double squared =
+            std::pow(range_residual(seen, fields[kInverseRange][i], 1.0 / scale), 2);
+        const double weight = fields[kWeight][i] * geman_mcclure(squared, robust.scale_px).weight;
+        sum_of_weights += weight;
+        sum += weight * weight * squared;
+      }
+    }
+    return sum / sum_of_weights;
   }
 
   void compute_residuals() {
@@ -175,8 +200,9 @@ PoseEstimate optimize_pose(const Rig& rig,
   }
   const double assumed_variance = options.noise_px * options.noise_px;
   const double variance = measure_variance(arrays, gate, assumed_variance);
+  const double range_variance = solver.measure_range_variance(huber, assumed_variance);
   const Matrix6d of_bearings = solver.has_ranges() ? solver.bearing_hessian(huber) : hessian;
-  const Matrix6d information = of_bearings / variance + (hessian - of_bearings) / assumed_variance;
+  const Matrix6d information = of_bearings / variance + (hessian - of_bearings) / range_variance;
   PoseEstimate estimate;
   estimate.rig_from_world = solver.rig_from_world();
   estimate.is_inlier = arrays.is_inlier;

@@ -47,8 +47,8 @@ struct PoseEstimate {
   std::span<const std::uint8_t> is_inlier;  ///< Per observation, in the order given.
   std::size_t num_inliers = 0;
   /// Of the left perturbation xi in exp(xi) * rig_from_world, with xi = (translation, rotation).
-  /// Scaled by noise_measured_px, the part of the ranges by their own sigmas; large but finite
-  /// where the observations say nothing.
+  /// Scaled by noise_measured_px, the part of the ranges by what their residuals show; large but
+  /// finite where the observations say nothing.
   Matrix6d covariance = Matrix6d::Zero();
   /// Standard deviation of a residual component as the inliers show it; leans on noise_px when
   /// there are few of them.
