@@ -214,7 +214,9 @@ std::optional<int> map_once(const RunOptions& options,
                             std::optional<FirstPass>& first,
                             Reporter& reporter) {
   Session session = open_session(options.session);
-  for (const std::string& line : session.description) reporter.info(line);
+  if (!first) {
+    for (const std::string& line : session.description) reporter.info(line);
+  }
   warn_unless_sure(reporter, session, "expect a bent map");
   prepare_results(options.report.out);
   const bool has_map_out = !options.map_out.empty();

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cstdio>
+#include <utility>
 
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
@@ -59,7 +60,8 @@ void Reporter::progress(std::size_t num_done,
                         std::string_view state) {
   if (verbosity_ == Verbosity::kQuiet) return;
   const Clock::time_point now = Clock::now();
-  if (!start_) {
+  const bool is_again = num_done < std::exchange(last_done_, num_done);
+  if (!start_ || is_again) {
     start_ = now;
     last_shown_ = now;
     return;

@@ -32,7 +32,8 @@ class Reporter {
   /// What ends the program, for the log; main() tells the user.
   void failure(std::string_view line);
 
-  /// num_done of num_total (if it is known) frames are done; state names the tracker's.
+  /// num_done of num_total (if it is known) frames are done; state names the tracker's. Begins anew
+  /// where fewer are done than before.
   void progress(std::size_t num_done, std::optional<std::size_t> num_total, std::string_view state);
   /// Removes the bar.
   void finish_progress();
@@ -52,6 +53,7 @@ class Reporter {
   std::ofstream log_;
   std::optional<Clock::time_point> start_;
   Clock::time_point last_shown_;
+  std::size_t last_done_ = 0;
 };
 
 /// Seconds as "12 s", "3:05 min" or "2:03 h".
