@@ -70,6 +70,36 @@ TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
   FAIL() << "no keyframe";
 }
 
+/// A box of points that somebody turns before a wall of them.
+PointCloud turned_box(double turn_rad) {
+  PointCloud cloud = scatter_in({-4.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 300, 4.0, 3);
+  const Rigid3 moved = make_test_pose({0.8 + turn_rad, 0.3, 3.0}, {0.0, turn_rad, 0.5 * turn_rad});
+  const PointCloud box = scatter_in({-0.9, -0.9, -0.9}, {0.9, 0.9, 0.9}, 100, 3.0, 4);
+  for (PointLandmark corner : box.landmarks) {
+    corner.position = moved * corner.position;
+    cloud.landmarks.push_back(corner);
+  }
+  return cloud;
+}
+
+TEST_P(AtRest, StaysWhateverMovesBeforeIt) {
+  PointSession session(GetParam(), turned_box(0.0));
+  Rigid3 rest;
+  for (int i = 0; i < 30; ++i) {
+    session.look_from(beside(0.02 * i), 1);
+    rest = session.track().world_from_rig.value_or(Rigid3{});
+  }
+  const double distance = rest.translation.norm() / 0.58 * 5.0;  // Of the wall.
+  for (int i = 0; i < 100; ++i) {
+    session.show(turned_box(0.02 * i));
+    session.look_from(beside(0.58), 1);
+    const TrackOutcome outcome = session.track();
+    ASSERT_TRUE(outcome.world_from_rig) << i;
+    // The first frames of the box in motion pull a little, while it could be noise.
+    EXPECT_LT((outcome.world_from_rig->translation - rest.translation).norm(), 0.04 * distance);
+  }
+}
+
 INSTANTIATE_TEST_SUITE_P(Setups, AtRest, ::testing::Values(1, 2), [](const auto& info) {
   return info.param == 1 ? "mono" : "stereo";
 });

@@ -34,6 +34,9 @@ class PointSession {
     }
   }
 
+  /// What there is to see from now on.
+  void show(PointCloud cloud) { cloud_ = std::move(cloud); }
+
   TrackOutcome track() {
     StageTimes times;
     const Frame frame{FrameId{num_frames_},

@@ -10,6 +10,7 @@
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
+#include "waymark/track/rest.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {
@@ -248,7 +249,9 @@ bool Initializer::has_moved(const Reference& reference, const Frame& frame) cons
     const Eigen::Vector3f& before = reference.frame.features->bearings[match.a];
     return (frame.features->bearings[match.b] - before).norm() >= kRestPx * pixel_rad_;
   };
-  return std::count_if(reference.matches.begin(), reference.matches.end(), moved) >= kMinLandmarks;
+  if (std::ranges::count_if(reference.matches, moved) < kMinLandmarks) return false;
+  return !is_at_rest(
+      *rig_->cameras[0].camera, *reference.frame.features, *frame.features, reference.matches);
 }
 
 std::optional<Initialization> Initializer::start_from_pair(const Reference& reference,

@@ -52,7 +52,8 @@ class Initializer {
   std::optional<Initialization> start_from_range(const Frame& frame);
   std::optional<Initialization> start_from_two_views(const Frame& frame);
   void match(Reference& reference, const Frame& frame);
-  /// Whether as many features as a map needs moved; if not, the pair has no parallax to look for.
+  /// Whether as many features as a map needs moved, and not just before a camera at rest; if not,
+  /// the pair has no parallax to look for.
   bool has_moved(const Reference& reference, const Frame& frame) const;
   std::optional<Initialization> start_from_pair(const Reference& reference, const Frame& frame);
   std::optional<Initialization> try_pair(const Reference& reference, const Frame& frame);

@@ -154,6 +154,33 @@ TEST(Initializer, MonoStartsOnceTurningBecomesMoving) {
   EXPECT_GE(started.at, 15u);
 }
 
+/// A box of points that somebody turns before a wall of them.
+PointCloud box_before_wall(std::uint32_t frame) {
+  PointCloud cloud = scatter_in({-5.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 600, 6.0, 3);
+  const Rigid3 moved = pose_at(0.01 * frame, 0.2, 3.5, 0.02 * frame);
+  const PointCloud box = scatter_in({-0.6, -0.6, -0.6}, {0.6, 0.6, 0.6}, 250, 3.0, 4);
+  for (PointLandmark corner : box.landmarks) {
+    corner.position = moved * corner.position;
+    cloud.landmarks.push_back(corner);
+  }
+  return cloud;
+}
+
+TEST(Initializer, MonoWaitsForTheCameraToMoveWhateverMovesBeforeIt) {
+  constexpr std::uint32_t kNumStill = 40;
+  Scene scene = mono_scene(
+      [](std::uint32_t i) { return i < kNumStill ? Rigid3{} : sideways()(i - kNumStill); });
+  Initializer initializer(scene.rig, false, 7);
+  std::uint32_t at = 0;
+  for (std::optional<Initialization> start; at < kNumStill + 30 && !start; ++at) {
+    scene.cloud = box_before_wall(at);
+    start = initializer.add(scene.frame(at));
+    if (start) break;
+  }
+  EXPECT_GT(at, kNumStill);
+  EXPECT_LT(at, kNumStill + 30);
+}
+
 TEST(Initializer, MonoKeepsOnlySoManyFramesWhileTheCameraStandsStill) {
   const auto num_still = static_cast<std::uint32_t>(Initializer::kMaxPassed + 20);
   const Path path = sideways();
