@@ -106,7 +106,10 @@ ImageView SeamPadding::widen_mask(ImageView mask,
 }
 
 FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
-    : rig_(std::move(rig)), settings_(settings), extractor_(settings_for(rig_, settings.features)) {
+    : rig_(std::move(rig)),
+      settings_(settings),
+      is_auto_masked_(settings.view.is_auto_masked()),
+      extractor_(settings_for(rig_, settings.features)) {
   for (const RigCamera& camera : rig_.cameras) {
     view_masks_.emplace_back(camera.camera, settings.view);
   }
@@ -146,6 +149,12 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images,
   }
   times_.depth_ms = ms_since(depth_start);
   return moved(std::move(features), rig_, motion);
+}
+
+void FrameBuilder::watch(ImageView image0, const Rigid3& rig_from_world, bool is_same_world) {
+  if (!is_auto_masked_) return;
+  const Rigid3 cam_from_world = rig_.cameras[0].cam_from_rig * rig_from_world;
+  view_masks_[0].watch(image0, cam_from_world.rotation.conjugate(), is_same_world);
 }
 
 bool FrameBuilder::needs_motion(const FrameImages& images) const {

@@ -59,9 +59,10 @@ class SeamPadding {
 
 /// Turns images into the immutable data of a frame: extraction, tangents, stereo or depth. Keeps
 /// its buffers; what is new per frame is the result. The same images give the same frame once the
-/// surroundings of the image circle are known (ViewMask::learn).
+/// surroundings of the image circle are known (ViewMask::learn), until watch() finds something.
 class FrameBuilder {
  public:
+  /// Throws InputError for a word that view.auto_mask does not know.
   FrameBuilder(Rig rig, const FrameSettings& settings);
 
   /// Throws InputError where the size of an image is not the camera's. image1 takes a rig of two
@@ -70,6 +71,13 @@ class FrameBuilder {
   /// motion: as far as it is known beforehand; features of rolling shutters are corrected by it,
   /// and found in depth images of other times.
   std::shared_ptr<const Features> build(const FrameImages& images, const RigMotion& motion = {});
+
+  /// Looks for what moves along with camera 0 in an image that it took from a known place. From the
+  /// next image on it is kept free of features. is_same_world: whether places can be compared.
+  void watch(ImageView image0, const Rigid3& rig_from_world, bool is_same_world);
+
+  /// What was found: 0 where camera 0 shows what moves along with it, else 255; empty: nowhere.
+  const Image& ego_mask() const { return view_masks_[0].ego_mask(); }
 
   /// Whether features depend on the motion: of rolling shutters, or in depth images of other times.
   bool needs_motion(const FrameImages& images) const;
@@ -93,6 +101,7 @@ class FrameBuilder {
 
   Rig rig_;
   FrameSettings settings_;
+  bool is_auto_masked_;
   FeatureExtractor extractor_;
   std::vector<ViewMask> view_masks_;  // Per camera of the rig.
   std::optional<SeamPadding> seam_;   // Where the columns of camera 0 repeat.

@@ -2,6 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <string>
+
+#include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 
 namespace waymark {
@@ -74,11 +77,20 @@ struct DepthSettings {
   }
 };
 
-/// Directions that are not used, for what moves with the camera.
+/// What is not used, since it moves along with the camera.
 struct ViewSettings {
   double max_angle_deg = 180.0;  ///< Off the optical axis.
   double top_deg = 0.0;          ///< Around straight up, -y of the camera.
   double bottom_deg = 0.0;       ///< Around straight down, +y of the camera.
+  std::string auto_mask = "on";  ///< "on": what moves along is looked for as well; "off".
+
+  /// Whether what moves along is looked for. InputError for another word.
+  bool is_auto_masked() const {
+    if (auto_mask != "on" && auto_mask != "off") {
+      throw InputError("view.auto_mask", "is " + auto_mask + ", expected on or off");
+    }
+    return auto_mask == "on";
+  }
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -102,6 +114,11 @@ struct ViewSettings {
                       .unit = "degrees",
                       .help = "No features closer than this to straight down (+y), where whoever "
                               "carries a 360 degree camera is."});
+    field(
+        "auto_mask",
+        self.auto_mask,
+        SettingInfo{.help = "Find what moves along with the camera, as a bonnet or burnt-in text, "
+                            "and keep it free of features: on or off."});
   }
 };
 

@@ -146,6 +146,18 @@ double lit_radius(ImageView image, const Eigen::Vector2d& center) {
   return end + kMinRings > num_pixels.size() ? INFINITY : static_cast<double>(end);
 }
 
+/// The levels, all of them if empty, or 0 where the mask is 0. Keeps the buffer.
+void combine(const Image& levels, ImageView mask, Image& result) {
+  if (result.values.empty()) result = Image(mask.width_px, mask.height_px);
+  for (int y = 0; y < mask.height_px; ++y) {
+    const std::uint8_t* const allowed = levels.values.empty() ? nullptr : levels.row(y);
+    for (int x = 0; x < mask.width_px; ++x) {
+      const std::uint8_t count = allowed ? allowed[x] : Pyramid::kNumLevels;
+      result.row(y)[x] = mask.at(x, y) == 0 ? 0 : count;
+    }
+  }
+}
+
 }  // namespace
 
 std::vector<float> distances_to_zero(ImageView image) {
@@ -169,7 +181,8 @@ ViewMask::ViewMask(std::shared_ptr<const Camera> camera, const ViewSettings& set
       center_px_(principal_point(*camera_)),
       may_have_circle_(is_wide(*camera_)),
       has_bearing_(test_bearings(*camera_, [](const Eigen::Vector3d* b) { return b != nullptr; })),
-      is_direction_(directions_in_use(*camera_, settings)) {
+      is_direction_(directions_in_use(*camera_, settings)),
+      ego_(camera_) {
   update();
 }
 
@@ -183,12 +196,29 @@ void ViewMask::learn(ImageView image) {
   update();
 }
 
+void ViewMask::watch(ImageView image,
+                     const Eigen::Quaterniond& world_from_cam,
+                     bool is_same_world) {
+  if (!is_same_world) ego_.restart();
+  const ImageView levels = lens_levels_.values.empty() ? ImageView() : lens_levels_.view();
+  if (ego_.watch(image, levels, world_from_cam)) exclude_ego();
+}
+
+void ViewMask::exclude_ego() {
+  const Image& mask = ego_.mask();
+  if (mask.values.empty()) {
+    num_levels_ = lens_levels_;
+  } else {
+    combine(lens_levels_, mask.view(), num_levels_);
+  }
+}
+
 void ViewMask::update() {
-  num_levels_ = Image();
+  lens_levels_ = Image();
   const bool has_circle = circle_radius_px_ > 0.0 && std::isfinite(circle_radius_px_);
   const bool has_surroundings = has_circle || !has_bearing_.values.empty();
-  if (!has_surroundings && is_direction_.values.empty()) return;
-  num_levels_ = Image(camera_->width_px(), camera_->height_px());
+  if (!has_surroundings && is_direction_.values.empty()) return exclude_ego();
+  lens_levels_ = Image(camera_->width_px(), camera_->height_px());
   Image is_scene = has_bearing_;
   if (is_scene.values.empty()) {
     is_scene = Image(camera_->width_px(), camera_->height_px());
@@ -207,20 +237,14 @@ void ViewMask::update() {
       ++count;
     }
     if (!is_direction_.values.empty() && is_direction_.values[i] == 0) count = 0;
-    num_levels_.values[i] = static_cast<std::uint8_t>(count);
+    lens_levels_.values[i] = static_cast<std::uint8_t>(count);
   }
+  exclude_ego();
 }
 
 ImageView ViewMask::num_levels(ImageView other) {
   if (other.is_empty()) return num_levels_.values.empty() ? ImageView() : num_levels_.view();
-  if (combined_.values.empty()) combined_ = Image(camera_->width_px(), camera_->height_px());
-  for (int y = 0; y < combined_.height_px; ++y) {
-    const std::uint8_t* const allowed = num_levels_.values.empty() ? nullptr : num_levels_.row(y);
-    for (int x = 0; x < combined_.width_px; ++x) {
-      const std::uint8_t levels = allowed ? allowed[x] : Pyramid::kNumLevels;
-      combined_.row(y)[x] = other.at(x, y) == 0 ? 0 : levels;
-    }
-  }
+  combine(num_levels_, other, combined_);
   return combined_.view();
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/camera/camera.h"
+#include "waymark/image/ego_mask.h"
 #include "waymark/image/image.h"
 #include "waymark/image/settings.h"
 
@@ -18,7 +19,8 @@ namespace waymark {
 std::vector<float> distances_to_zero(ImageView image);
 
 /// Where in the images of a camera features may be. Kept free are pixels without a bearing, the
-/// black surroundings of a lens's image circle, and directions that the settings exclude.
+/// black surroundings of a lens's image circle, directions that the settings exclude, and what is
+/// found to move along with the camera.
 class ViewMask {
  public:
   /// The first images that are searched for black surroundings; an image may be dark all over.
@@ -31,6 +33,13 @@ class ViewMask {
   /// images of a camera that is wide enough to have one; returns at once afterwards.
   void learn(ImageView image);
 
+  /// Looks for what moves along with the camera, see EgoMask. is_same_world: whether the direction
+  /// can be compared with the last one.
+  void watch(ImageView image, const Eigen::Quaterniond& world_from_cam, bool is_same_world);
+
+  /// What was found to move along, see EgoMask::mask().
+  const Image& ego_mask() const { return ego_.mask(); }
+
   /// How many pyramid levels may have features at each pixel: a feature's patch does not touch the
   /// surroundings. 0 as well where the other mask, empty or of the same size, is 0. Empty where
   /// there are no limits. Stays valid until the next call.
@@ -41,6 +50,7 @@ class ViewMask {
 
  private:
   void update();
+  void exclude_ego();
 
   std::shared_ptr<const Camera> camera_;
   Eigen::Vector2d center_px_;
@@ -49,7 +59,9 @@ class ViewMask {
   int num_learned_ = 0;
   Image has_bearing_;   // 1 or 0; empty: all have.
   Image is_direction_;  // 1 or 0 by the settings; empty: all are used.
-  Image num_levels_;    // Empty: no limits.
+  EgoMask ego_;
+  Image lens_levels_;  // As num_levels_, but for what moves along.
+  Image num_levels_;   // Empty: no limits.
   Image combined_;
 };
 

@@ -380,6 +380,7 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "view.max_angle_deg",
                                               "view.top_deg",
                                               "view.bottom_deg",
+                                              "view.auto_mask",
                                               "tracking.min_inliers",
                                               "tracking.keyframe_ratio",
                                               "tracking.keyframe_parallax_px",

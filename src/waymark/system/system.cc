@@ -102,6 +102,7 @@ class System::Impl {
   std::vector<CalibrationEstimate> calibration() const;
   const FocalCheck* focal_check() const;
   const FrameDetails& details() const { return details_; }
+  const Image& ego_mask() const { return builder_.ego_mask(); }
 
  private:
   void make_tracker(bool has_range);
@@ -128,6 +129,7 @@ class System::Impl {
   PublishedMap visible_;
   FrameId last_due_;  ///< The global adjustment that was asked for last.
   FrameDetails details_;
+  SubmapId watched_submap_;  ///< Of the last frame with a pose.
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   int num_relocalizations_ = 0;
   bool is_finished_ = false;
@@ -167,6 +169,11 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
     look_at_map(id);
   }
   TrackOutcome outcome = tracker_->track(frame, visible_.snapshot, result.stages);
+  if (outcome.world_from_rig) {
+    const bool is_same_world = outcome.submap == watched_submap_;
+    builder_.watch(images.image0, outcome.world_from_rig->inverse(), is_same_world);
+    watched_submap_ = outcome.submap;
+  }
   memory_.add(frame, outcome, *map());
   num_relocalizations_ += outcome.is_relocalized;
   result.frame = FrameId{id.value - memory_.first().value};
@@ -372,6 +379,7 @@ void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
 const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
+Image System::ego_mask() const { return impl_->ego_mask(); }
 std::shared_ptr<const Rig> System::rig() const { return impl_->rig(); }
 std::vector<CalibrationEstimate> System::calibration() const { return impl_->calibration(); }
 const FrameDetails& System::details() const { return impl_->details(); }

@@ -96,6 +96,10 @@ class System {
   /// did not contradict it. After finish(): final.
   std::vector<CalibrationEstimate> calibration() const;
 
+  /// What was found to move along with camera 0 by now: 0 there, else 255, in the size of its
+  /// image; empty while nothing was.
+  Image ego_mask() const;
+
   /// The newest finished map, immutable.
   std::shared_ptr<const Map> map() const;
 
