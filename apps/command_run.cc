@@ -52,6 +52,12 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                   summary.submaps));
   report_reasons(reporter, results.table);
   if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
+  if (!results.ego_mask.values.empty()) {
+    reporter.info(
+        fmt::format("{:.1f} % of the image moves along with the camera and has no features: {}",
+                    100.0 * summary.moves_along.value_or(0.0),
+                    (options.report.out / "view_mask.png").string()));
+  }
   const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
   reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
                             format_duration(summary.wall_s),

@@ -160,6 +160,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["loops"] = summary.loops;
   json["relocalizations"] = summary.relocalizations;
   if (summary.quality) json["quality"] = to_json(*summary.quality);
+  if (summary.moves_along) json["moves_along"] = *summary.moves_along;
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
   if (!summary.refined_calibration.empty()) {
     json["refined_calibration"] = to_json(summary.refined_calibration);

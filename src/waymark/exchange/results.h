@@ -106,6 +106,7 @@ struct RunSummary {
   std::string version;                   ///< Of the program.
   std::optional<std::size_t> localized;  ///< Of localize only.
   std::optional<RunQuality> quality;     ///< Of run only.
+  std::optional<double> moves_along;  ///< Of run only: part of the image, see System::ego_mask().
   /// Of run only: what seems to be wrong with the calibration and the time stamps, in words.
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.

@@ -13,6 +13,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/export_scene.h"
+#include "waymark/input/decode.h"
 #include "waymark/session/quality.h"
 
 namespace waymark {
@@ -86,6 +87,22 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system, F
   return poses;
 }
 
+double ego_share(const Image& mask) {
+  if (mask.values.empty()) return 0.0;
+  return static_cast<double>(std::ranges::count(mask.values, 0)) /
+         static_cast<double>(mask.values.size());
+}
+
+/// Or removes that of an earlier run.
+void write_ego_mask(const std::filesystem::path& path, const Image& mask) {
+  std::error_code error;
+  if (mask.values.empty()) {
+    std::filesystem::remove(path, error);
+  } else {
+    write_file_atomically(path, encode_png(mask));
+  }
+}
+
 }  // namespace
 
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
@@ -113,6 +130,8 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.table = std::move(frames.table);
   results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
+  results.ego_mask = system.ego_mask();
+  results.summary.moves_along = ego_share(results.ego_mask);
   if (hooks.watch) results.summary.mistakes = hooks.watch->mistakes();
   results.failure = frames.failure;
   usage.write_to(results.summary);
@@ -146,6 +165,7 @@ void write_results(const std::filesystem::path& folder, const SessionResults& re
                    folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
              },
              [&] { write_summary_json(folder, results.summary); },
+             [&] { write_ego_mask(folder / "view_mask.png", results.ego_mask); },
              [&] { write_frames_csv(folder, results.table); }});
 }
 

@@ -28,6 +28,7 @@ struct SessionResults {
   std::vector<std::vector<StampedPose>> trajectories;
   std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
   RunSummary summary;
+  Image ego_mask;  ///< What was found to move along with camera 0, see System::ego_mask().
   /// What ended the session before its input did; the rest is what there was until then.
   std::exception_ptr failure;
 };
@@ -57,8 +58,8 @@ void add_trajectories(const Map& map,
 /// that they cannot be written. Throws OutputError.
 void prepare_results(const std::filesystem::path& folder);
 
-/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv and summary.json, each
-/// whatever becomes of the others; throws OutputError.
+/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv, summary.json and, where
+/// something moves along, view_mask.png, each whatever becomes of the others; throws OutputError.
 void write_results(const std::filesystem::path& folder, const SessionResults& results);
 
 /// "inline", "lockstep", "realtime".

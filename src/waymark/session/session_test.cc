@@ -8,6 +8,7 @@
 
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
+#include "waymark/input/decode.h"
 #include "waymark/session/merging.h"
 #include "waymark/session/quality.h"
 #include "waymark/session/testing/memory_input.h"
@@ -102,6 +103,64 @@ TEST(RunSession, GoesFromInputToResults) {
   EXPECT_FALSE(std::filesystem::exists(folder / "trajectory_1.txt"));
   EXPECT_THAT(read_text_file(folder / "frames.csv", "a table"), HasSubstr("\n10,"));
   EXPECT_THAT(read_text_file(folder / "summary.json", "a summary"), HasSubstr("\"unreadable\": 1"));
+}
+
+/// Walks to and fro in a room behind a patterned bonnet at the bottom of the image.
+std::vector<InputFrame> frames_behind_bonnet(std::size_t count) {
+  constexpr std::size_t kWay = 20;
+  SequenceSpec spec = small_spec();
+  spec.motion = "loop";
+  spec.num_frames = 200;
+  SimulatedSequence sequence(spec, std::thread::hardware_concurrency());
+  std::vector<SimulatedFrame> way;
+  for (int i = 0; i <= static_cast<int>(kWay); ++i) {
+    Image& image = way.emplace_back(sequence.frame(i)).images[0];
+    for (int y = 200; y < 240; ++y) {
+      for (int x = 90; x < 230; ++x) {
+        image.row(y)[x] = static_cast<std::uint8_t>((x / 4 * 37 ^ y / 4 * 91) % 251);
+      }
+    }
+  }
+  std::vector<InputFrame> frames(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const std::size_t turn = i % (2 * kWay);
+    const SimulatedFrame& simulated = way[std::min(turn, 2 * kWay - turn)];
+    frames[i].index = i;
+    frames[i].timestamp_ns = 50'000'000 * static_cast<std::int64_t>(i);
+    frames[i].images = simulated.images;
+    frames[i].depth = simulated.depth;
+  }
+  return frames;
+}
+
+TEST(RunSession, KeepsFeaturesOffWhatMovesAlong) {
+  const std::vector<InputFrame> frames = frames_behind_bonnet(100);
+  const testing::TemporaryFolder folder;
+  std::vector<std::vector<StampedPose>> trajectories;
+  for (const Timing timing : {Timing::kInline, Timing::kLockstep}) {
+    MemoryInput input(frames);
+    System system(small_rig(), small_settings(), timing);
+    const SessionResults results = run_session(input, system);
+    EXPECT_NEAR(results.summary.moves_along.value_or(0.0), 140.0 * 40.0 / (320.0 * 240.0), 0.02);
+    for (const Keypoint& keypoint : system.details().features->keypoints) {
+      EXPECT_FALSE(keypoint.y_px > 205.0f && std::abs(keypoint.x_px - 160.0f) < 60.0f);
+    }
+    write_results(folder.path(), results);
+    const std::optional<Image> mask = read_grey_image(folder / "view_mask.png");
+    ASSERT_TRUE(mask);
+    EXPECT_EQ(mask->values, system.ego_mask().values);
+    trajectories.push_back(results.trajectories.at(0));
+  }
+  ASSERT_EQ(trajectories[0].size(), trajectories[1].size());
+  EXPECT_EQ(trajectories[0].back().world_from_camera.matrix(),
+            trajectories[1].back().world_from_camera.matrix());
+
+  MemoryInput input({frames.begin(), frames.begin() + 3});
+  System system(small_rig(), small_settings(), Timing::kInline);
+  const SessionResults results = run_session(input, system);
+  EXPECT_EQ(results.summary.moves_along, 0.0);
+  write_results(folder.path(), results);
+  EXPECT_FALSE(std::filesystem::exists(folder / "view_mask.png")) << "of an earlier run";
 }
 
 TEST(RunSession, EndsEarlyWithWhatItHas) {
