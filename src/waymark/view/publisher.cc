@@ -24,6 +24,22 @@ Image copy_of(const ImageView& view) {
   return image;
 }
 
+/// Darkens what is not used: where the mask, which may be empty, is 0.
+void darken(const ImageView& mask, Image& image) {
+  for (int y = 0; y < mask.height_px; ++y) {
+    for (int x = 0; x < mask.width_px; ++x) {
+      if (mask.at(x, y) == 0) image.row(y)[x] /= 3;
+    }
+  }
+}
+
+Image drawn_image(const System& system, const FrameImages& input) {
+  Image image = copy_of(input.image0);
+  darken(input.mask, image);
+  darken(system.ego_mask().view(), image);
+  return image;
+}
+
 FeatureColors colors_of(const FrameDetails& details, const ImageView& image) {
   FeatureColors colors;
   colors.frame = details.frame;
@@ -69,7 +85,7 @@ void ViewPublisher::tell(const System& system,
                                                                   input.image0.height_px,
                                                                   details.features,
                                                                   details.landmarks,
-                                                                  copy_of(input.image0)});
+                                                                  drawn_image(system, input)});
   }
   push();
 }

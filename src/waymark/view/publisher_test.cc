@@ -134,6 +134,18 @@ TEST_F(Publisher, GivesAnImageWhereOneIsWished) {
   EXPECT_EQ(listener_.last().image, nullptr);
 }
 
+TEST_F(Publisher, DarkensWhatIsMasked) {
+  listener_.channel.wants_image = true;
+  FrameImages input = session_.input();
+  Image mask(kWidth, kHeight);
+  for (int y = 0; y < kHeight; ++y) std::fill_n(mask.row(y), kWidth / 2, 255);
+  input.mask = mask.view();
+  feed(input);
+  const ImageView image = listener_.last().image->image.view();
+  EXPECT_EQ(image.at(17, 33), input.image0.at(17, 33));
+  EXPECT_EQ(image.at(kWidth - 17, 33), input.image0.at(kWidth - 17, 33) / 3);
+}
+
 TEST_F(Publisher, CountsLossesAndFramesThatWereNotFed) {
   feed(session_.input());
   feed(session_.black_input());
