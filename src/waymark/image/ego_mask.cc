@@ -7,6 +7,7 @@
 #include <cmath>
 #include <utility>
 
+#include "waymark/base/median.h"
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/image/convert.h"
 
@@ -28,6 +29,12 @@ constexpr double kMaxUnturnedPart = 0.5;
 /// The part of the gradients that stays, beyond that of a world at infinity: .15 at most in
 /// recordings in which nothing moves along, .3 to .9 of burnt-in text (docs/decisions.md).
 constexpr double kAlong = 0.25, kNotAlong = 0.1;
+/// So many landmarks within this distance, in the median, are where they were.
+constexpr std::size_t kMinAnchors = 8;
+constexpr double kRestingPx = 1.5;
+/// Of the images of a window, in which what the places rest on stays. Where the camera rests so
+/// long, kAlongAtRest of the gradients are left anywhere.
+constexpr double kRestingPart = 0.75, kAlongAtRest = 0.5, kMaxAlongPartAtRest = 0.25;
 /// Where more of the image stays it is the camera that does, whatever its direction.
 constexpr double kMaxAlongPart = 0.5;
 /// What comes in from the upper or lower edge is as high, in parts of the image: where all
@@ -112,14 +119,15 @@ EgoMask::EgoMask(std::shared_ptr<const Camera> camera)
   }
 }
 
-bool EgoMask::watch(ImageView image, ImageView levels, const Eigen::Quaterniond& world_from_cam) {
+bool EgoMask::watch(const LocatedImage& located, ImageView levels) {
   if (++num_passed_ < interval_) return false;
   num_passed_ = 0;
-  directions_.push_back(world_from_cam);
+  note_landmarks(located);
+  directions_.push_back(located.world_from_cam);
   if (factor_ < 1.0) {
-    accumulate(reduce(image, factor_).view());
+    accumulate(reduce(located.image, factor_).view());
   } else {
-    accumulate(image);
+    accumulate(located.image);
   }
   if (directions_.size() < kNumImages) return false;
   const bool has_changed = judge(levels);
@@ -130,8 +138,31 @@ bool EgoMask::watch(ImageView image, ImageView levels, const Eigen::Quaterniond&
 
 void EgoMask::restart() {
   directions_.clear();
+  num_resting_ = 0;
   std::ranges::fill(gradients_, Eigen::Vector2i::Zero());
   std::ranges::fill(structures_, Structure{});
+}
+
+void EgoMask::note_landmarks(const LocatedImage& located) {
+  const bool is_first = directions_.empty();
+  if (is_first) anchors_.clear();
+  std::vector<double> distances_px;
+  for (std::size_t i = 0; i < located.landmarks.size(); ++i) {
+    const LandmarkId id = located.landmarks[i];
+    const Keypoint& keypoint = located.features.keypoints[i];
+    if (!id.is_valid() || keypoint.camera != 0) continue;
+    const Eigen::Vector2f pixel(keypoint.x_px, keypoint.y_px);
+    if (is_first) {
+      anchors_.emplace_back(id, pixel);
+      continue;
+    }
+    const auto by_id = [](const auto& anchor) { return anchor.first; };
+    const auto anchor = std::ranges::lower_bound(anchors_, id, {}, by_id);
+    if (anchor == anchors_.end() || anchor->first != id) continue;
+    distances_px.push_back((anchor->second - pixel).norm());
+  }
+  if (is_first) std::ranges::sort(anchors_, {}, [](const auto& anchor) { return anchor.first; });
+  num_resting_ += distances_px.size() >= kMinAnchors && median(distances_px) < kRestingPx;
 }
 
 void EgoMask::accumulate(ImageView image) {
@@ -185,7 +216,33 @@ double EgoMask::unturned_part(std::size_t cell) const {
 }
 
 bool EgoMask::judge(ImageView levels) {
-  const std::vector<Structure> means = mean_structures();
+  const double num_images = static_cast<double>(directions_.size());
+  const bool rests = static_cast<double>(num_resting_) > kRestingPart * num_images;
+  const double along = rests ? kAlongAtRest : kAlong;
+  std::vector<std::uint8_t> found = is_along_;
+  int num_told = 0, num_along = 0;
+  const std::vector<std::optional<double>> staying = staying_parts(levels);
+  for (std::size_t i = 0; i < found.size(); ++i) {
+    if (!staying[i]) continue;
+    const double unturned = rests ? 0.0 : unturned_part(i);
+    if (unturned > kMaxUnturnedPart) continue;
+    const double beyond = (*staying[i] - unturned) / (1.0 - unturned);
+    ++num_told;
+    num_along += beyond > along;
+    if (beyond > along) found[i] = 1;
+    if (beyond < kNotAlong) found[i] = 0;
+  }
+  const double max_part = rests ? kMaxAlongPartAtRest : kMaxAlongPart;
+  if (num_told == 0 || num_along > max_part * num_told) return false;
+  interval_ = kLaterInterval;
+  if (found == is_along_) return false;
+  is_along_ = std::move(found);
+  return true;
+}
+
+/// Part of the gradients that stays, per cell: in the direction in which least does, as the world
+/// may move along its lines. Nothing where there is too little structure to tell.
+std::vector<std::optional<double>> EgoMask::staying_parts(ImageView levels) const {
   std::vector<std::uint8_t> has_features(is_along_.size(), 1);
   if (!levels.is_empty()) {
     visit_cells(
@@ -193,34 +250,22 @@ bool EgoMask::judge(ImageView levels) {
           for (int x = first; x < end; ++x) has_features[cell] &= levels.at(x, y) != 0;
         });
   }
+  const std::vector<Structure> means = mean_structures();
   const double num_images = static_cast<double>(directions_.size());
   const double num_pixels =
       static_cast<double>(gradients_.size()) / static_cast<double>(is_along_.size());
   const double min_structure = num_images * num_pixels * std::pow(kMinGrayPerPx * kSobelSum, 2);
-  std::vector<std::uint8_t> found = is_along_;
-  int num_told = 0, num_along = 0;
-  for (std::size_t i = 0; i < found.size(); ++i) {
+  std::vector<std::optional<double>> result(is_along_.size());
+  for (std::size_t i = 0; i < result.size(); ++i) {
+    if (!has_features[i] || bearings_[i].isZero()) continue;
     const Eigen::Matrix2d all = matrix(structures_[i]);
-    // In the direction in which least stays: the world may move along its lines.
-    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> least(all, Eigen::EigenvaluesOnly);
-    if (!has_features[i] || bearings_[i].isZero() || least.eigenvalues()[0] < min_structure)
-      continue;
-    const double unturned = unturned_part(i);
-    if (unturned > kMaxUnturnedPart) continue;
-    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> ratio(
+    const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2d> structure(all, Eigen::EigenvaluesOnly);
+    if (structure.eigenvalues()[0] < min_structure) continue;
+    const Eigen::GeneralizedSelfAdjointEigenSolver<Eigen::Matrix2d> part(
         matrix(means[i]), all, Eigen::EigenvaluesOnly);
-    const double staying = ratio.eigenvalues()[0] / num_images;
-    const double beyond = (staying - unturned) / (1.0 - unturned);
-    ++num_told;
-    num_along += beyond > kAlong;
-    if (beyond > kAlong) found[i] = 1;
-    if (beyond < kNotAlong) found[i] = 0;
+    result[i] = part.eigenvalues()[0] / num_images;
   }
-  if (num_told == 0 || num_along > kMaxAlongPart * num_told) return false;
-  interval_ = kLaterInterval;
-  if (found == is_along_) return false;
-  is_along_ = std::move(found);
-  return true;
+  return result;
 }
 
 /// Per cell whether it moves along, with what lies between what was found and the upper or the

@@ -6,18 +6,31 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
+#include <utility>
 #include <vector>
 
+#include "waymark/base/id.h"
 #include "waymark/camera/camera.h"
+#include "waymark/image/features.h"
 #include "waymark/image/image.h"
 
 namespace waymark {
+
+/// An image of camera 0 that was located.
+struct LocatedImage {
+  ImageView image;
+  Eigen::Quaterniond world_from_cam;
+  const Features& features;               ///< Seen in it.
+  std::span<const LandmarkId> landmarks;  ///< That the place rests on: per feature, or invalid.
+};
 
 /// Finds what moves along with the camera: a bonnet, whoever carries it, text that is burnt in.
 /// There the mean of the image's gradients over many frames is as large as the gradients are, while
 /// those of a world that moves cancel out (as those behind a watermark do, Dekel et al. 2017). How
 /// much would remain of a world at infinity follows from the directions that the camera looked in:
-/// while it does not turn, nothing is told.
+/// while it does not turn, nothing is told. But where what the places rest on stays on its pixels,
+/// and nearly all of the image moves, they rest on what moves along.
 class EgoMask {
  public:
   /// Images that are judged at once.
@@ -25,10 +38,9 @@ class EgoMask {
 
   explicit EgoMask(std::shared_ptr<const Camera> camera);
 
-  /// Looks at the next image of which the direction is known: at every third, and once they told
-  /// something at every tenth. levels: 0 where there are no features anyway; empty: nowhere. Gives
-  /// whether the mask changed.
-  bool watch(ImageView image, ImageView levels, const Eigen::Quaterniond& world_from_cam);
+  /// Looks at the next image: at every third, and once they told something at every tenth. levels:
+  /// 0 where there are no features anyway; empty: nowhere. Gives whether the mask changed.
+  bool watch(const LocatedImage& located, ImageView levels);
 
   /// From here on the directions are in another world.
   void restart();
@@ -42,9 +54,11 @@ class EgoMask {
     double xx = 0.0, xy = 0.0, yy = 0.0;
   };
 
+  void note_landmarks(const LocatedImage& located);
   void accumulate(ImageView image);
   std::vector<Structure> mean_structures() const;
   bool judge(ImageView levels);
+  std::vector<std::optional<double>> staying_parts(ImageView levels) const;
   double unturned_part(std::size_t cell) const;
   std::vector<std::uint8_t> region() const;
   void draw();
@@ -57,10 +71,13 @@ class EgoMask {
   std::vector<Eigen::Vector3d> bearings_;  ///< Of the cells' centres; zero where there is none.
   std::vector<double> pixels_rad_;         ///< What a pixel of the reduced image covers there.
   std::vector<Eigen::Quaterniond> directions_;  ///< Of the images so far.
-  int width_px_ = 0, height_px_ = 0;            ///< Of the reduced image.
-  std::vector<Eigen::Vector2i> gradients_;      ///< Their sums over the images, per pixel.
-  std::vector<Structure> structures_;           ///< Sums over the images, per cell.
-  std::vector<std::uint8_t> is_along_;          ///< Per cell, by the images judged last that told.
+  /// What the place of the first image rests on, and where it was seen.
+  std::vector<std::pair<LandmarkId, Eigen::Vector2f>> anchors_;
+  std::size_t num_resting_ = 0;             ///< Images in which they are still there.
+  int width_px_ = 0, height_px_ = 0;        ///< Of the reduced image.
+  std::vector<Eigen::Vector2i> gradients_;  ///< Their sums over the images, per pixel.
+  std::vector<Structure> structures_;       ///< Sums over the images, per cell.
+  std::vector<std::uint8_t> is_along_;      ///< Per cell, by the images judged last that told.
   Image mask_;
 };
 

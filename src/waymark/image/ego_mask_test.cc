@@ -62,6 +62,24 @@ void overlay(const EgoBox& box, Image& image) {
   }
 }
 
+/// Where there are no landmarks, or ten that are always at the same place.
+LocatedImage located(const Image& image,
+                     const Eigen::Quaterniond& world_from_cam,
+                     bool has_landmarks = false) {
+  static const std::vector<LandmarkId> landmarks = [] {
+    std::vector<LandmarkId> ids;
+    for (std::uint32_t i = 0; i < 10; ++i) ids.push_back(LandmarkId{i});
+    return ids;
+  }();
+  static const Features features = [] {
+    Features result;
+    result.keypoints.resize(landmarks.size());
+    return result;
+  }();
+  if (!has_landmarks) return {image.view(), world_from_cam, features, {}};
+  return {image.view(), world_from_cam, features, landmarks};
+}
+
 /// Part of a box that is masked, or of everything else.
 double masked_part(const Image& mask, const EgoBox& box) {
   if (mask.values.empty()) return 0.0;
@@ -81,7 +99,7 @@ void watch_turning(EgoMask& mask, int first, int end, const std::vector<EgoBox>&
   for (int i = first; i < end; ++i) {
     Image image = seen_after(turn_px(i));
     for (const EgoBox& box : drawn) overlay(box, image);
-    const bool has_changed = mask.watch(image.view(), {}, direction_of(turn_px(i)));
+    const bool has_changed = mask.watch(located(image, direction_of(turn_px(i))), {});
     ASSERT_TRUE(!has_changed || i == kFirstImages - 1 || i >= kSecondImages) << i;
   }
 }
@@ -117,7 +135,7 @@ TEST(EgoMask, LeavesWhatHasNoFeaturesAnyway) {
   for (int i = 0; i < kFirstImages; ++i) {
     Image image = seen_after(turn_px(i));
     overlay(kText, image);
-    mask.watch(image.view(), levels.view(), direction_of(turn_px(i)));
+    mask.watch(located(image, direction_of(turn_px(i))), levels.view());
   }
   EXPECT_TRUE(mask.mask().values.empty());
 }
@@ -128,7 +146,29 @@ TEST(EgoMask, TellsNothingWhileTheCameraDoesNotTurn) {
   for (int i = 0; i < kFirstImages; ++i) {
     Image image = seen_after(turn_px(i));
     overlay({180, 80, 300, 110}, image);
-    mask.watch(image.view(), {}, direction_of(0.5 * (i % 2)));
+    mask.watch(located(image, direction_of(0.5 * (i % 2))), {});
+  }
+  EXPECT_TRUE(mask.mask().values.empty());
+}
+
+// As the directions say, but the image contradicts.
+TEST(EgoMask, FindsWhatThePlacesRestOn) {
+  EgoMask mask(make_ego_camera());
+  for (int i = 0; i < kFirstImages; ++i) {
+    Image image = seen_after(turn_px(i));
+    overlay(kText, image);
+    mask.watch(located(image, direction_of(0.0), true), {});
+  }
+  EXPECT_GT(masked_part(mask.mask(), kText), 0.4);
+  EXPECT_LT(masked_part(mask.mask()), 0.05);
+}
+
+TEST(EgoMask, TellsNothingWhereThePlacesRestOnTheWorld) {
+  EgoMask mask(make_ego_camera());
+  for (int i = 0; i < kFirstImages; ++i) {
+    Image image = seen_after(0);
+    overlay({100 + i, 90, 220 + i, 200}, image);  // Something passes.
+    mask.watch(located(image, direction_of(0.0), true), {});
   }
   EXPECT_TRUE(mask.mask().values.empty());
 }
@@ -139,7 +179,7 @@ TEST(EgoMask, TellsNothingWhileTheCameraIsAtRest) {
   for (int i = 0; i < kFirstImages; ++i) {
     Image image = seen_after(0);
     overlay({100 + i, 90, 220 + i, 200}, image);  // Something passes.
-    mask.watch(image.view(), {}, direction_of(turn_px(i)));
+    mask.watch(located(image, direction_of(turn_px(i))), {});
   }
   EXPECT_TRUE(mask.mask().values.empty());
 }
@@ -164,7 +204,7 @@ TEST(EgoMask, BelongsTogetherBelowWhatSeesAllAround) {
     Image image = seen_after(turn_px(i));
     for (const int left : {100, 160, 220}) overlay({left, 180, left + 40, 200}, image);
     const Eigen::AngleAxisd turned(turn_px(i) * rad_per_px, Eigen::Vector3d::UnitY());
-    mask.watch(image.view(), {}, Eigen::Quaterniond(turned));
+    mask.watch(located(image, Eigen::Quaterniond(turned)), {});
   }
   EXPECT_EQ(masked_part(mask.mask(), {100, 190, 260, kEgoHeightPx}), 1.0);
   EXPECT_EQ(masked_part(mask.mask(), {0, 0, kEgoWidthPx, 180}), 0.0);
@@ -177,8 +217,7 @@ TEST(EgoMask, IsWhatASettingAsksFor) {
     for (int i = 0; i < kFirstImages; ++i) {
       Image image = seen_after(turn_px(i));
       overlay(kBonnet, image);
-      const Rigid3 world_from_rig(direction_of(turn_px(i)), Eigen::Vector3d::Zero());
-      builder.watch(image.view(), world_from_rig.inverse(), true);
+      builder.watch(located(image, direction_of(turn_px(i))), true);
     }
     return masked_part(builder.ego_mask(), kBonnet);
   };

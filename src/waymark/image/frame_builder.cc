@@ -151,10 +151,8 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images,
   return moved(std::move(features), rig_, motion);
 }
 
-void FrameBuilder::watch(ImageView image0, const Rigid3& rig_from_world, bool is_same_world) {
-  if (!is_auto_masked_) return;
-  const Rigid3 cam_from_world = rig_.cameras[0].cam_from_rig * rig_from_world;
-  view_masks_[0].watch(image0, cam_from_world.rotation.conjugate(), is_same_world);
+void FrameBuilder::watch(const LocatedImage& located, bool is_same_world) {
+  if (is_auto_masked_) view_masks_[0].watch(located, is_same_world);
 }
 
 bool FrameBuilder::needs_motion(const FrameImages& images) const {

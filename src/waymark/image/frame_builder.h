@@ -72,9 +72,9 @@ class FrameBuilder {
   /// and found in depth images of other times.
   std::shared_ptr<const Features> build(const FrameImages& images, const RigMotion& motion = {});
 
-  /// Looks for what moves along with camera 0 in an image that it took from a known place. From the
-  /// next image on it is kept free of features. is_same_world: whether places can be compared.
-  void watch(ImageView image0, const Rigid3& rig_from_world, bool is_same_world);
+  /// Looks for what moves along with camera 0. From the next image on it is kept free of features.
+  /// is_same_world: whether the landmarks and directions are in the same world as those before.
+  void watch(const LocatedImage& located, bool is_same_world);
 
   /// What was found: 0 where camera 0 shows what moves along with it, else 255; empty: nowhere.
   const Image& ego_mask() const { return view_masks_[0].ego_mask(); }

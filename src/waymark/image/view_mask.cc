@@ -196,12 +196,10 @@ void ViewMask::learn(ImageView image) {
   update();
 }
 
-void ViewMask::watch(ImageView image,
-                     const Eigen::Quaterniond& world_from_cam,
-                     bool is_same_world) {
+void ViewMask::watch(const LocatedImage& located, bool is_same_world) {
   if (!is_same_world) ego_.restart();
   const ImageView levels = lens_levels_.values.empty() ? ImageView() : lens_levels_.view();
-  if (ego_.watch(image, levels, world_from_cam)) exclude_ego();
+  if (ego_.watch(located, levels)) exclude_ego();
 }
 
 void ViewMask::exclude_ego() {

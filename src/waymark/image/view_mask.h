@@ -33,9 +33,9 @@ class ViewMask {
   /// images of a camera that is wide enough to have one; returns at once afterwards.
   void learn(ImageView image);
 
-  /// Looks for what moves along with the camera, see EgoMask. is_same_world: whether the direction
-  /// can be compared with the last one.
-  void watch(ImageView image, const Eigen::Quaterniond& world_from_cam, bool is_same_world);
+  /// Looks for what moves along with the camera, see EgoMask. is_same_world: whether directions
+  /// and landmarks can be compared with those of the last one.
+  void watch(const LocatedImage& located, bool is_same_world);
 
   /// What was found to move along, see EgoMask::mask().
   const Image& ego_mask() const { return ego_.mask(); }

@@ -170,8 +170,12 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   }
   TrackOutcome outcome = tracker_->track(frame, visible_.snapshot, result.stages);
   if (outcome.world_from_rig) {
-    const bool is_same_world = outcome.submap == watched_submap_;
-    builder_.watch(images.image0, outcome.world_from_rig->inverse(), is_same_world);
+    const Rigid3 world_from_cam = *outcome.world_from_rig * rig_->cameras[0].cam_from_rig.inverse();
+    builder_.watch({images.image0,
+                    world_from_cam.rotation,
+                    *outcome.details.features,
+                    outcome.details.landmarks},
+                   outcome.submap == watched_submap_);
     watched_submap_ = outcome.submap;
   }
   memory_.add(frame, outcome, *map());
