@@ -14,8 +14,8 @@
 namespace waymark {
 namespace {
 
-/// Larger images are reduced: what is looked for is not finer.
-constexpr double kMaxWidthPx = 1024.0;
+/// Images are reduced by a whole number to about this: what is looked for is not finer.
+constexpr double kUsualWidthPx = 1024.0;
 /// Cells in a row of the image; as many rows as make them square.
 constexpr int kColumns = 48;
 constexpr int kFirstInterval = 3, kLaterInterval = 10;
@@ -100,7 +100,7 @@ Eigen::Matrix2d matrix(const Structure& structure) {
 
 EgoMask::EgoMask(std::shared_ptr<const Camera> camera)
     : camera_(std::move(camera)),
-      factor_(std::min(1.0, kMaxWidthPx / camera_->width_px())),
+      factor_(1.0 / std::max(1.0, std::round(camera_->width_px() / kUsualWidthPx))),
       rows_(std::clamp(kColumns * camera_->height_px() / camera_->width_px(), 1, kColumns)),
       interval_(kFirstInterval),
       is_along_(static_cast<std::size_t>(rows_ * kColumns), 0) {
