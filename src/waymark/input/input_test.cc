@@ -250,6 +250,19 @@ TEST(Mask, OnePerFrameByName) {
               HasSubstr("masks: no mask has the name of a frame"));
 }
 
+TEST(Mask, OnePerFrameInOrderWhereNamesDiffer) {
+  const TemporaryFolder folder;
+  make_images(folder / "images", 11);
+  for (int i = 0; i < 11; ++i) {
+    write_image(folder / ("masks/m" + std::to_string(100 + i) + ".png"), 16, 12, 10 * i);
+  }
+  InputOptions options;
+  options.mask = folder / "masks";
+  options.first = 2;
+  const std::unique_ptr<Input> input = open_input(folder.path(), options);
+  for (int i = 2; i < 11; ++i) EXPECT_EQ(input->next()->mask->view().at(0, 0), 10 * i);
+}
+
 /// Frames of value 20, 40, ... at 10 per second.
 void make_video(const std::filesystem::path& path, int num_frames) {
   cv::VideoWriter writer(

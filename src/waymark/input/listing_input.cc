@@ -36,7 +36,7 @@ ListingInput::ListingInput(const std::filesystem::path& path,
       choose_calibration(path, options.calibration, listing_.calibration, info_.setup);
   std::vector<std::string> stems;
   for (const ListedFrame& frame : listing_.frames) stems.push_back(stem_of(frame));
-  masks_.expect_one_of(stems);
+  masks_.match(stems);
   check_first_frame(find_first_readable());
   check_first_depth();
   describe(path, options);

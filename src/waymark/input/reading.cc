@@ -83,7 +83,8 @@ std::string describe_calibration(bool is_given, const std::optional<CameraChain>
 MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
   if (path_.empty()) return;
   if (std::filesystem::is_directory(path_)) {
-    for (const std::filesystem::path& image : list_images(path_)) {
+    in_order_ = list_images(path_);
+    for (const std::filesystem::path& image : in_order_) {
       by_name_[image.stem().string()] = image;
     }
     return;
@@ -96,13 +97,18 @@ std::filesystem::path MaskSource::path_of(const std::string& stem) const {
   return fixed_ ? path_ : by_name_.at(stem);
 }
 
-void MaskSource::expect_one_of(const std::vector<std::string>& stems) const {
-  if (by_name_.empty()) return;
-  if (std::any_of(stems.begin(), stems.end(), [this](const auto& stem) { return has(stem); }))
-    return;
-  throw InputError(path_.string(),
-                   fmt::format("no mask has the name of a frame, expected {}.png or the like",
-                               stems.empty() ? "NAME" : stems.front()));
+void MaskSource::match(const std::vector<std::string>& stems) {
+  if (in_order_.empty()) return;
+  if (std::ranges::any_of(stems, [this](const auto& stem) { return has(stem); })) return;
+  if (in_order_.size() != stems.size()) {
+    throw InputError(path_.string(),
+                     fmt::format("no mask has the name of a frame, expected {}.png or the like, or "
+                                 "as many masks as frames: {}, there are {}",
+                                 stems.empty() ? "NAME" : stems.front(),
+                                 stems.size(),
+                                 in_order_.size()));
+  }
+  for (std::size_t i = 0; i < stems.size(); ++i) by_name_[stems[i]] = in_order_[i];
 }
 
 bool MaskSource::has(const std::string& stem) const { return fixed_ || by_name_.contains(stem); }

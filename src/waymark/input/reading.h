@@ -72,15 +72,15 @@ inline FrameSelection select_frames(const std::filesystem::path& path,
 }
 
 /// Masks of camera 0: one image for all frames, or a folder with one image per frame, named as the
-/// frame's image but for the extension.
+/// frame's image but for the extension, or else in the order of the frames.
 class MaskSource {
  public:
   /// Path empty: no masks. Throws InputError when it is missing or unreadable.
   explicit MaskSource(const std::filesystem::path& path);
 
-  /// Throws InputError for a folder of masks of which none belongs to a frame with one of these
-  /// names: a wrong name would otherwise go unnoticed.
-  void expect_one_of(const std::vector<std::string>& stems) const;
+  /// The names of all frames. Throws InputError for a folder of masks of which none has one of
+  /// them, unless they are as many: then they belong to the frames in their order.
+  void match(const std::vector<std::string>& stems);
 
   /// Whether the frame whose image has this name (without extension) has a mask.
   bool has(const std::string& stem) const;
@@ -97,6 +97,7 @@ class MaskSource {
 
   std::filesystem::path path_;
   std::optional<Image> fixed_;
+  std::vector<std::filesystem::path> in_order_;
   std::map<std::string, std::filesystem::path> by_name_;
 };
 

@@ -99,7 +99,7 @@ class VideoInput : public Input {
     selection_ = select_frames(path, options, num_frames);
     if (num_frames) {
       info_.num_frames = selection_.count(*num_frames);
-      expect_masks(*num_frames);
+      match_masks(*num_frames);
     }
     info_.calibration = choose_calibration(path, options.calibration, std::nullopt, info_.setup);
     start(path);
@@ -121,10 +121,10 @@ class VideoInput : public Input {
                             times_path.string());
   }
 
-  void expect_masks(std::size_t num_frames) const {
+  void match_masks(std::size_t num_frames) {
     std::vector<std::string> stems;
     for (std::size_t i = 0; i < num_frames; ++i) stems.push_back(mask_name(i));
-    masks_.expect_one_of(stems);
+    masks_.match(stems);
   }
 
   /// The next selected frame of any kind, or nothing at the end of video, times or selection.
