@@ -105,6 +105,13 @@ class PythonSystem {
     return check ? std::optional(*check) : std::nullopt;
   }
 
+  std::optional<py::array_t<std::uint8_t>> ego_mask() {
+    const Turn turn = take();
+    const Image mask = system_.ego_mask();
+    if (mask.values.empty()) return std::nullopt;
+    return py::array_t<std::uint8_t>(Shape{mask.height_px, mask.width_px}, mask.values.data());
+  }
+
   std::vector<CalibrationEstimate> calibration() {
     const Turn turn = take();
     return system_.calibration();
@@ -255,6 +262,11 @@ Totals up to the map that map() gives: Statistics. Final after finish().)")
 
 What the residuals say of the calibration's focal length: a FocalCheck, once some 200 frames are
 mapped and where the motion tells; None before.)")
+      .def("ego_mask", &PythonSystem::ego_mask, R"(ego_mask(self)
+--
+
+What was found to move along with camera 0 by now: an array of uint8 (H, W), 0 there, else 255; None
+while nothing was.)")
       .def("calibration", &PythonSystem::calibration, R"(calibration(self)
 --
 

@@ -111,6 +111,20 @@ class Results(Test):
             self.assertGreater(features.num_primary, 50)
             self.assertLess(features.pixels[:features.num_primary, 0].max(), 189)
 
+    def test_what_moves_along(self):
+        way = frames("turned")
+        system = waymark.System(camchain("turned"), settings={"features.count": 300})
+        rows, columns = np.mgrid[:40, :150]
+        for i in range(110):
+            frame = way[min(i % 38, 38 - i % 38)]
+            image0 = frame.image0.copy()
+            image0[-40:, 100:250] = 100 + (columns // 10 + rows // 10) % 2 * 40
+            system.feed(50_000_000 * i, image0, frame.image1)
+        mask = system.ego_mask()
+        self.assertEqual((mask.dtype, mask.shape), (np.uint8, way[0].image0.shape))
+        self.assertLess(mask[-30:, 110:240].mean(), 60)
+        self.assertGreater(mask[:-60].mean(), 250)
+
     def test_totals_while_it_runs(self):
         system = waymark.System(camchain(), timing="inline")
         self.assertEqual(system.statistics().num_keyframes, 0)
@@ -135,6 +149,7 @@ class Results(Test):
         self.assertFalse(trajectory.is_filled.any())
         self.assertFalse(trajectory.world_from_rig.flags.writeable)
         self.assertIsNone(system.focal_check())
+        self.assertIsNone(system.ego_mask())
         self.assertEqual(system.calibration(), [])
 
     def test_calibration_that_images_contradict(self):
