@@ -14,7 +14,8 @@
 namespace waymark {
 namespace {
 
-/// Images are reduced by a whole number to about this: what is looked for is not finer.
+/// Of larger images every so many pixels are taken that this comes out: what is looked for is not
+/// finer, and means take longer than all the rest.
 constexpr double kUsualWidthPx = 1024.0;
 /// Cells in a row of the image; as many rows as make them square.
 constexpr int kColumns = 48;
@@ -125,7 +126,7 @@ bool EgoMask::watch(const LocatedImage& located, ImageView levels) {
   note_landmarks(located);
   directions_.push_back(located.world_from_cam);
   if (factor_ < 1.0) {
-    accumulate(reduce(located.image, factor_).view());
+    accumulate(pick_reduced(located.image, factor_).view());
   } else {
     accumulate(located.image);
   }

@@ -106,6 +106,8 @@ class System::Impl {
 
  private:
   void make_tracker(bool has_range);
+  /// Looks for what moves along in a frame that was tracked.
+  void watch(ImageView image0, const TrackOutcome& outcome, StageTimes& times);
   void look_with_calibration();
   void look_at_map(FrameId frame);
   void send(FrameId frame, MapperMessage message);
@@ -169,15 +171,7 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
     look_at_map(id);
   }
   TrackOutcome outcome = tracker_->track(frame, visible_.snapshot, result.stages);
-  if (outcome.world_from_rig) {
-    const Rigid3 world_from_cam = *outcome.world_from_rig * rig_->cameras[0].cam_from_rig.inverse();
-    builder_.watch({images.image0,
-                    world_from_cam.rotation,
-                    *outcome.details.features,
-                    outcome.details.landmarks},
-                   outcome.submap == watched_submap_);
-    watched_submap_ = outcome.submap;
-  }
+  watch(images.image0, outcome, result.stages);
   memory_.add(frame, outcome, *map());
   num_relocalizations_ += outcome.is_relocalized;
   result.frame = FrameId{id.value - memory_.first().value};
@@ -192,6 +186,16 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   }
   details_ = std::move(outcome.details);
   return result;
+}
+
+void System::Impl::watch(ImageView image0, const TrackOutcome& outcome, StageTimes& times) {
+  if (!outcome.world_from_rig) return;
+  StageTimer timer(times, Stage::kFeatures);
+  const Rigid3 world_from_cam = *outcome.world_from_rig * rig_->cameras[0].cam_from_rig.inverse();
+  const FrameDetails& details = outcome.details;
+  builder_.watch({image0, world_from_cam.rotation, *details.features, details.landmarks},
+                 outcome.submap == watched_submap_);
+  watched_submap_ = outcome.submap;
 }
 
 void System::Impl::make_tracker(bool has_range) {
