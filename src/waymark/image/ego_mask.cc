@@ -35,7 +35,7 @@ constexpr std::size_t kMinAnchors = 8;
 constexpr double kRestingPx = 1.5;
 /// Of the images of a window, in which what the places rest on stays. Where the camera rests so
 /// long, kAlongAtRest of the gradients are left anywhere.
-constexpr double kRestingPart = 0.75, kAlongAtRest = 0.5, kMaxAlongPartAtRest = 0.25;
+constexpr double kRestingPart = 0.75, kAlongAtRest = 0.5, kMaxAlongPartAtRest = 0.4;
 /// Where more of the image stays it is the camera that does, whatever its direction.
 constexpr double kMaxAlongPart = 0.5;
 /// What comes in from the upper or lower edge is as high, in parts of the image: where all
