@@ -19,8 +19,8 @@ namespace waymark {
 
 /// An image of camera 0 that was located.
 struct LocatedImage {
-  ImageView image;
-  Eigen::Quaterniond world_from_cam;
+  ImageView image;                        ///< In full size.
+  Eigen::Quaterniond world_from_cam;      ///< How the camera stood.
   const Features& features;               ///< Seen in it.
   std::span<const LandmarkId> landmarks;  ///< That the place rests on: per feature, or invalid.
 };
