@@ -107,6 +107,7 @@ struct SimulateOptions {
   std::string camera;  ///< Camchain file or name; empty: the default.
   Setup setup = Setup::kStereo;
   SequenceSpec spec;
+  double exposure_ms = 0.0;
   double readout_ms = 0.0;
   double depth_lag_ms = 0.0;
   std::vector<double> turn_deg;   ///< Of camera 1; empty: none.
@@ -135,6 +136,7 @@ SequenceSpec plain_spec_of(const SimulateOptions& options) {
   }
   SequenceSpec spec = options.spec;
   spec.name = spec.world = options.name;
+  spec.effects.exposure_s = 1e-3 * options.exposure_ms;
   spec.chain = chain_of(options);
   return spec;
 }
@@ -237,6 +239,12 @@ void add_simulate_command(CLI::App& program, Command& command) {
   simulation.add_option("--noise", spec.effects.noise_sigma, "Sigma of the grey values")
       ->check(number_between(0.0, 100.0))
       ->capture_default_str();
+  simulation
+      .add_option(
+          "--exposure",
+          options->exposure_ms,
+          "Milliseconds that the shutter is open, of a world: what moves meanwhile blurs [0]")
+      ->check(number_between(0.0, 1000.0));
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
   add_flaw_options(simulation, *options);
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");

@@ -144,15 +144,14 @@ std::vector<MotionKey> along_path(const Course& course, int num_rounds, HeadTurn
   return keys;
 }
 
-/// Keys that move about the start by offset(phase), phase from 0 to 1; offsets are to the right, up
-/// and ahead, and yaw, pitch, roll.
+/// Keys that move about the start by offset(phase), phase from 0 to 1 in `count` steps; offsets are
+/// to the right, up and ahead, and yaw, pitch, roll.
 template <class Offset>
-std::vector<MotionKey> about_start(const Course& course, Offset offset) {
-  constexpr int kCount = 40;
+std::vector<MotionKey> about_start(const Course& course, int count, Offset offset) {
   const Rigid3 start = pose_of(course.start);
   std::vector<MotionKey> keys;
-  for (int i = -1; i <= kCount + 1; ++i) {
-    const MotionKey change = offset(static_cast<double>(i) / kCount);
+  for (int i = -1; i <= count + 1; ++i) {
+    const MotionKey change = offset(static_cast<double>(i) / count);
     MotionKey key = course.start;
     key.position = start * Vector3d(change.position.x(), -change.position.y(), change.position.z());
     key.yaw_deg += change.yaw_deg;
@@ -211,22 +210,79 @@ std::vector<MotionKey> turn_fast(const Course& course) {
   });
 }
 
+/// Yaw of a head that turns between two sides at a constant speed and rests on each.
+double turn_deg(double seconds, double deg_per_s) {
+  constexpr double kSideDeg = 60.0;
+  constexpr double kRest_s = 0.4;
+  const double turn_s = 2.0 * kSideDeg / deg_per_s;
+  const double first_s = 0.5 * turn_s;  // From the middle to one side.
+  if (seconds < first_s) return deg_per_s * seconds;
+  const double since_s = seconds - first_s;
+  const double turns = std::floor(since_s / (turn_s + kRest_s));
+  const double turned_s = std::max(0.0, since_s - turns * (turn_s + kRest_s) - kRest_s);
+  const double sign = std::fmod(turns, 2.0) == 0.0 ? 1.0 : -1.0;
+  return sign * (kSideDeg - deg_per_s * turned_s);
+}
+
+/// Looks to both sides once, slowly, in the first half of the time; then back and forth.
+std::vector<MotionKey> look_and_turn(const Course& course, double duration_s, double deg_per_s) {
+  constexpr double kKeysPerSecond = 10.0;
+  constexpr double kSwingsPerSecond = 0.4;
+  const int count = std::max(1, static_cast<int>(kKeysPerSecond * duration_s));
+  return about_start(course, count, [&](double phase) {
+    const double late_s = (phase - 0.5) * duration_s;
+    const double swing = kTwoPi * kSwingsPerSecond * phase * duration_s;
+    MotionKey key{{0.4 * std::sin(swing), 0.1 * std::sin(0.7 * swing), 0.2 * std::cos(swing)}};
+    key.yaw_deg =
+        late_s < 0.0 ? 60.0 * std::sin(2.0 * kTwoPi * phase) : turn_deg(late_s, deg_per_s);
+    return key;
+  });
+}
+
+Sway no_sway(const Course&) { return {}; }
+Sway usual_sway(const Course& course) { return course.sway; }
+/// That of somebody who runs: up to 8 degrees at 1 Hz and less at up to 5 Hz.
+Sway shaking(const Course&) { return {0.01, 8.0, 13, 1.0}; }
+
 struct NamedMotion {
   std::string_view name;
-  std::vector<MotionKey> (*keys)(const Course& course);
-  bool sways;
+  std::vector<MotionKey> (*keys)(const Course& course, double duration_s);
+  Sway (*sway)(const Course& course);
 };
 
-constexpr std::array<NamedMotion, 9> kMotions = {{
-    {"loop", [](const Course& course) { return walk_around(course, 1); }, true},
-    {"rounds", [](const Course& course) { return walk_around(course, 3); }, true},
-    {"thirty_rounds", [](const Course& course) { return repeat_round(course, 30); }, true},
-    {"fast_turn", turn_fast, true},
-    {"inspect", [](const Course& course) { return about_start(course, inspect_offset); }, true},
-    {"slide", [](const Course& course) { return about_start(course, slide_offset); }, false},
-    {"forward", [](const Course& course) { return about_start(course, forward_offset); }, false},
-    {"rotate", [](const Course& course) { return about_start(course, rotate_offset); }, false},
-    {"still", [](const Course& course) { return std::vector(4, course.start); }, false},
+constexpr std::array<NamedMotion, 12> kMotions = {{
+    {"loop", [](const Course& course, double) { return walk_around(course, 1); }, usual_sway},
+    {"rounds", [](const Course& course, double) { return walk_around(course, 3); }, usual_sway},
+    {"thirty_rounds",
+     [](const Course& course, double) { return repeat_round(course, 30); },
+     usual_sway},
+    {"fast_turn", [](const Course& course, double) { return turn_fast(course); }, usual_sway},
+    {"turns_150",
+     [](const Course& course, double duration_s) {
+       return look_and_turn(course, duration_s, 150.0);
+     },
+     usual_sway},
+    {"turns_250",
+     [](const Course& course, double duration_s) {
+       return look_and_turn(course, duration_s, 250.0);
+     },
+     usual_sway},
+    {"inspect",
+     [](const Course& course, double) { return about_start(course, 40, inspect_offset); },
+     usual_sway},
+    {"shaken",
+     [](const Course& course, double) { return about_start(course, 40, inspect_offset); },
+     shaking},
+    {"slide",
+     [](const Course& course, double) { return about_start(course, 40, slide_offset); },
+     no_sway},
+    {"forward",
+     [](const Course& course, double) { return about_start(course, 40, forward_offset); },
+     no_sway},
+    {"rotate",
+     [](const Course& course, double) { return about_start(course, 40, rotate_offset); },
+     no_sway},
+    {"still", [](const Course& course, double) { return std::vector(4, course.start); }, no_sway},
 }};
 
 }  // namespace
@@ -250,8 +306,9 @@ Motion::Motion(std::vector<MotionKey> keys, double duration_s, const Sway& sway)
   Rng rng(sway.seed, 0);
   for (int i = 0; i < kNumWaves; ++i) {
     // Faster waves are smaller, so that all shake about as fast.
-    const double frequency = 0.4 * std::pow(5.0, static_cast<double>(i) / (kNumWaves - 1));
-    const double share = 0.4 / frequency;
+    const double frequency =
+        sway.lowest_hz * std::pow(5.0, static_cast<double>(i) / (kNumWaves - 1));
+    const double share = sway.lowest_hz / frequency;
     const Vector3d position = random_signs(rng, sway.position_m * share);
     const Vector3d angle = random_signs(rng, sway.angle_deg * share);
     waves_.push_back({position, angle, frequency, rng.uniform(0.0, kTwoPi)});
@@ -301,7 +358,7 @@ Motion make_motion(std::string_view world, std::string_view name, double duratio
   }
   for (const NamedMotion& motion : kMotions) {
     if (motion.name != name) continue;
-    return Motion(motion.keys(*course), duration_s, motion.sways ? course->sway : Sway());
+    return Motion(motion.keys(*course, duration_s), duration_s, motion.sway(*course));
   }
   throw InputError(fmt::format("motion '{}'", name),
                    fmt::format("unknown, expected one of {}", fmt::join(motion_names(), ", ")));

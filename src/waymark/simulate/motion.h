@@ -24,11 +24,12 @@ struct MotionKey {
 /// Pose of the rig (axes of camera 0: x right, y down, z forward).
 Rigid3 pose_of(const MotionKey& key);
 
-/// How much a hand or a step shakes the rig: amplitudes of a few sines between 0.4 and 2 Hz.
+/// How much a hand or a step shakes the rig: amplitudes of a few sines over 2.3 octaves.
 struct Sway {
   double position_m = 0.0;  ///< Amplitude along each axis.
   double angle_deg = 0.0;   ///< Amplitude of yaw, pitch and roll.
   std::uint64_t seed = 0;   ///< Of frequencies and phases.
+  double lowest_hz = 0.4;  ///< Frequency of the slowest and largest sine; the quickest has 5 times.
 };
 
 /// A camera motion with continuous acceleration: a uniform cubic B-spline (de Boor 1978) whose
@@ -64,6 +65,8 @@ class Motion {
 ///   rounds     three times around and a bit on, over the same ground
 ///   thirty_rounds  thirty times around, each time looking at the same
 ///   fast_turn  the path of one loop, with quick turns of the head
+///   turns_150, turns_250  looking around slowly, then with turns of so many degrees per second
+///   shaken     as inspect, by a hand that shakes at up to 5 Hz
 ///   inspect    hand-held, around the starting place
 ///   slide      to the side and back
 ///   forward    ahead and back

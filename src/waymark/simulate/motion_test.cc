@@ -65,6 +65,12 @@ double usual_duration_s(const std::string& world, const std::string& motion) {
   return motion == "rounds" ? 3.0 * once_s : motion == "thirty_rounds" ? 30.0 * once_s : once_s;
 }
 
+/// With what a hand sways.
+double most_deg_per_s(const std::string& motion) {
+  if (motion.starts_with("turns_")) return std::stod(motion.substr(6)) + 15.0;
+  return motion == "fast_turn" || motion == "shaken" ? 250.0 : 110.0;
+}
+
 TEST(Motion, IsSmooth) {
   for (const std::string& world : world_names()) {
     const bool is_street = world == "street";
@@ -74,7 +80,10 @@ TEST(Motion, IsSmooth) {
       EXPECT_LT(bounds.speed, is_street ? 12.0 : 3.0);
       EXPECT_LT(bounds.acceleration, is_street ? 16.0 : 5.0);
       EXPECT_LT(bounds.jump, 0.1);
-      EXPECT_LT(bounds.turn_deg_per_s, name == "fast_turn" ? 250.0 : 110.0);
+      EXPECT_LT(bounds.turn_deg_per_s, most_deg_per_s(name));
+      if (name.starts_with("turns_")) {
+        EXPECT_GT(bounds.turn_deg_per_s, std::stod(name.substr(6)));
+      }
     }
   }
 }
