@@ -13,6 +13,7 @@
 #include "waymark/image/brief.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/rolling_shutter.h"
+#include "waymark/image/small_image.h"
 
 namespace waymark {
 namespace {
@@ -193,6 +194,7 @@ const TangentArrays& FrameBuilder::compute_tangents(const Camera& camera) {
 void FrameBuilder::extract_keypoints(const FrameImages& images) {
   view_masks_[0].learn(images.image0);
   const ImageView mask = view_masks_[0].num_levels(images.mask);
+  small_image_ = std::make_shared<const SmallImage>(make_small_image(images.image0, mask));
   if (!seam_) {
     extractor_.extract(images.image0, mask, keypoints_, descriptors_);
     return;

@@ -19,6 +19,8 @@
 
 namespace waymark {
 
+struct SmallImage;
+
 struct FrameSettings {
   FeatureSettings features = {};
   StereoSettings stereo = {};
@@ -79,6 +81,9 @@ class FrameBuilder {
   /// What was found: 0 where camera 0 shows what moves along with it, else 255; empty: nowhere.
   const Image& ego_mask() const { return view_masks_[0].ego_mask(); }
 
+  /// Image 0 of the last frame; null before the first.
+  std::shared_ptr<const SmallImage> small_image() const { return small_image_; }
+
   /// Whether features depend on the motion: of rolling shutters, or in depth images of other times.
   bool needs_motion(const FrameImages& images) const;
 
@@ -113,6 +118,7 @@ class FrameBuilder {
   std::vector<Descriptor> descriptors_;
   std::vector<Eigen::Vector2d> pixels_;
   std::vector<float> level_scales_;
+  std::shared_ptr<const SmallImage> small_image_;
   FrameTimes times_;
 };
 

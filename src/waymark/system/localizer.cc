@@ -138,7 +138,9 @@ Frame Localizer::Impl::build(const FrameImages& images,
                              TrackingResult& result) {
   FrameImages used = images;
   if (!uses_range_) used.image1 = {}, used.depth = {};
-  Frame frame{FrameId{num_frames_}, images.timestamp_ns, find_features(used, motion)};
+  auto features = find_features(used, motion);
+  Frame frame{
+      FrameId{num_frames_}, images.timestamp_ns, std::move(features), builder_.small_image()};
   ++num_frames_;
   result.frame = frame.id;
   result.stages[Stage::kFeatures] = builder_.times().features_ms;

@@ -163,7 +163,8 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
   look_with_calibration();
   const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
-  const Frame frame{id, images.timestamp_ns, builder_.build(images, motion)};
+  auto features = builder_.build(images, motion);
+  const Frame frame{id, images.timestamp_ns, std::move(features), builder_.small_image()};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
   {

@@ -10,11 +10,14 @@
 
 namespace waymark {
 
+struct SmallImage;
+
 /// A frame on its way through the tracker.
 struct Frame {
   FrameId id;
   std::int64_t timestamp_ns = 0;
   std::shared_ptr<const Features> features;
+  std::shared_ptr<const SmallImage> image = nullptr;  ///< Of camera 0; null where there is none.
 };
 
 }  // namespace waymark

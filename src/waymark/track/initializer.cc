@@ -174,6 +174,7 @@ Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::ui
       seed_(seed),
       pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
       search_radius_px_(search_radius_px(*rig->cameras.at(0).camera, kSearchRadiusPx, kSearchPart)),
+      turn_aligner_(rig->cameras[0].camera),
       projection_(rig) {}
 
 std::optional<Initialization> Initializer::add(const Frame& frame) {
@@ -232,6 +233,31 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
 }
 
 void Initializer::match(Reference& reference, const Frame& frame) {
+  match_near_expected(reference, frame);
+  if (reference.matches.size() >= kMinLandmarks) return;
+  if (expect_turned(reference, frame)) match_near_expected(reference, frame);
+}
+
+bool Initializer::expect_turned(Reference& reference, const Frame& frame) {
+  if (!reference.frame.image || !frame.image) return false;
+  const TurnAlignment turn = turn_aligner_.align(*reference.frame.image, *frame.image);
+  if (!turn.is_certain()) return false;
+  const Features& features = *reference.frame.features;
+  const std::size_t count = features.num_primary;
+  std::vector<Eigen::Vector3d> bearings;
+  for (std::size_t i = 0; i < count; ++i) {
+    bearings.push_back(turn.b_from_a * features.bearings[i].cast<double>());
+  }
+  std::vector<Eigen::Vector2d> pixels(count);
+  std::vector<std::uint8_t> is_visible(count);
+  rig_->cameras[0].camera->project(bearings, pixels, is_visible);
+  for (std::size_t i = 0; i < count; ++i) {
+    if (is_visible[i]) reference.expected_pixels[i] = pixels[i].cast<float>();
+  }
+  return true;
+}
+
+void Initializer::match_near_expected(Reference& reference, const Frame& frame) {
   const auto matches = appearance_.match_near(*reference.frame.features,
                                               reference.expected_pixels,
                                               search_radius_px_,

@@ -12,6 +12,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
+#include "waymark/match/turn_alignment.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/messages.h"
@@ -52,6 +53,9 @@ class Initializer {
   std::optional<Initialization> start_from_range(const Frame& frame);
   std::optional<Initialization> start_from_two_views(const Frame& frame);
   void match(Reference& reference, const Frame& frame);
+  void match_near_expected(Reference& reference, const Frame& frame);
+  /// Expects the features where the turn of the camera takes them. Whether the images tell it.
+  bool expect_turned(Reference& reference, const Frame& frame);
   /// Whether as many features as a map needs moved, and not just before a camera at rest; if not,
   /// the pair has no parallax to look for.
   bool has_moved(const Reference& reference, const Frame& frame) const;
@@ -70,6 +74,7 @@ class Initializer {
   double search_radius_px_;  ///< Around where a feature was last seen.
   FrameReason reason_ = FrameReason::kNone;
   AppearanceMatcher appearance_;
+  TurnAligner turn_aligner_;
   ProjectionMatcher projection_;
   PoseWorkspace pose_workspace_;
   std::deque<Reference> references_;

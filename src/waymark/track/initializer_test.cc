@@ -57,6 +57,21 @@ Path sideways() {
   return [](std::uint32_t i) { return pose_at(0.04 * i, 0.002 * i, 0.01 * i, 0.002 * i); };
 }
 
+TEST(Initializer, MonoStartsThroughFastTurnsThatImagesTell) {
+  // 84 px from frame to frame, more than is searched.
+  const Scene scene =
+      mono_scene([](std::uint32_t i) { return pose_at(0.15 * i, 0.0, 0.0, 0.2 * i - 0.4); });
+  EXPECT_FALSE(run(scene, false, 8).start);
+  Initializer initializer(scene.rig, false, 7);
+  bool has_started = false;
+  for (std::uint32_t i = 0; i < 8 && !has_started; ++i) {
+    Frame frame = scene.frame(i);
+    frame.image = far_image(*scene.rig->cameras[0].camera, scene.world_from_rig(i));
+    has_started = initializer.add(frame).has_value();
+  }
+  EXPECT_TRUE(has_started);
+}
+
 TEST(Initializer, MonoStartsWithTheTrueMotionUpToScale) {
   const Scene scene = mono_scene(sideways());
   const Started started = run(scene, false, 40);

@@ -25,6 +25,7 @@ void LastFrame::set(const Frame& frame,
                     std::span<const LandmarkId> landmarks) {
   pose_ = pose;
   features_ = frame.features;
+  image_ = frame.image;
   landmarks_.assign(landmarks.begin(), landmarks.end());
   motion_.update(frame.timestamp_ns, rig_from_world);
 }

@@ -105,6 +105,11 @@ class LastFrame {
   /// where its reference is gone, refers to another keyframe (invalid: to none).
   void forget_missing(const Map& before, const Map& after, KeyframeId other);
 
+  /// Its image; null where there is none.
+  const SmallImage* image() const { return image_.get(); }
+
+  /// Its pose; after carry_over() in the map of that.
+  const Rigid3& rig_from_world() const { return motion_.pose(); }
   /// Pose of a frame at this time if the motion goes on.
   Rigid3 predict(std::int64_t timestamp_ns) const { return motion_.predict(timestamp_ns); }
 
@@ -123,6 +128,7 @@ class LastFrame {
  private:
   RelativePose pose_;
   std::shared_ptr<const Features> features_;
+  std::shared_ptr<const SmallImage> image_;
   std::vector<LandmarkId> landmarks_;  ///< Per feature.
   MotionModel motion_;
   LandmarkSet set_;

@@ -9,6 +9,8 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/camera/scaled_camera.h"
+#include "waymark/image/small_image.h"
 #include "waymark/map/map.h"
 #include "waymark/match/test_scene.h"
 #include "waymark/simulate/testing/points.h"
@@ -94,6 +96,29 @@ class TestMap {
 /// A cloud some metres before a camera at the origin.
 inline PointCloud cloud_ahead(int count = 1500) {
   return scatter_in({-5.0, -3.0, 4.0}, {5.0, 3.0, 9.0}, count, 6.0, 3);
+}
+
+/// What a camera at the origin of the cloud sees of walls that are far away.
+inline std::shared_ptr<const SmallImage> far_image(const Camera& camera,
+                                                   const Rigid3& world_from_cam) {
+  const ScaledCamera small =
+      ScaledCamera::resized({std::shared_ptr<void>(), &camera},
+                            small_image_factor(camera.width_px(), camera.height_px()));
+  SmallImage image;
+  image.grey = Image(small.width_px(), small.height_px());
+  for (int y = 0; y < small.height_px(); ++y) {
+    for (int x = 0; x < small.width_px(); ++x) {
+      const Eigen::Vector2d pixel(x, y);
+      Eigen::Vector3d bearing;
+      std::uint8_t is_valid = 0;
+      small.unproject({&pixel, 1}, {&bearing, 1}, {&is_valid, 1});
+      const Eigen::Vector3d to = world_from_cam.rotation * bearing;
+      const double grey = 128.0 + 60.0 * std::sin(7.0 * to.x() + 3.0 * to.y()) +
+                          50.0 * std::sin(5.0 * to.y() - 4.0 * to.x() * to.z());
+      image.grey.row(y)[x] = static_cast<std::uint8_t>(grey);
+    }
+  }
+  return std::make_shared<const SmallImage>(std::move(image));
 }
 
 inline Rigid3 pose_at(double x, double y = 0.0, double z = 0.0, double yaw_rad = 0.0) {

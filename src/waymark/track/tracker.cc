@@ -43,6 +43,7 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       settings_(settings),
       seed_(seed),
       initializer_(rig, has_range, seed),
+      turn_aligner_(rig->cameras.at(0).camera),
       locator_(rig),
       relocalizer_(rig, settings, seed),
       keyframe_assessor_(rig, has_range),
@@ -51,6 +52,7 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
 void Tracker::look_with(std::shared_ptr<const Rig> rig) {
   rig_ = std::move(rig);
   initializer_ = Initializer(rig_, has_range_, seed_);
+  turn_aligner_ = TurnAligner(rig_->cameras[0].camera);
   locator_ = FrameLocator(rig_);
   relocalizer_ = Relocalizer(rig_, settings_, seed_);
   keyframe_assessor_ = KeyframeAssessor(rig_, has_range_);
@@ -83,7 +85,7 @@ Frame Tracker::straightened(const Frame& frame, const LocatedFrame& located) con
   if (mode_ != Mode::kTracking || rig_->cameras[0].readout_s == 0.0) return frame;
   const RigMotion motion =
       last_.motion_in(*map_, frame.timestamp_ns, located.rig_from_world, located.landmarks);
-  return {frame.id, frame.timestamp_ns, moved(frame.features, *rig_, motion)};
+  return {frame.id, frame.timestamp_ns, moved(frame.features, *rig_, motion), frame.image};
 }
 
 TrackOutcome Tracker::track(const Frame& seen, const MapSnapshot& visible, StageTimes& times) {
@@ -107,21 +109,58 @@ std::optional<LocatedFrame> Tracker::locate_from_last(const Frame& frame, StageT
   if (mode_ != Mode::kTracking) return std::nullopt;
   StageTimer timer(times, Stage::kPredict);
   last_.carry_over(*map_);
-  const LandmarkSet& landmarks = last_.landmarks(*map_);
   const Rigid3 predicted = last_.predict(frame.timestamp_ns);
+  const auto [radius_px, wide_radius_px] = search_radii_px_;
+  if (auto located = locate_near(frame, predicted, radius_px)) return located;
+  std::optional<LocatedFrame> wide = locate_near(frame, predicted, wide_radius_px);
+  std::optional<LocatedFrame> by_image = locate_by_image(frame);
+  const bool is_better = by_image && (!wide || by_image->num_inliers > wide->num_inliers);
+  return is_better ? by_image : wide;
+}
+
+std::optional<LocatedFrame> Tracker::locate_by_image(const Frame& frame) {
+  const std::optional<Rigid3> predicted = predict_by_image(frame);
+  if (!predicted) return std::nullopt;
   for (const double radius_px : search_radii_px_) {
-    std::vector<LandmarkId> matched =
-        locator_.find(*frame.features, landmarks, predicted, {.radius_px = radius_px});
-    if (num_valid(matched) < settings_.min_inliers) continue;
-    LocatedFrame located = locator_.locate(*frame.features, *map_, predicted, std::move(matched));
-    if (located.num_inliers >= settings_.min_inliers / 2) return located;
+    if (auto located = locate_near(frame, *predicted, radius_px)) return located;
   }
   return std::nullopt;
+}
+
+std::optional<LocatedFrame> Tracker::locate_near(const Frame& frame,
+                                                 const Rigid3& rig_from_world,
+                                                 double radius_px) {
+  std::vector<LandmarkId> matched = locator_.find(
+      *frame.features, last_.landmarks(*map_), rig_from_world, {.radius_px = radius_px});
+  if (num_valid(matched) < settings_.min_inliers) return std::nullopt;
+  LocatedFrame located =
+      locator_.locate(*frame.features, *map_, rig_from_world, std::move(matched));
+  if (located.num_inliers < settings_.min_inliers / 2) return std::nullopt;
+  return located;
+}
+
+std::optional<Rigid3> Tracker::predict_by_image(const Frame& frame) {
+  if (!frame.image || !last_.image()) return std::nullopt;
+  const TurnAlignment turn = turn_aligner_.align(*last_.image(), *frame.image);
+  if (!turn.is_certain()) return std::nullopt;
+  const Eigen::Quaterniond cam_from_rig = rig_->cameras[0].cam_from_rig.rotation;
+  const Eigen::Quaterniond rig_turn = cam_from_rig.conjugate() * turn.b_from_a * cam_from_rig;
+  const Eigen::Quaterniond rotation = (rig_turn * last_.rig_from_world().rotation).normalized();
+  const Eigen::Vector3d centre = last_.predict(frame.timestamp_ns).origin_in_source();
+  return Rigid3(rotation, -(rotation * centre));
 }
 
 std::optional<LocatedFrame> Tracker::recover(const Frame& frame, StageTimes& times) {
   if (!last_.has_pose() || num_lost_ >= kRecoveryFrames) return std::nullopt;
   StageTimer timer(times, Stage::kRecover);
+  if (mode_ == Mode::kLost) {
+    last_.carry_over(*map_);
+    auto located = locate_by_image(frame);
+    if (located && located->num_inliers >= settings_.min_inliers) {
+      local_map_source_.reset();
+      return located;
+    }
+  }
   for (const KeyframeId id : recovery_keyframes()) {
     if (auto located = locate_near_keyframe(frame, id)) {
       local_map_source_.reset();

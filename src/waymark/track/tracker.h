@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/match/appearance.h"
+#include "waymark/match/turn_alignment.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/frame_verdict.h"
@@ -73,7 +74,17 @@ class Tracker {
   /// The frame as it would be with the motion that its pose shows; of a rolling shutter alone.
   Frame straightened(const Frame& frame, const LocatedFrame& located) const;
   std::optional<LocatedFrame> locate_from_last(const Frame& frame, StageTimes& times);
-  /// Among the keyframes where it was last, or while mapping the newest ones of that sub-map.
+  /// By landmarks of the last frame, near where this pose puts them.
+  std::optional<LocatedFrame> locate_near(const Frame& frame,
+                                          const Rigid3& rig_from_world,
+                                          double radius_px);
+  /// The same, the turn since then being told by the images.
+  std::optional<LocatedFrame> locate_by_image(const Frame& frame);
+  /// Its pose as the motion predicts it, but turned as its image tells. Nothing where that does not
+  /// resemble the last one.
+  std::optional<Rigid3> predict_by_image(const Frame& frame);
+  /// From the last frame that had a pose, else among the keyframes where it was last, or while
+  /// mapping the newest ones of that sub-map.
   std::optional<LocatedFrame> recover(const Frame& frame, StageTimes& times);
   std::vector<KeyframeId> recovery_keyframes() const;
   std::optional<LocatedFrame> locate_near_keyframe(const Frame& frame, KeyframeId keyframe);
@@ -99,6 +110,7 @@ class Tracker {
   const std::uint64_t seed_;
   Initializer initializer_;
   AppearanceMatcher appearance_;
+  TurnAligner turn_aligner_;
   FrameLocator locator_;
   Relocalizer relocalizer_;
   KeyframeAssessor keyframe_assessor_;

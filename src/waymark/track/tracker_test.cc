@@ -37,6 +37,17 @@ class TrackerTest : public ::testing::Test {
     return tracker_->track(frame, {map_, places_}, times);
   }
 
+  /// With the image; whether that took a search among keyframes.
+  bool recovers(std::uint32_t number, const Rigid3& world_from_rig) {
+    StageTimes times;
+    const Frame frame{FrameId{number},
+                      50'000'000 * std::int64_t{number},
+                      scene_.look(world_from_rig, number).features,
+                      far_image(*scene_.rig->cameras[0].camera, world_from_rig)};
+    expect_pose(tracker_->track(frame, {map_, places_}, times), world_from_rig);
+    return times[Stage::kRecover] > 0.0;
+  }
+
   /// Tracks a view and lets the mapper answer.
   TrackOutcome track(std::uint32_t number, const Rigid3& world_from_rig) {
     TrackOutcome outcome = track(number, *scene_.look(world_from_rig, number).features);
@@ -225,6 +236,16 @@ TEST_F(TrackerTest, FollowsASuddenTurn) {
   const TrackOutcome outcome = track(10, turned);
   ASSERT_EQ(outcome.state, FrameState::kTracked);
   expect_pose(outcome, turned);
+}
+
+TEST_F(TrackerTest, IsToldOfASuddenTurnByTheImage) {
+  follow_path(5);
+  const Rigid3 turned = pose_at(0.1, 0.0, 0.0, -0.5);  // By 210 px.
+  EXPECT_FALSE(recovers(5, path(5)));
+  EXPECT_FALSE(recovers(6, turned));
+  // The frame before this one had no image.
+  EXPECT_EQ(track(7, turned).state, FrameState::kTracked);
+  EXPECT_TRUE(recovers(8, path(5)));
 }
 
 TEST_F(TrackerTest, StaysInitializingWhileThereAreNoFeatures) {
