@@ -91,10 +91,12 @@ class Sequence:
 
 
 class Part:
-    """Frames [first, end) of a sequence; black ones are as from a covered lens."""
+    """Frames [first, end) of a sequence, each step-th of them; black ones are as from a covered
+    lens."""
 
-    def __init__(self, sequence, first, end, is_black=False):
-        self.sequence, self.first, self.end, self.is_black = sequence, first, end, is_black
+    def __init__(self, sequence, first, end, is_black=False, step=1):
+        self.sequence, self.first, self.end = sequence, first, end
+        self.is_black, self.step = is_black, step
 
 
 class SplicedFrame:
@@ -117,9 +119,10 @@ def splice(parts, folder):
     black = folder / "black.png"
     write_black_png(black, *png_size(first.files[0][0]))
     frames = []
+    next_stamp = FIRST_STAMP_NS
     for part in parts:
-        for index in range(part.first, part.end):
-            stamp = FIRST_STAMP_NS + len(frames) * first.step_ns
+        for index in range(part.first, part.end, part.step):
+            stamp, next_stamp = next_stamp, next_stamp + part.step * first.step_ns
             for stream, file in zip(first.streams, part.sequence.files[index]):
                 hidden = part.is_black and stream != "depth"
                 link = folder / stream / file_name(first, len(frames), stamp)
