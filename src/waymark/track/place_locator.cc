@@ -39,12 +39,13 @@ PlaceLocator::PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed)
 std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  const Map& map,
                                                  KeyframeId candidate,
-                                                 std::uint64_t stream) {
+                                                 std::uint64_t stream,
+                                                 double min_confidence) {
   matched_keyframes_ = strongest_neighbours(map, candidate, kNumMatchedKeyframes - 1);
   matched_keyframes_.insert(matched_keyframes_.begin(), candidate);
   std::optional<LocatedPlace> place =
       refine(features, map, candidate, stream, match_by_appearance(features, map));
-  if (place && place->confidence < kMinConfidence) {
+  if (place && place->confidence < min_confidence) {
     attempt_.failure = FrameReason::kNotVerified;
     return std::nullopt;
   }

@@ -45,12 +45,13 @@ class PlaceLocator {
   /// rig: the one that sees the features.
   PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
-  /// Nothing unless the pose rests on 30 landmarks with kMinConfidence; all of these are of the
+  /// Nothing unless the pose rests on 30 landmarks with this confidence; all of these are of the
   /// candidate's sub-map. Same seed and stream (the frame, for example), same result.
   std::optional<LocatedPlace> locate(const Features& features,
                                      const Map& map,
                                      KeyframeId candidate,
-                                     std::uint64_t stream);
+                                     std::uint64_t stream,
+                                     double min_confidence = kMinConfidence);
 
   /// The same where a pose is known already, though too coarsely to look for landmarks one by one:
   /// to within some 5 degrees or a tenth of the depth of the scene. Such a pose says more than

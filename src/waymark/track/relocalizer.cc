@@ -7,18 +7,29 @@
 #include <tuple>
 #include <utility>
 
+#include "waymark/track/last_frame.h"
+
 namespace waymark {
 namespace {
 
 constexpr std::size_t kMaxCandidates = 10;
 /// What merely looks alike does not get that far; the other candidates need not be tried.
 constexpr double kCertainConfidence = 0.5;
+/// How far a rig moves from one frame to the next at most, by the distance of what it sees.
+constexpr double kMaxMovedPart = 0.5;
 
 /// How the search may end, from what is furthest; other reasons come before all of these.
 constexpr std::array kEnds = {FrameReason::kNone,
                               FrameReason::kNotVerified,
                               FrameReason::kTooFewInliers,
                               FrameReason::kTooFewMatches};
+
+bool is_near(const LastPlace& last, const Map& map, const LocatedFrame& located) {
+  const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
+  const double moved = (centre - last.rig_from_world.origin_in_source()).norm();
+  return moved * median_inverse_range(map, located.rig_from_world, located.landmarks) <
+         kMaxMovedPart;
+}
 
 }  // namespace
 
@@ -29,34 +40,41 @@ Relocalizer::Relocalizer(std::shared_ptr<const Rig> rig,
 
 std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const Map& map,
-                                                const PlaceIndex& places) {
+                                                const PlaceIndex& places,
+                                                const std::optional<LastPlace>& last) {
   const PlaceQuery query = {
       .max_candidates = kMaxCandidates,
       .is_excluded = [&](const PlaceRow& row) { return !map.keyframes().contains(row.keyframe); }};
   std::vector<KeyframeId> candidates;
+  if (last) candidates.push_back(last->keyframe);
   for (const PlaceCandidate& candidate : places.find(frame.features->descriptors, query)) {
     candidates.push_back(candidate.keyframe);
   }
-  return locate_among(frame, map, candidates);
+  return locate_among(frame, map, candidates, last);
 }
 
 std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
                                                       const Map& map,
-                                                      std::span<const KeyframeId> candidates) {
+                                                      std::span<const KeyframeId> candidates,
+                                                      const std::optional<LastPlace>& last) {
   std::optional<LocatedFrame> best;
   double best_confidence = 0;
   std::vector<KeyframeId> tried;
   diagnosis_ = {.reason = FrameReason::kNoCandidate};
   for (const KeyframeId candidate : candidates) {
     if (std::ranges::find(tried, candidate) != tried.end()) continue;
-    auto place = locator_.locate(*frame.features, map, candidate, frame.id.value);
+    const double min_confidence = last ? 0.0 : PlaceLocator::kMinConfidence;
+    auto place = locator_.locate(*frame.features, map, candidate, frame.id.value, min_confidence);
     const auto matched = locator_.matched_keyframes();
     tried.insert(tried.end(), matched.begin(), matched.end());
     const bool has_inliers = place && place->frame.num_inliers >= min_inliers_;
     PlaceAttempt attempt = locator_.attempt();
     if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;
+    const bool is_believed = has_inliers && (place->confidence >= PlaceLocator::kMinConfidence ||
+                                             is_near(*last, map, place->frame));
+    if (has_inliers && !is_believed) attempt.failure = FrameReason::kNotVerified;
     note(attempt);
-    if (!has_inliers || (best && place->confidence <= best_confidence)) continue;
+    if (!is_believed || (best && place->confidence <= best_confidence)) continue;
     best_confidence = place->confidence;
     best = std::move(place->frame);
     if (best_confidence >= kCertainConfidence) break;

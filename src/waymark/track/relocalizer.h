@@ -17,6 +17,13 @@
 
 namespace waymark {
 
+/// Where the rig was just before: the keyframe that its pose referred to, and the pose. A place
+/// within half of the median distance of what is seen from there needs no confidence.
+struct LastPlace {
+  KeyframeId keyframe;
+  Rigid3 rig_from_world;
+};
+
 /// Finds frames of which nothing is known in the map: similar places from the index, the first of
 /// which that shows what the frame shows is the answer. The cost is bounded whatever the size of
 /// the map, and misses are preferred to wrong places. Keeps its buffers.
@@ -27,12 +34,16 @@ class Relocalizer {
 
   /// Pose of a frame in whichever sub-map shows the place. The index may know more or fewer
   /// keyframes than the map.
-  std::optional<LocatedFrame> locate(const Frame& frame, const Map& map, const PlaceIndex& places);
+  std::optional<LocatedFrame> locate(const Frame& frame,
+                                     const Map& map,
+                                     const PlaceIndex& places,
+                                     const std::optional<LastPlace>& last = {});
 
   /// The same with the keyframes to compare given, the likeliest first.
   std::optional<LocatedFrame> locate_among(const Frame& frame,
                                            const Map& map,
-                                           std::span<const KeyframeId> candidates);
+                                           std::span<const KeyframeId> candidates,
+                                           const std::optional<LastPlace>& last = {});
 
   /// What became of the last search, of the place that came closest or was found; the reason is
   /// kNoCandidate or PlaceAttempt::failure.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <span>
 #include <utility>
 #include <vector>
@@ -36,10 +37,12 @@ class RelocalizerTest : public ::testing::Test {
     }
   }
 
-  std::optional<LocatedFrame> locate(const PointCloud& cloud, const Rigid3& world_from_rig) {
+  std::optional<LocatedFrame> locate(const PointCloud& cloud,
+                                     const Rigid3& world_from_rig,
+                                     const std::optional<LastPlace>& last = {}) {
     const auto view = observe(cloud, *scene_.rig, world_from_rig, scene_.noise, 100);
     const Frame frame = {FrameId{100}, 0, view.features};
-    return relocalizer_.locate(frame, scene_.map, places_);
+    return relocalizer_.locate(frame, scene_.map, places_, last);
   }
 
   SubmapId submap_of(const LocatedFrame& located) const {
@@ -87,6 +90,24 @@ TEST_F(RelocalizerTest, PrefersThePlaceThatExplainsMore) {
   const auto in_first = locate(first_, pose_at(0.5));
   ASSERT_TRUE(in_first);
   EXPECT_EQ(submap_of(*in_first), SubmapId{0});
+}
+
+TEST_F(RelocalizerTest, BelievesNearTheLastPlaceWhatItWouldNotElsewhere) {
+  // Only what is at the left is as it was.
+  PointCloud changed = another_cloud(13);
+  for (std::size_t i = 0; i < changed.landmarks.size(); ++i) {
+    const PointLandmark& before = first_.landmarks[i];
+    PointLandmark& now = changed.landmarks[i];
+    now.position.x() = std::max(now.position.x(), -1.4);
+    if (before.position.x() < -1.5) now = before;
+  }
+  const Rigid3 truth = pose_at(0.5, 0.1, 0.2);
+  EXPECT_FALSE(locate(changed, truth));
+  EXPECT_EQ(relocalizer_.diagnosis().reason, FrameReason::kNotVerified);
+  EXPECT_FALSE(locate(changed, truth, LastPlace{KeyframeId{1}, pose_at(0.5, 8.0).inverse()}));
+  const auto near = locate(changed, truth, LastPlace{KeyframeId{1}, pose_at(0.4).inverse()});
+  ASSERT_TRUE(near);
+  EXPECT_LT((near->rig_from_world.origin_in_source() - truth.translation).norm(), 0.03);
 }
 
 TEST_F(RelocalizerTest, SaysThatNoCandidateFits) {

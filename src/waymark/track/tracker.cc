@@ -23,7 +23,8 @@ constexpr int kMaxLocalMapAge = 5;
 constexpr std::size_t kRecoveryKeyframes = 12;
 /// Frames after a loss in which the camera is looked for near where it was.
 constexpr int kRecoveryFrames = 30;
-/// Frames after a loss until a single one with range may start a new sub-map.
+/// Frames after a loss until a single one with range may start a new sub-map, and in which a place
+/// near the last pose is believed.
 constexpr int kPatience = 5;
 
 std::array<double, 2> search_radii(const Rig& rig) {
@@ -206,7 +207,11 @@ std::optional<LocatedFrame> Tracker::locate_near_keyframe(const Frame& frame, Ke
 
 std::optional<LocatedFrame> Tracker::relocalize(const Frame& frame, StageTimes& times) {
   StageTimer timer(times, Stage::kRecover);
-  std::optional<LocatedFrame> located = relocalizer_.locate(frame, *map_, *places_);
+  std::optional<LastPlace> last;
+  if (last_.has_pose() && num_lost_ < kPatience) {
+    last = {map_->resolve(last_.reference()), last_.rig_from_world()};
+  }
+  std::optional<LocatedFrame> located = relocalizer_.locate(frame, *map_, *places_, last);
   if (located) local_map_source_.reset();
   return located;
 }
