@@ -38,13 +38,19 @@ void add_crates(WorldBuilder& builder, const Vector3d& foot, double side, Rng& r
       box_on(upper, Vector3d::Constant(0.6 * side)), rng.uniform(-40.0, 0.0), Style::kCrate);
 }
 
-void add_globe(WorldBuilder& builder, const Vector3d& foot) {
-  builder.add_cylinder(foot, 0.2, 0.9, Style::kCrate);
-  builder.add_sphere(foot + Vector3d(0.0, 0.0, 1.1), 0.2, Style::kMetal);
+void add_globe(WorldBuilder& builder, const Vector3d& foot, bool is_blank) {
+  builder.add_cylinder(foot, 0.2, 0.9, is_blank ? Style::kBlank : Style::kCrate);
+  const Vector3d centre = foot + Vector3d(0.0, 0.0, 1.1);
+  builder.add_sphere(centre, 0.2, is_blank ? Style::kBlank : Style::kMetal);
 }
 
-/// Furniture in the four corners of a room; doors in the middle of the walls stay free.
-void furnish_corners(WorldBuilder& builder, const Box& room, Rng& rng) {
+void add_cabinet(WorldBuilder& builder, const Vector3d& foot, bool is_blank) {
+  builder.add_box(box_on(foot, {0.9, 0.45, 0.8}), 0.0, is_blank ? Style::kBlank : Style::kCrate);
+}
+
+/// Furniture in the four corners of a room; doors in the middle of the walls stay free. Of blank
+/// furniture only books and crates have any texture.
+void furnish_corners(WorldBuilder& builder, const Box& room, bool is_blank, Rng& rng) {
   std::array<int, 4> kinds = {0, 1, 2, 3};
   for (std::uint32_t i = 3; i > 0; --i) std::swap(kinds[i], kinds[rng.below(i + 1)]);
   for (int corner = 0; corner < 4; ++corner) {
@@ -64,13 +70,13 @@ void furnish_corners(WorldBuilder& builder, const Box& room, Rng& rng) {
         add_crates(builder, foot(0.5, 0.5), 0.55, rng);
         break;
       case 2:
-        add_globe(builder, foot(0.4, 0.4));
+        add_globe(builder, foot(0.4, 0.4), is_blank);
         break;
       default:
-        builder.add_box(box_on(foot(0.5, 0.25), {0.9, 0.45, 0.8}), 0.0, Style::kCrate);
+        add_cabinet(builder, foot(0.5, 0.25), is_blank);
         builder.add_box(box_on(foot(0.4, 0.25) + Vector3d(0.0, 0.0, 0.8), {0.3, 0.2, 0.35}),
                         20.0,
-                        Style::kMetal);
+                        is_blank ? Style::kBlank : Style::kMetal);
     }
   }
 }
@@ -216,7 +222,7 @@ World make_room(std::uint64_t seed) { return make_one_room(seed, Style::kWall, "
 
 World make_bare_room(std::uint64_t seed) { return make_one_room(seed, Style::kBare, "bare"); }
 
-World make_apartment(std::uint64_t seed) {
+World make_four_rooms(std::uint64_t seed, Style walls, const char* name) {
   constexpr double kWidth = 4.0;
   constexpr double kDepth = 3.5;
   constexpr double kRight = kWidth + kWallThickness;
@@ -231,8 +237,8 @@ World make_apartment(std::uint64_t seed) {
     RoomOpenings openings;
     (is_right ? openings.at_min_x : openings.at_max_x) = {door_at(0.5 * kDepth)};
     (is_upper ? openings.at_min_y : openings.at_max_y) = {door_at(0.5 * kWidth)};
-    builder.add_room(box, openings, Style::kWall);
-    furnish_corners(builder, box, rng);
+    builder.add_room(box, openings, walls);
+    furnish_corners(builder, box, walls == Style::kBlank, rng);
   }
   for (const double offset : {0.0, kUp}) {
     const double y = offset + 0.5 * (kDepth - kDoorWidth);
@@ -242,7 +248,15 @@ World make_apartment(std::uint64_t seed) {
     const double x = offset + 0.5 * (kWidth - kDoorWidth);
     builder.add_doorway({{x, kDepth, 0.0}, {x + kDoorWidth, kUp, kDoorHeight}}, 1);
   }
-  return builder.build("apartment");
+  return builder.build(name);
+}
+
+World make_apartment(std::uint64_t seed) {
+  return make_four_rooms(seed, Style::kWall, "apartment");
+}
+
+World make_blank_apartment(std::uint64_t seed) {
+  return make_four_rooms(seed, Style::kBlank, "blank");
 }
 
 World make_twins(std::uint64_t seed) {
@@ -258,7 +272,7 @@ World make_twins(std::uint64_t seed) {
     RoomOpenings openings;
     openings.at_min_y = {door_at(0.5 * kWidth)};
     builder.add_room(box, openings, Style::kWall);
-    furnish_corners(builder, box, rng);
+    furnish_corners(builder, box, false, rng);
     const double left = x + 0.5 * (kWidth - kDoorWidth);
     builder.add_doorway({{left, -kWallThickness, 0.0}, {left + kDoorWidth, 0.0, kDoorHeight}}, 1);
     doors.push_back(door_at(x + 0.5 * kWidth));
@@ -316,12 +330,13 @@ struct NamedWorld {
   World (*make)(std::uint64_t seed);
 };
 
-constexpr std::array<NamedWorld, 6> kWorlds = {{{"room", make_room},
+constexpr std::array<NamedWorld, 7> kWorlds = {{{"room", make_room},
                                                 {"apartment", make_apartment},
                                                 {"hall", make_hall},
                                                 {"street", make_street},
                                                 {"twins", make_twins},
-                                                {"bare", make_bare_room}}};
+                                                {"bare", make_bare_room},
+                                                {"blank", make_blank_apartment}}};
 
 }  // namespace
 

@@ -57,6 +57,10 @@ void paint_bare(Canvas& canvas, const Area& area, Rng& rng) {
   draw_clouds(canvas, 1.0, 14.0, rng);
 }
 
+void paint_blank(Canvas& canvas, const Area& area, Rng& rng) {
+  canvas.fill_area(area, between(110, 200, rng));
+}
+
 void paint_floor(Canvas& canvas, const Area& area, Rng& rng) {
   canvas.fill_area(area, 45);
   lay_pieces(canvas, area, {{1.1, 0.14}, 0.006, 95, 150, true}, rng);
@@ -186,8 +190,9 @@ void paint_foliage(Canvas& canvas, const Area& area, Rng& rng) {
 
 Image paint(Style style, const Vector2d& size_m, double texel_m, Rng& rng) {
   using Painter = void (*)(Canvas&, const Area&, Rng&);
-  constexpr std::array<Painter, 13> kPainters = {paint_wall,
+  constexpr std::array<Painter, 14> kPainters = {paint_wall,
                                                  paint_bare,
+                                                 paint_blank,
                                                  paint_floor,
                                                  paint_tiles,
                                                  paint_ceiling,

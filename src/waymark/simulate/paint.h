@@ -71,10 +71,12 @@ void draw_posters(
 /// Smooth light and dark clouds of about size_m, +-contrast.
 void draw_clouds(Canvas& canvas, double size_m, double contrast, Rng& rng);
 
-/// What a surface looks like. All styles have marks of all sizes; kBare has next to none.
+/// What a surface looks like. All styles have marks of all sizes; kBare has next to none, kBlank is
+/// of one grey.
 enum class Style : std::uint8_t {
   kWall,
   kBare,
+  kBlank,
   kFloor,
   kTiles,
   kCeiling,

@@ -66,9 +66,10 @@ void WorldBuilder::add_room(const Box& box, const RoomOpenings& openings, Style 
   add_wall(left_high, max, z, openings.at_max_y, walls);
   add_wall(min, left_high, z, openings.at_min_x, walls);
   add_wall(right_low, min, z, openings.at_min_y, walls);
-  add_ground(min, max, z.x(), Style::kFloor);
+  const bool is_blank = walls == Style::kBlank;
+  add_ground(min, max, z.x(), is_blank ? Style::kBlank : Style::kFloor);
   add(make_rectangle(at_height(min, z.y()), Vector3d::UnitX(), Vector3d::UnitY(), max - min),
-      Style::kCeiling);
+      is_blank ? Style::kBlank : Style::kCeiling);
 }
 
 void WorldBuilder::add_box(const Box& box, double turn_deg, Style style) {

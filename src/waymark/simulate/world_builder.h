@@ -48,7 +48,7 @@ class WorldBuilder {
                 Style style);
   /// A level rectangle seen from above.
   void add_ground(const Eigen::Vector2d& min, const Eigen::Vector2d& max, double z, Style style);
-  /// Walls, floor and ceiling, seen from inside.
+  /// Walls, floor and ceiling, seen from inside; all blank where the walls are.
   void add_room(const Box& box, const RoomOpenings& openings, Style walls);
   /// Four sides and the top, turned around the vertical through its centre.
   void add_box(const Box& box, double turn_deg, Style style);
