@@ -34,6 +34,8 @@ constexpr double kMaxRelativeStep = 0.02;
 
 /// Standard deviation of the position of a corner; turns slant into uncertainty.
 constexpr double kCornerSigmaPx = 0.5;
+/// That of a point along its edge, where it is as good as anywhere in its cell.
+constexpr double kAlongEdgeSigmaPx = 4.0;
 
 struct Sample {
   double inverse_range;
@@ -118,9 +120,13 @@ std::span<const Sample> nearest_surface(const DepthSamples& around) {
 }
 
 /// Inverse range at the keypoint. A plane in space is a plane in inverse range too; its slope times
-/// the uncertainty of the corner, and what the plane leaves over, add to the sensor's noise.
-/// Noise of neighbours is correlated, so that it does not average out.
-InverseRange fit_surface(std::span<const Sample> surface, double quantum_m, double z) {
+/// the uncertainty of the keypoint, and what the plane leaves over, add to the sensor's noise.
+/// Noise of neighbours is correlated, so that it does not average out. along_px: uncertainty of the
+/// keypoint besides that of corners.
+InverseRange fit_surface(std::span<const Sample> surface,
+                         double quantum_m,
+                         double z,
+                         const Eigen::Vector2d& along_px) {
   const double count = static_cast<double>(surface.size());
   Eigen::Vector3d mean = Eigen::Vector3d::Zero();
   for (const Sample& s : surface) mean += Eigen::Vector3d(s.dx_px, s.dy_px, s.inverse_range);
@@ -141,19 +147,21 @@ InverseRange fit_surface(std::span<const Sample> surface, double quantum_m, doub
   const double inverse_depth = value / z;
   const double quantum_sigma = quantum_m * inverse_depth * inverse_depth / std::sqrt(12.0);
   const double depth_variance = kSensorSigma * kSensorSigma + quantum_sigma * quantum_sigma;
-  const double variance =
-      z * z * depth_variance + left_over + slope.squaredNorm() * kCornerSigmaPx * kCornerSigmaPx;
+  const double along = slope.dot(along_px);
+  const double variance = z * z * depth_variance + left_over +
+                          slope.squaredNorm() * kCornerSigmaPx * kCornerSigmaPx + along * along;
   return {value, std::sqrt(variance)};
 }
 
 std::optional<InverseRange> measure(DepthView depth,
                                     const DepthSettings& settings,
                                     const Keypoint& keypoint,
-                                    const ZPerRange& z) {
+                                    const ZPerRange& z,
+                                    const Eigen::Vector2d& along_px) {
   const DepthSamples around = look_around(depth, settings.factor, keypoint, z);
   const std::span<const Sample> surface = nearest_surface(around);
   if (surface.empty()) return std::nullopt;
-  InverseRange fitted = fit_surface(surface, 1.0 / settings.factor, z.at_keypoint);
+  InverseRange fitted = fit_surface(surface, 1.0 / settings.factor, z.at_keypoint, along_px);
   fitted.value -= settings.inverse_offset * z.at_keypoint;
   if (!(fitted.value > 0.0)) return std::nullopt;
   return fitted;
@@ -166,6 +174,7 @@ void sample_depth(DepthView depth,
                   std::span<const Keypoint> keypoints,
                   std::span<const Eigen::Vector3f> bearings,
                   std::span<const Matrix23f> level_pixel_from_bearing,
+                  std::size_t num_edges,
                   std::vector<float>& range_m,
                   std::vector<float>& inverse_range_sigma) {
   WAYMARK_CHECK(bearings.size() == keypoints.size());
@@ -175,7 +184,11 @@ void sample_depth(DepthView depth,
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (bearings[i].z() < kMinZPerRange) continue;
     const ZPerRange z = z_per_range(keypoints[i], bearings[i], level_pixel_from_bearing[i]);
-    const std::optional<InverseRange> inverse = measure(depth, settings, keypoints[i], z);
+    const double angle_rad = keypoints[i].angle_rad;
+    const Eigen::Vector2d along(-std::sin(angle_rad), std::cos(angle_rad));
+    const double along_px = i + num_edges < keypoints.size() ? 0.0 : kAlongEdgeSigmaPx;
+    const std::optional<InverseRange> inverse =
+        measure(depth, settings, keypoints[i], z, along_px * along);
     if (!inverse) continue;
     range_m[i] = static_cast<float>(1.0 / inverse->value);
     inverse_range_sigma[i] = static_cast<float>(inverse->sigma);

@@ -45,7 +45,8 @@ Measured measure(const DepthImage& image, float x_px, float y_px, Eigen::Vector3
   const std::vector<Matrix23f> derivatives = {derivative(bearings[0])};
   std::vector<float> range_m;
   std::vector<float> sigma;
-  sample_depth(image.view(), {.factor = kFactor}, keypoints, bearings, derivatives, range_m, sigma);
+  sample_depth(
+      image.view(), {.factor = kFactor}, keypoints, bearings, derivatives, 0, range_m, sigma);
   return {range_m[0], sigma[0]};
 }
 
@@ -115,10 +116,10 @@ TEST(Depth, AllocatesNothingOnceWarm) {
   std::vector<float> range_m;
   std::vector<float> sigma;
   sample_depth(
-      slanted.view(), {.factor = kFactor}, keypoints, bearings, derivatives, range_m, sigma);
+      slanted.view(), {.factor = kFactor}, keypoints, bearings, derivatives, 0, range_m, sigma);
   const long before = testing::num_allocations();
   sample_depth(
-      slanted.view(), {.factor = kFactor}, keypoints, bearings, derivatives, range_m, sigma);
+      slanted.view(), {.factor = kFactor}, keypoints, bearings, derivatives, 0, range_m, sigma);
   EXPECT_EQ(testing::num_allocations() - before, 0);
   EXPECT_GT(range_m[49], 1.0f);
 }

@@ -6,11 +6,13 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "waymark/base/check.h"
 #include "waymark/image/brief.h"
 #include "waymark/image/corners.h"
+#include "waymark/image/edges.h"
 #include "waymark/image/fast.h"
 #include "waymark/image/spread.h"
 
@@ -20,6 +22,17 @@ namespace {
 // Corners keep this distance from the border of their level, so that the patch that describes them
 // lies within.
 constexpr int kBorderPx = kBriefRadius;
+
+// Points on edges join in where strong corners are in less than this part of the image, whose
+// longer side has so many blocks (docs/decisions.md).
+constexpr double kFewCovered = 0.45;
+// So many corners in all are needed per block that is expected to have some.
+constexpr int kCornersPerBlock = 4;
+constexpr int kNumBlocks = 8;
+// The level of edges: one that noise and blur change little.
+constexpr int kEdgeLevel = 2;
+// Slope of an edge, per grey value of its height, in pixels of its level.
+constexpr double kSlopeOfHeight = 0.35;
 
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
@@ -54,15 +67,19 @@ double needed_density(const PaddedImage& image, int level, int count) {
   return share / area;
 }
 
-// The corners of a level that the mask lets through: it counts the levels from 0 up.
-std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corners) {
+// Whether the mask lets a pixel of a level through: it counts the levels from 0 up.
+bool allows(ImageView mask, int level, int x_px, int y_px) {
   const auto nearest = [&](int coordinate_px, int size) {
     const double at = Pyramid::level0_from_level(coordinate_px, level) + 0.5;
     return std::min(static_cast<int>(at), size - 1);
   };
+  return mask.at(nearest(x_px, mask.width_px), nearest(y_px, mask.height_px)) > level;
+}
+
+// The corners of a level that the mask lets through.
+std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corners) {
   const auto end = std::remove_if(corners.begin(), corners.end(), [&](const Corner& corner) {
-    return mask.at(nearest(corner.x_px, mask.width_px), nearest(corner.y_px, mask.height_px)) <=
-           level;
+    return !allows(mask, level, corner.x_px, corner.y_px);
   });
   return corners.first(static_cast<std::size_t>(end - corners.begin()));
 }
@@ -84,11 +101,20 @@ struct FeatureExtractor::Workspace {
   std::vector<float> angles_rad;
   PaddedImage smooth;
   BlurWorkspace blur;
+  EdgeFinder edge_finder;
+  std::vector<std::uint8_t> has_no_corner;
+  std::vector<std::uint8_t> is_covered;
 
   void reserve(int width_px, int height_px, int count);
   LevelCounts detect(ImageView mask, const FeatureSettings& settings);
   void choose(int level, int count);
   void append(int level, std::vector<Keypoint>& keypoints, std::vector<Descriptor>& descriptors);
+  void mark_strong_corners(std::span<const Keypoint> keypoints);
+  bool has_few_corners(ImageView mask, int count);
+  std::size_t append_edges(ImageView mask,
+                           const FeatureSettings& settings,
+                           std::vector<Keypoint>& keypoints,
+                           std::vector<Descriptor>& descriptors);
 };
 
 void FeatureExtractor::Workspace::reserve(int width_px, int height_px, int count) {
@@ -153,6 +179,92 @@ void FeatureExtractor::Workspace::append(int level,
   }
 }
 
+// Parts of this size that cover a length.
+int num_cells(int length, int cell) { return (length + cell - 1) / cell; }
+
+// Cells around strong corners, which tell more than edges do.
+void FeatureExtractor::Workspace::mark_strong_corners(std::span<const Keypoint> keypoints) {
+  const PaddedImage& image = pyramid.image(kEdgeLevel);
+  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
+  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
+  has_no_corner.assign(static_cast<std::size_t>(columns * rows), 1);
+  for (const Keypoint& keypoint : keypoints) {
+    if (keypoint.response < static_cast<float>(kStrongContrast)) continue;
+    const auto cell = [&](float coordinate_px, int count) {
+      const double at = Pyramid::level_from_level0(coordinate_px, kEdgeLevel);
+      return std::clamp(static_cast<int>(at) / EdgeFinder::kCellPx, 0, count - 1);
+    };
+    const int index = cell(keypoint.y_px, rows) * columns + cell(keypoint.x_px, columns);
+    has_no_corner[static_cast<std::size_t>(index)] = 0;
+  }
+}
+
+// Whether strong corners, of `count` corners in all, are in few of the blocks whose centre the mask
+// lets through.
+bool FeatureExtractor::Workspace::has_few_corners(ImageView mask, int count) {
+  const PaddedImage& image = pyramid.image(kEdgeLevel);
+  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
+  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
+  const int block_cells = std::max(num_cells(std::max(columns, rows), kNumBlocks), 1);
+  const int block_px = block_cells * EdgeFinder::kCellPx;
+  const int block_columns = num_cells(image.width_px(), block_px);
+  const int num_blocks = block_columns * num_cells(image.height_px(), block_px);
+  is_covered.assign(static_cast<std::size_t>(num_blocks), 0);
+  for (int row = 0; row < rows; ++row) {
+    for (int column = 0; column < columns; ++column) {
+      const int block = row / block_cells * block_columns + column / block_cells;
+      is_covered[static_cast<std::size_t>(block)] |=
+          !has_no_corner[static_cast<std::size_t>(row * columns + column)];
+    }
+  }
+  int num_allowed = 0;
+  int num_covered = 0;
+  for (int i = 0; i < num_blocks; ++i) {
+    const int x = i % block_columns * block_px + block_px / 2;
+    const int y = i / block_columns * block_px + block_px / 2;
+    if (!mask.is_empty() && !allows(mask, kEdgeLevel, x, y)) continue;
+    ++num_allowed;
+    num_covered += is_covered[static_cast<std::size_t>(i)];
+  }
+  return num_covered < kFewCovered * std::min(num_allowed, count / kCornersPerBlock);
+}
+
+std::size_t FeatureExtractor::Workspace::append_edges(ImageView mask,
+                                                      const FeatureSettings& settings,
+                                                      std::vector<Keypoint>& keypoints,
+                                                      std::vector<Descriptor>& descriptors) {
+  mark_strong_corners(keypoints);
+  if (!has_few_corners(mask, settings.count)) return 0;
+  const PaddedImage& image = pyramid.image(kEdgeLevel);
+  const auto points = edge_finder.find(image,
+                                       has_no_corner,
+                                       {.border_px = kBorderPx + 1,
+                                        .min_slope = kSlopeOfHeight * settings.min_contrast,
+                                        .count = static_cast<std::size_t>(settings.count) / 2});
+  selected.clear();
+  angles_rad.clear();
+  for (const EdgePoint& point : points) {
+    const auto x = static_cast<std::uint16_t>(std::lround(point.x_px));
+    const auto y = static_cast<std::uint16_t>(std::lround(point.y_px));
+    if (!mask.is_empty() && !allows(mask, kEdgeLevel, x, y)) continue;
+    selected.push_back({x, y, 0});
+    angles_rad.push_back(point.angle_rad);
+    Keypoint keypoint;
+    keypoint.x_px = static_cast<float>(Pyramid::level0_from_level(point.x_px, kEdgeLevel));
+    keypoint.y_px = static_cast<float>(Pyramid::level0_from_level(point.y_px, kEdgeLevel));
+    keypoint.angle_rad = point.angle_rad;
+    keypoint.response = point.slope;
+    keypoint.level = kEdgeLevel;
+    keypoints.push_back(keypoint);
+  }
+  if (selected.empty()) return 0;
+  gaussian_blur(image, blur, smooth);
+  const std::size_t num_before = descriptors.size();
+  descriptors.resize(num_before + selected.size());
+  describe(smooth, selected, angles_rad, std::span(descriptors).subspan(num_before));
+  return selected.size();
+}
+
 FeatureExtractor::FeatureExtractor(const FeatureSettings& settings)
     : settings_(settings), workspace_(std::make_unique<Workspace>()) {}
 FeatureExtractor::~FeatureExtractor() = default;
@@ -161,10 +273,10 @@ FeatureExtractor& FeatureExtractor::operator=(FeatureExtractor&&) noexcept = def
 
 const Pyramid& FeatureExtractor::pyramid() const { return workspace_->pyramid; }
 
-void FeatureExtractor::extract(ImageView image,
-                               ImageView mask,
-                               std::vector<Keypoint>& keypoints,
-                               std::vector<Descriptor>& descriptors) {
+std::size_t FeatureExtractor::extract(ImageView image,
+                                      ImageView mask,
+                                      std::vector<Keypoint>& keypoints,
+                                      std::vector<Descriptor>& descriptors) {
   check_input(image, mask);
   keypoints.clear();
   descriptors.clear();
@@ -180,6 +292,8 @@ void FeatureExtractor::extract(ImageView image,
     workspace_->choose(level, count);
     workspace_->append(level, keypoints, descriptors);
   }
+  if (!settings_.edges) return 0;
+  return workspace_->append_edges(mask, settings_, keypoints, descriptors);
 }
 
 }  // namespace waymark

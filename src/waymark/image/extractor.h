@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <memory>
 #include <vector>
 
@@ -27,11 +28,12 @@ class FeatureExtractor {
   /// the image, ordered by level, row and column. There are settings.count of them, fewer only
   /// where the image has no more corners. The mask is empty or of the size of the image; there are
   /// no features of a level where it is not above the number of the level, none at all where it is
-  /// 0. Throws InputError where the sizes differ.
-  void extract(ImageView image,
-               ImageView mask,
-               std::vector<Keypoint>& keypoints,
-               std::vector<Descriptor>& descriptors);
+  /// 0. Where corners of good contrast are few, points on edges follow (EdgeFinder), whose angle is
+  /// that across the edge; returns how many. Throws InputError where the sizes differ.
+  std::size_t extract(ImageView image,
+                      ImageView mask,
+                      std::vector<Keypoint>& keypoints,
+                      std::vector<Descriptor>& descriptors);
 
   /// Levels of the last image.
   const Pyramid& pyramid() const;

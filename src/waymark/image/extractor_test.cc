@@ -19,11 +19,12 @@ namespace {
 struct Extracted {
   std::vector<Keypoint> keypoints;
   std::vector<Descriptor> descriptors;
+  std::size_t num_edges = 0;
 };
 
 Extracted extract(FeatureExtractor& extractor, const PaddedImage& image, ImageView mask = {}) {
   Extracted result;
-  extractor.extract(image.view(), mask, result.keypoints, result.descriptors);
+  result.num_edges = extractor.extract(image.view(), mask, result.keypoints, result.descriptors);
   return result;
 }
 
@@ -133,6 +134,47 @@ TEST(FeatureExtractor, HonoursMasks) {
     // Up to half a pixel of the coarsest level for the sub-pixel part.
     EXPECT_GT(keypoint.x_px, 199.0f - 1.8f);
   }
+}
+
+/// A wall with a poster in one corner, and a door.
+PaddedImage make_blank_wall() {
+  PaddedImage image = testing::make_texture(640, 480, 4, 2);
+  for (int y = 0; y < 480; ++y) {
+    for (int x = y < 120 ? 160 : 0; x < 640; ++x) {
+      image.row(y)[x] = x > 300 && x < 480 && y > 200 ? 120 : 160;
+    }
+  }
+  return image;
+}
+
+TEST(FeatureExtractor, AddsPointsOnEdgesWhereCornersAreFew) {
+  FeatureExtractor extractor({});
+  const Extracted features = extract(extractor, make_blank_wall());
+  ASSERT_GT(features.num_edges, 30u);
+  ASSERT_EQ(features.descriptors.size(), features.keypoints.size());
+  int num_of_door = 0;
+  for (std::size_t i = features.keypoints.size() - features.num_edges;
+       i < features.keypoints.size();
+       ++i) {
+    const Keypoint& keypoint = features.keypoints[i];
+    const double side = std::min(std::abs(keypoint.x_px - 300.5), std::abs(keypoint.x_px - 479.5));
+    num_of_door += std::min(side, std::abs(keypoint.y_px - 200.5)) < 0.5;
+  }
+  EXPECT_GT(num_of_door, 30);
+  FeatureExtractor without({.edges = false});
+  EXPECT_EQ(extract(without, make_blank_wall()).num_edges, 0u);
+  EXPECT_EQ(extract(extractor, testing::make_texture(640, 480, 4, 2)).num_edges, 0u);
+}
+
+TEST(FeatureExtractor, AddsNoEdgesWhereTheMaskIs) {
+  Image mask(640, 480);
+  for (int y = 0; y < 480; ++y) {
+    for (int x = 0; x < 640; ++x) mask.row(y)[x] = x < 400 ? 8 : 0;
+  }
+  FeatureExtractor extractor({});
+  const Extracted features = extract(extractor, make_blank_wall(), mask.view());
+  EXPECT_GT(features.num_edges, 10u);
+  for (const Keypoint& keypoint : features.keypoints) EXPECT_LT(keypoint.x_px, 402.0f);
 }
 
 TEST(FeatureExtractor, FindsNothingWhereThereIsNothing) {

@@ -75,6 +75,7 @@ std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features) {
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     derive_of_camera(c, *rig.cameras[c].camera, workspace, features, is_valid);
   }
+  keep_across(features);
   const Camera& camera = *rig.cameras[0].camera;
   features.grid =
       FeatureGrid(camera.width_px(),
@@ -85,6 +86,13 @@ std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features) {
                     return std::pair(features.keypoints[i].x_px, features.keypoints[i].y_px);
                   });
   return is_valid;
+}
+
+void keep_across(Features& features) {
+  for (std::size_t i = features.num_corners(); i < features.num_primary; ++i) {
+    Matrix23f& w = features.level_pixel_from_bearing[i];
+    w = across_edge(w, features.keypoints[i].angle_rad);
+  }
 }
 
 void measure_stereo_ranges(const Rig& rig, Features& features) {

@@ -19,6 +19,9 @@ namespace waymark {
 /// bearing; where it has none, what was filled in is unspecified.
 std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features);
 
+/// Leaves of level_pixel_from_bearing of points on edges what is across.
+void keep_across(Features& features);
+
 /// Ranges of the primary features that have a partner in camera 1, with their standard deviations:
 /// from the angle between the two in the epipolar plane. rig: two cameras, some distance apart.
 void measure_stereo_ranges(const Rig& rig, Features& features);

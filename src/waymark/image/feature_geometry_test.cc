@@ -61,6 +61,24 @@ TEST(FeatureGeometry, SaysWhichPixelsHaveNoBearing) {
   EXPECT_EQ(derive_geometry(make_rig(), features), (std::vector<std::uint8_t>{1, 0}));
 }
 
+TEST(FeatureGeometry, OfEdgesIsAcross) {
+  constexpr float kAngleRad = 0.7f;
+  Features features;
+  features.keypoints = {{.x_px = 100.0f, .y_px = 150.0f, .angle_rad = kAngleRad, .level = 2},
+                        {.x_px = 100.0f, .y_px = 150.0f, .angle_rad = kAngleRad, .level = 2}};
+  features.num_primary = 2;
+  features.num_edges = 1;
+  derive_geometry(make_rig(), features);
+  EXPECT_FALSE(features.is_edge(0));
+  EXPECT_TRUE(features.is_edge(1));
+  const Eigen::Vector2f across(std::cos(kAngleRad), std::sin(kAngleRad));
+  const Matrix23f& of_corner = features.level_pixel_from_bearing[0];
+  const Matrix23f& of_edge = features.level_pixel_from_bearing[1];
+  EXPECT_LT((across.transpose() * (of_edge - of_corner)).norm(), 1e-3f);
+  EXPECT_LT((Eigen::RowVector2f(-across.y(), across.x()) * of_edge).norm(), 1e-3f);
+  EXPECT_GT(of_edge.norm(), 100.0f);
+}
+
 /// A feature that shows a point in both cameras; found in camera 1 beside where that is, in pixels
 /// of level 0 along its rows.
 Features see_pair(const Rig& rig, const Eigen::Vector3d& point_in_rig, double off_px) {

@@ -4,8 +4,10 @@
 
 #include <Eigen/Core>
 #include <array>
+#include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "waymark/camera/camera.h"
@@ -13,12 +15,14 @@
 
 namespace waymark {
 
-/// A corner in the image of one camera of the rig. Pixel of level 0, sub-pixel.
+/// A corner, or a point on an edge, in the image of one camera of the rig. Pixel of level 0,
+/// sub-pixel.
 struct Keypoint {
-  float x_px = 0.0f;        ///< To the right; 0 is the centre of the leftmost pixels.
-  float y_px = 0.0f;        ///< Down; 0 is the centre of the top pixels.
-  float angle_rad = 0.0f;   ///< Orientation of the patch, clockwise as y points down.
-  float response = 0.0f;    ///< Corner score; comparable within one image only.
+  float x_px = 0.0f;  ///< To the right; 0 is the centre of the leftmost pixels.
+  float y_px = 0.0f;  ///< Down; 0 is the centre of the top pixels.
+  /// Orientation of the patch, or across the edge to the lighter side; clockwise as y points down.
+  float angle_rad = 0.0f;
+  float response = 0.0f;    ///< Corner score, or slope; comparable within one image only.
   std::uint8_t level = 0;   ///< Pyramid level it was found at.
   std::uint8_t camera = 0;  ///< Index in the rig.
 };
@@ -39,16 +43,25 @@ struct RigMotion {
   friend bool operator==(const RigMotion&, const RigMotion&) = default;
 };
 
+/// What an edge leaves of W: n n^T W, n being the unit vector across it in the image.
+inline Matrix23f across_edge(const Matrix23f& level_pixel_from_bearing, float angle_rad) {
+  const Eigen::Vector2f across(std::cos(angle_rad), std::sin(angle_rad));
+  return across * (across.transpose() * level_pixel_from_bearing).eval();
+}
+
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
-/// none and belong to a primary feature.
+/// none and belong to a primary feature. Where corners are few the last of the primary features are
+/// points on edges, which tell their place across the edge only.
 struct Features {
   std::size_t num_primary = 0;            ///< Features of camera 0.
+  std::size_t num_edges = 0;              ///< The last of these are points on edges.
   std::vector<Keypoint> keypoints;        ///< All features; pixels are those of each one's camera.
   std::vector<Descriptor> descriptors;    ///< num_primary entries.
   std::vector<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
   /// Derivative of the pixel of the feature's level by the bearing, at the measured bearing (W).
-  /// The residual of a landmark is W * (predicted bearing - measured bearing).
+  /// The residual of a landmark is W * (predicted bearing - measured bearing). On edges W has rank
+  /// 1: what it gives is across.
   std::vector<Matrix23f> level_pixel_from_bearing;
   std::vector<float> size_rad;  ///< Angle of one pixel of the feature's level.
   /// The feature of camera 1 that belongs to a primary feature, and back; kNoFeature where none.
@@ -68,6 +81,16 @@ struct Features {
 
   /// Features of both cameras.
   std::size_t size() const { return keypoints.size(); }
+
+  /// The primary features that are no points on edges come first.
+  std::size_t num_corners() const { return num_primary - num_edges; }
+  bool is_edge(std::size_t feature) const {
+    return feature >= num_corners() && feature < num_primary;
+  }
+  /// What corners look like, the only ones that are known by that.
+  std::span<const Descriptor> corner_descriptors() const {
+    return std::span(descriptors).first(num_corners());
+  }
 
   /// What a feature measures. Features of camera 1 are found again where those of camera 0 are,
   /// with the errors of these: what they add is the range.

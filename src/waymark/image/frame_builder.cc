@@ -149,6 +149,7 @@ std::shared_ptr<const Features> FrameBuilder::build(const FrameImages& images,
     add_depth(images, motion, *features);
   }
   times_.depth_ms = ms_since(depth_start);
+  keep_across(*features);
   return moved(std::move(features), rig_, motion);
 }
 
@@ -177,6 +178,7 @@ void FrameBuilder::add_depth(const FrameImages& images,
                keypoints_,
                bearings,
                features.level_pixel_from_bearing,
+               features.num_edges,
                features.range_m,
                features.inverse_range_sigma);
   features.inverse_depth_offset = static_cast<float>(settings_.depth.inverse_offset);
@@ -191,29 +193,31 @@ const TangentArrays& FrameBuilder::compute_tangents(const Camera& camera) {
   return tangent_computer_.compute(camera, pixels_, level_scales_);
 }
 
-void FrameBuilder::extract_keypoints(const FrameImages& images) {
+std::size_t FrameBuilder::extract_keypoints(const FrameImages& images) {
   view_masks_[0].learn(images.image0);
   const ImageView mask = view_masks_[0].num_levels(images.mask);
   small_image_ = std::make_shared<const SmallImage>(make_small_image(images.image0, mask));
   if (!seam_) {
-    extractor_.extract(images.image0, mask, keypoints_, descriptors_);
-    return;
+    return extractor_.extract(images.image0, mask, keypoints_, descriptors_);
   }
   const int width = images.image0.width_px;
   const ImageView wide_mask =
       seam_->widen_mask(mask, width, images.image0.height_px, Pyramid::kNumLevels);
-  extractor_.extract(seam_->widen(images.image0), wide_mask, keypoints_, descriptors_);
+  const std::size_t num_edges =
+      extractor_.extract(seam_->widen(images.image0), wide_mask, keypoints_, descriptors_);
   for (Keypoint& keypoint : keypoints_) {
     keypoint.x_px -= static_cast<float>(seam_->margin_px());
     const auto right = static_cast<float>(width) - 0.5f;
     if (keypoint.x_px < -0.5f) keypoint.x_px += static_cast<float>(width);
     if (keypoint.x_px >= right) keypoint.x_px -= static_cast<float>(width);
   }
+  return num_edges;
 }
 
 /// Features without a usable bearing are dropped.
 void FrameBuilder::extract_primary(const FrameImages& images, Features& features) {
-  extract_keypoints(images);
+  const std::size_t num_edges = extract_keypoints(images);
+  const std::size_t num_corners = keypoints_.size() - num_edges;
   pixels_.clear();
   level_scales_.clear();
   for (const Keypoint& keypoint : keypoints_) {
@@ -228,6 +232,7 @@ void FrameBuilder::extract_primary(const FrameImages& images, Features& features
     if (!tangents.is_valid[i]) continue;
     append(features, keypoints_[i], tangents, i);
     features.descriptors.push_back(descriptors_[i]);
+    features.num_edges += i >= num_corners;
   }
   const std::size_t count = features.keypoints.size();
   features.num_primary = count;

@@ -94,7 +94,8 @@ class FrameBuilder {
 
  private:
   void extract_primary(const FrameImages& images, Features& features);
-  void extract_keypoints(const FrameImages& images);
+  /// Returns how many of them, the last, are points on edges.
+  std::size_t extract_keypoints(const FrameImages& images);
   void add_stereo(const FrameImages& images, Features& features);
   void add_depth(const FrameImages& images, const RigMotion& motion, Features& features);
   const TangentArrays& compute_tangents(const Camera& camera);

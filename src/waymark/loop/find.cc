@@ -65,7 +65,7 @@ std::vector<KeyframeId> with_neighbours(const Map& map,
 std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query) {
   const std::vector<KeyframeId> near = within_steps(map, query, kNumNearSteps);
   const auto ranked =
-      places.find(map.keyframes().at(query).features->descriptors,
+      places.find(map.keyframes().at(query).features->corner_descriptors(),
                   {.max_candidates = near.size() + kNumRanked,
                    .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
   double best_near = 0.0;

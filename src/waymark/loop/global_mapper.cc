@@ -58,7 +58,7 @@ void GlobalMapper::add(const NewKeyframe& message) {
 void GlobalMapper::update_places(const Mapper::Changes& changes) {
   for (const KeyframeId id : changes.added) {
     const Keyframe& keyframe = mapper_.map().keyframes().at(id);
-    places_.add(id, keyframe.submap, keyframe.features->descriptors);
+    places_.add(id, keyframe.submap, keyframe.features->corner_descriptors());
   }
   for (const KeyframeId id : changes.erased) places_.erase(id);
 }

@@ -84,6 +84,8 @@ struct Appearance {
   Eigen::Vector3d direction = Eigen::Vector3d::Zero();  ///< Mean unit vector towards its observers.
   /// Extent in metres of one pixel of the level it was seen at: distance times size_rad.
   double size_m = 0.0;
+  /// Of a point on an edge: a unit vector across it, in the world; zero otherwise.
+  Eigen::Vector3d across = Eigen::Vector3d::Zero();
 };
 
 /// A point of the map.

@@ -107,6 +107,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
     record.fail(fmt::format(
         "has {} descriptors, expected at most {}, one per feature", num_primary, count));
   }
+  if (record.has("num_edges")) features->num_edges = record.whole("num_edges", num_primary);
   features->bearings = record.array<Eigen::Vector3f>("bearing", count);
   features->level_pixel_from_bearing =
       record.array<Matrix23f>("level_pixel_from_bearing", count, kSlopeRange);

@@ -56,6 +56,7 @@ void expect_same(const Keyframe& a, const Keyframe& b) {
 void expect_same(const Features& a, const Features& b) {
   ASSERT_EQ(a.size(), b.size());
   EXPECT_EQ(a.num_primary, b.num_primary);
+  EXPECT_EQ(a.num_edges, b.num_edges);
   for (std::size_t i = 0; i < a.size(); ++i) {
     const Keypoint& p = a.keypoints[i];
     const Keypoint& q = b.keypoints[i];
@@ -99,6 +100,7 @@ TEST(MapFile, HoldsEverything) {
     EXPECT_EQ(std::tie(a.num_visible, a.num_found, a.appearance.descriptor, a.appearance.size_m),
               std::tie(b.num_visible, b.num_found, b.appearance.descriptor, b.appearance.size_m));
     EXPECT_EQ(a.appearance.direction, b.appearance.direction);
+    EXPECT_EQ(a.appearance.across, b.appearance.across);
   });
 }
 

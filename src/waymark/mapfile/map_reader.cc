@@ -171,6 +171,10 @@ void MapReader::read_landmarks(MapRecord& record) {
   const auto descriptors = record.array<Descriptor>("descriptor", count);
   const auto directions = record.array<Eigen::Vector3d>("direction", count, kDirectionRange);
   const auto sizes_m = record.array<double>("size_m", count, kLandmarkSizeRange);
+  auto across = std::vector<Eigen::Vector3d>(count, Eigen::Vector3d::Zero());
+  if (record.has("across")) {
+    across = record.array<Eigen::Vector3d>("across", count, kDirectionRange);
+  }
   for (std::size_t i = 0; i < count; ++i) {
     MapParts::StoredLandmark stored{ids[i], {}};
     stored.landmark.submap = submaps[i];
@@ -178,7 +182,7 @@ void MapReader::read_landmarks(MapRecord& record) {
     stored.landmark.reference = references[i];
     stored.landmark.num_visible = num_visible[i];
     stored.landmark.num_found = num_found[i];
-    stored.landmark.appearance = {descriptors[i], directions[i], sizes_m[i]};
+    stored.landmark.appearance = {descriptors[i], directions[i], sizes_m[i], across[i]};
     parts_.landmarks.push_back(std::move(stored));
   }
 }

@@ -106,6 +106,7 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   writer.add_array("response", column(keypoints, &Keypoint::response));
   writer.add_array("level", column(keypoints, &Keypoint::level));
   writer.add_array("camera", column(keypoints, &Keypoint::camera));
+  if (features.num_edges > 0) writer.add("num_edges", features.num_edges);
   writer.add_array("descriptor", features.descriptors);
   writer.add_array("bearing", features.bearings);
   writer.add_array("level_pixel_from_bearing", features.level_pixel_from_bearing, kSlopeRange);
@@ -142,6 +143,8 @@ struct LandmarkRows {
   std::vector<Descriptor> descriptor;
   std::vector<Eigen::Vector3d> direction;
   std::vector<double> size_m;
+  std::vector<Eigen::Vector3d> across;
+  bool has_edges = false;
 
   void add(LandmarkId landmark_id, const Landmark& landmark) {
     id.push_back(landmark_id);
@@ -153,6 +156,8 @@ struct LandmarkRows {
     descriptor.push_back(landmark.appearance.descriptor);
     direction.push_back(landmark.appearance.direction);
     size_m.push_back(landmark.appearance.size_m);
+    across.push_back(landmark.appearance.across);
+    has_edges |= !across.back().isZero();
   }
 
   void write(MapRecordWriter& writer, std::uint64_t record_id) const {
@@ -166,6 +171,7 @@ struct LandmarkRows {
     writer.add_array("descriptor", descriptor);
     writer.add_array("direction", direction, kDirectionRange);
     writer.add_array("size_m", size_m, kLandmarkSizeRange);
+    if (has_edges) writer.add_array("across", across, kDirectionRange);
     writer.end();
   }
 };

@@ -3,6 +3,7 @@
 #include "waymark/mapping/appearance.h"
 
 #include <array>
+#include <cmath>
 #include <span>
 
 #include "waymark/base/median.h"
@@ -31,6 +32,19 @@ Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) 
   return *descriptors[best];
 }
 
+/// The unit vector across an edge as camera 0 sees it, in the world; zero where there is none.
+Eigen::Vector3d across_edge(const Features& features,
+                            std::uint32_t feature,
+                            const Rigid3& cam_from_world) {
+  if (!features.is_edge(feature)) return Eigen::Vector3d::Zero();
+  const float angle_rad = features.keypoints[feature].angle_rad;
+  const Eigen::Vector2f across(std::cos(angle_rad), std::sin(angle_rad));
+  // The slope of the distance from the edge, by the bearing: its steepest direction.
+  const Eigen::Vector3f by_bearing =
+      features.level_pixel_from_bearing[feature].transpose() * across;
+  return cam_from_world.rotation_matrix().transpose() * by_bearing.cast<double>().normalized();
+}
+
 }  // namespace
 
 Appearance describe_landmark(const Map& map, LandmarkId id) {
@@ -49,6 +63,7 @@ Appearance describe_landmark(const Map& map, LandmarkId id) {
     descriptors.push_back(&features.descriptors[observation.feature]);
     if (observation.keyframe == landmark.reference || appearance.size_m == 0.0) {
       appearance.size_m = distance * features.size_rad[observation.feature];
+      appearance.across = across_edge(features, observation.feature, cam_from_world);
     }
   }
   if (descriptors.empty()) return landmark.appearance;

@@ -45,8 +45,11 @@ bool add_derivatives(const CalibrationParameters& parameters,
   std::vector<float>& all = calibration.level_pixel_by_intrinsics;
   for (std::size_t k = 0; k < measured.indices.size(); ++k) {
     calibration.first_derivative[measured.indices[k]] = all.size();
-    for (std::size_t j = k * stride; j < (k + 1) * stride; ++j) {
-      all.push_back(static_cast<float>((*derivatives)[j]) / measured.level_scales[k]);
+    for (std::size_t j = k * stride; j < (k + 1) * stride; j += 2) {
+      const Eigen::Vector2d by((*derivatives)[j], (*derivatives)[j + 1]);
+      const Eigen::Vector2f counted = (measured.measured[k] * by).cast<float>();
+      all.push_back(counted.x() / measured.level_scales[k]);
+      all.push_back(counted.y() / measured.level_scales[k]);
     }
   }
   return true;

@@ -3,6 +3,7 @@
 #include "waymark/mapping/camera_measurements.h"
 
 #include <Eigen/Cholesky>
+#include <cmath>
 #include <limits>
 #include <map>
 #include <memory>
@@ -12,6 +13,16 @@
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
+namespace {
+
+Eigen::Matrix2d measured_part(const Features& features, std::uint32_t feature) {
+  if (!features.is_edge(feature)) return Eigen::Matrix2d::Identity();
+  const double angle_rad = features.keypoints[feature].angle_rad;
+  const Eigen::Vector2d across(std::cos(angle_rad), std::sin(angle_rad));
+  return across * across.transpose();
+}
+
+}  // namespace
 
 std::vector<CameraMeasurements> collect(const Map& map,
                                         std::span<const Observation> observed,
@@ -26,6 +37,7 @@ std::vector<CameraMeasurements> collect(const Map& map,
     camera.indices.push_back(i);
     camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
+    camera.measured.push_back(measured_part(*keyframe.features, observed[i].feature));
   }
   return cameras;
 }
@@ -65,7 +77,7 @@ void linearize(const CameraMeasurements& measured,
     const Eigen::Vector3d bearing =
         direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
     observation.bearing = bearing.cast<float>();
-    observation.level_pixel_from_bearing = w.cast<float>();
+    observation.level_pixel_from_bearing = (measured.measured[k] * w).cast<float>();
   }
 }
 

@@ -76,6 +76,7 @@ void add_observations(const Map& map,
     num_keyframes += pose != last;
     last = pose;
     const Features& features = *map.keyframes().at(observation.keyframe).features;
+    if (features.is_edge(observation.feature)) continue;
     const Keypoint& keypoint = features.keypoints[observation.feature];
     BundleObservation measured;
     measured.pose = static_cast<std::uint32_t>(pose);

@@ -12,6 +12,7 @@
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"
 #include "waymark/mapping/triangulate.h"
+#include "waymark/mapping/triangulate_edges.h"
 
 namespace waymark {
 namespace {
@@ -71,6 +72,7 @@ Mapper::Changes Mapper::add(const NewKeyframe& message) {
   const LandmarkId first_new = map_.landmarks().end_id();
   add_landmarks_from_range(map_, id, dirty_);
   triangulate_with_neighbours(map_, id, epipolar_, dirty_);
+  triangulate_edges(map_, id, dirty_);
   for (std::uint32_t value = first_new.value; value < map_.landmarks().end_id().value; ++value) {
     probation_.add(LandmarkId{value}, id.value);
   }

@@ -37,9 +37,11 @@ std::span<const FeatureMatch> AppearanceMatcher::match_all(const Features& a,
                                                            const Features& b,
                                                            const AppearanceOptions& options) {
   begin(b);
-  candidates_.resize(b.num_primary);
+  candidates_.resize(b.num_corners());
   std::iota(candidates_.begin(), candidates_.end(), 0u);
-  for (std::uint32_t index : indices_a) choose(index, a, b, options);
+  for (std::uint32_t index : indices_a) {
+    if (!a.is_edge(index)) choose(index, a, b, options);
+  }
   return finish(a, b);
 }
 
@@ -51,11 +53,12 @@ std::span<const FeatureMatch> AppearanceMatcher::match_near(
     const AppearanceOptions& options) {
   WAYMARK_CHECK(expected_pixels.size() == a.num_primary);
   begin(b);
-  for (std::uint32_t index = 0; index < a.num_primary; ++index) {
+  for (std::uint32_t index = 0; index < a.num_corners(); ++index) {
     const Eigen::Vector2f pixel = expected_pixels[index];
     const float size = a.size_rad[index];
     candidates_.clear();
     b.grid.visit_near(pixel.x(), pixel.y(), radius_px, [&](std::uint32_t feature) {
+      if (b.is_edge(feature)) return;
       const Keypoint& keypoint = b.keypoints[feature];
       const double across = b.grid.column_distance_px(keypoint.x_px, pixel.x());
       if (std::hypot(across, keypoint.y_px - pixel.y()) > radius_px) return;

@@ -19,7 +19,7 @@ struct FeatureMatch {
   std::uint16_t distance = 0;  ///< Hamming.
 };
 
-/// Matches primary features by descriptor alone, or within a window of the image. One to one.
+/// Matches corners of camera 0 by descriptor alone, or within a window of the image. One to one.
 /// Matches whose change of orientation disagrees with the rest are dropped (Hough voting, Lowe
 /// 2004, 7.3). Keeps its buffers; results stay valid until the next call.
 class AppearanceMatcher {

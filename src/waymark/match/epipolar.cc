@@ -44,14 +44,14 @@ std::span<const FeatureMatch> EpipolarMatcher::match(const Features& a,
     return Polar{std::atan2(v.y(), v.x()), std::atan2(across, v.z()), feature};
   };
   polar_b_.clear();
-  for (std::uint32_t i = 0; i < b.num_primary; ++i) {
+  for (std::uint32_t i = 0; i < b.num_corners(); ++i) {
     if (!is_taken_b[i]) polar_b_.push_back(to_polar(axes_from_b * b.bearings[i], i));
   }
   std::sort(polar_b_.begin(), polar_b_.end(), [](const Polar& l, const Polar& r) {
     return l.azimuth_rad != r.azimuth_rad ? l.azimuth_rad < r.azimuth_rad : l.feature < r.feature;
   });
   best_of_b_.assign(b.num_primary, FeatureMatch{kNoFeature, kNoFeature, UINT16_MAX});
-  for (std::uint32_t i = 0; i < a.num_primary; ++i) {
+  for (std::uint32_t i = 0; i < a.num_corners(); ++i) {
     if (!is_taken_a[i]) choose(to_polar(axes_from_a * a.bearings[i], i), a, b, options);
   }
   matches_.clear();

@@ -18,7 +18,7 @@ struct EpipolarOptions {
   AppearanceOptions appearance{.max_distance = 56, .max_ratio = 0.85};
 };
 
-/// Finds features of two views of camera 0 that may show the same unknown point: alike, and on each
+/// Finds corners of two views of camera 0 that may show the same unknown point: alike, and on each
 /// other's epipolar curve. Works on bearings, for any central camera: around the baseline as axis,
 /// both bearings of a point have the same azimuth, and their angles to the axis differ by the
 /// parallax. So the features of b are sorted by azimuth once and each feature of a meets a short

@@ -16,6 +16,7 @@ struct LandmarkSet {
   std::vector<Eigen::Vector3d> directions;  ///< See Appearance.
   std::vector<double> sizes_m;              ///< See Appearance.
   std::vector<Descriptor> descriptors;
+  std::vector<Eigen::Vector3d> across;  ///< See Appearance.
 
   std::size_t size() const { return ids.size(); }
 
@@ -25,6 +26,7 @@ struct LandmarkSet {
     directions.clear();
     sizes_m.clear();
     descriptors.clear();
+    across.clear();
   }
 
   void add(LandmarkId id, const Landmark& landmark) {
@@ -33,6 +35,7 @@ struct LandmarkSet {
     directions.push_back(landmark.appearance.direction);
     sizes_m.push_back(landmark.appearance.size_m);
     descriptors.push_back(landmark.appearance.descriptor);
+    across.push_back(landmark.appearance.across);
   }
 };
 

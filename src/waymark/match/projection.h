@@ -30,7 +30,9 @@ struct ProjectionMatches {
 
 /// Finds landmarks among the primary features of a frame near where a pose puts them (guided
 /// matching as in PTAM, Klein and Murray 2007). Expected scale and radius come from the landmark's
-/// metric size, so that frames of different cameras compare. Keeps its buffers.
+/// metric size, so that frames of different cameras compare. A point on an edge is found where the
+/// nearest edge of that direction passes it, since its place along the edge is not told. Keeps its
+/// buffers.
 class ProjectionMatcher {
  public:
   /// rig: the one that sees the frames.
@@ -51,6 +53,16 @@ class ProjectionMatcher {
   void project(const LandmarkSet& landmarks,
                const Rigid3& rig_from_world,
                double min_direction_cos);
+  /// Where points on edges have their edges; not where there are none to match.
+  void project_edges(const LandmarkSet& landmarks,
+                     const Features& features,
+                     const Rigid3& rig_from_world);
+  void match_edge(std::size_t landmark,
+                  const LandmarkSet& landmarks,
+                  const Features& features,
+                  std::span<const std::uint8_t> is_taken,
+                  double radius_px);
+  void take(std::size_t landmark, std::uint32_t feature, std::uint16_t distance);
   void find_candidates(std::size_t landmark,
                        const LandmarkSet& landmarks,
                        const Features& features,
@@ -73,6 +85,11 @@ class ProjectionMatcher {
   ProjectionMatches matches_;
   std::vector<Eigen::Vector3d> points_in_cam_;
   std::vector<Eigen::Vector2d> pixels_;
+  std::vector<std::uint32_t> edges_;        ///< Of the landmarks; in order.
+  std::vector<Eigen::Vector2d> across_px_;  ///< Per landmark, unit; of edges_ only.
+  std::vector<Eigen::Vector3d> beside_in_cam_;
+  std::vector<Eigen::Vector2d> beside_px_;
+  std::vector<std::uint8_t> is_beside_visible_;
   std::vector<std::uint32_t> candidates_;
   std::vector<std::uint16_t> distances_;
   std::vector<std::uint32_t> landmark_of_feature_;

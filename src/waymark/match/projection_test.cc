@@ -6,6 +6,7 @@
 
 #include <set>
 
+#include "waymark/image/feature_geometry.h"
 #include "waymark/match/test_scene.h"
 
 namespace waymark {
@@ -110,6 +111,48 @@ TEST_F(Projection, FindsNothingWhereThePoseIsFarOff) {
   const Rigid3 turned = make_test_pose(Vector3d::Zero(), {0.0, 0.3, 0.0}) * world_from_rig_;
   const auto& matches = matcher_.match(landmarks_, *seen_.features, {}, turned.inverse(), {});
   EXPECT_LT(static_cast<double>(matches.num_matches), 0.02 * num_true_features());
+}
+
+/// A vertical edge at pixel (319.5, 239.5), 2 m away, lighter on its right.
+LandmarkSet edge_landmark() {
+  Landmark landmark;
+  landmark.position_in_world = {0.0, 0.0, 2.0};
+  landmark.appearance = {{}, -Vector3d::UnitZ(), 2.0 / 420.0, Vector3d::UnitX()};
+  LandmarkSet set;
+  set.add(LandmarkId{0}, landmark);
+  return set;
+}
+
+Features edge_features(const Rig& rig, std::vector<Keypoint> keypoints) {
+  Features features;
+  features.num_primary = features.num_edges = keypoints.size();
+  features.descriptors.resize(keypoints.size());
+  features.keypoints = std::move(keypoints);
+  derive_geometry(rig, features);
+  return features;
+}
+
+TEST_F(Projection, FindsEdgesAcrossThem) {
+  const Features features = edge_features(*rig_,
+                                          {{.x_px = 320.0f, .y_px = 239.0f, .angle_rad = 3.1f},
+                                           {.x_px = 320.5f, .y_px = 252.0f},
+                                           {.x_px = 322.5f, .y_px = 244.0f},
+                                           {.x_px = 325.5f, .y_px = 239.0f}});
+  // Darker on its right, too far along it, and farther across.
+  const auto& matches = matcher_.match(edge_landmark(), features, {}, Rigid3(), {.radius_px = 8.0});
+  EXPECT_EQ(matches.features, std::vector{2u});
+}
+
+TEST_F(Projection, KeepsEdgesAndCornersApart) {
+  Features features = edge_features(*rig_, {{.x_px = 320.0f, .y_px = 239.0f}});
+  LandmarkSet corner = edge_landmark();
+  corner.across[0].setZero();
+  EXPECT_EQ(matcher_.match(corner, features, {}, Rigid3(), {}).num_matches, 0u);
+  EXPECT_EQ(matcher_.match(edge_landmark(), features, {}, Rigid3(), {}).num_matches, 1u);
+  features.num_edges = 0;
+  const auto& matches = matcher_.match(edge_landmark(), features, {}, Rigid3(), {});
+  EXPECT_EQ(matches.num_matches, 0u);
+  EXPECT_FALSE(matches.is_visible[0]);  // What has no edges does not say that it should be there.
 }
 
 }  // namespace

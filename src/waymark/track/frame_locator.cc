@@ -57,6 +57,10 @@ LocatedFrame FrameLocator::locate_again(const Features& features,
                                         LocatedFrame first,
                                         const LandmarkSet& set,
                                         const ProjectionOptions& options) {
+  // The nearest edge is another one where the pose was off by as much.
+  for (std::size_t i = features.num_corners(); i < features.num_primary; ++i) {
+    first.landmarks[i] = LandmarkId{};
+  }
   is_taken_.resize(features.num_primary);
   for (std::size_t i = 0; i < is_taken_.size(); ++i) is_taken_[i] = first.landmarks[i].is_valid();
   std::vector<LandmarkId> found = primary_landmarks(features, first.landmarks);

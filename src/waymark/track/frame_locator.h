@@ -48,7 +48,7 @@ class FrameLocator {
                                const ProjectionOptions& options);
 
   /// Locates a frame again, with those landmarks of the set in addition that its other features
-  /// show, seen from where it was located first.
+  /// show, seen from where it was located first. Points on edges are all looked for anew.
   LocatedFrame locate_again(const Features& features,
                             const Map& map,
                             LocatedFrame first,

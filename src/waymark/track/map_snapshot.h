@@ -20,7 +20,7 @@ struct MapSnapshot {
 inline MapSnapshot index_map(std::shared_ptr<const Map> map, KeyframeId end = {}) {
   PlaceIndex places;
   map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (id < end) places.add(id, keyframe.submap, keyframe.features->descriptors);
+    if (id < end) places.add(id, keyframe.submap, keyframe.features->corner_descriptors());
   });
   return {std::move(map), std::make_shared<const PlaceIndex>(std::move(places))};
 }

@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/pose_refiner.h"
 
+#include <cmath>
+
 #include "waymark/image/pyramid.h"
 #include "waymark/image/rolling_shutter.h"
 
@@ -13,11 +15,16 @@ constexpr std::size_t kMinObservations = 20;
 constexpr double kMinInlierRatio = 0.5;
 /// A start's poses are off by what little parallax it had.
 constexpr double kRefineRadiusPx = 20.0;
+constexpr float kAcrossUnitRad = 1e-4f;
 
 SeenLandmark see(const Features& features, std::uint32_t feature, LandmarkId landmark) {
   const Keypoint& keypoint = features.keypoints[feature];
   SeenLandmark seen{.landmark = landmark, .x_px = keypoint.x_px, .y_px = keypoint.y_px};
   seen.level = keypoint.level;
+  seen.is_edge = features.is_edge(feature);
+  if (seen.is_edge) {
+    seen.across = static_cast<std::int16_t>(std::lround(keypoint.angle_rad / kAcrossUnitRad));
+  }
   if (features.partner[feature] != kNoFeature) return seen;
   const Measurement measured = features.measurement(feature);
   if (measured.inverse_range_sigma == 0.0f) return seen;
@@ -96,10 +103,11 @@ void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
     if (!tangents.is_valid[i]) continue;
     const SeenLandmark& one = *living_[i];
     const float along_z = tangents.bearings[i].z();
+    const Matrix23f& w = tangents.level_pixel_from_bearing[i];
     observations_.add(map.landmarks().at(map.resolve(one.landmark)).position_in_world,
                       {0,
                        tangents.bearings[i],
-                       tangents.level_pixel_from_bearing[i],
+                       one.is_edge ? across_edge(w, kAcrossUnitRad * one.across) : w,
                        along_z * one.inverse_depth,
                        along_z * one.inverse_depth_sigma});
   }

@@ -26,6 +26,8 @@ struct SeenLandmark {
   float inverse_depth = 0.0f;
   float inverse_depth_sigma = 0.0f;  ///< Its standard deviation; 0 where there is none.
   std::uint8_t level = 0;            ///< Of the pyramid.
+  bool is_edge = false;              ///< Seen across the edge only.
+  std::int16_t across = 0;           ///< Keypoint::angle_rad there, in 1e-4 rad.
 };
 
 /// The features of a frame that show a landmark. landmarks: per feature, invalid where none.

@@ -47,7 +47,7 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
       .is_excluded = [&](const PlaceRow& row) { return !map.keyframes().contains(row.keyframe); }};
   std::vector<KeyframeId> candidates;
   if (last) candidates.push_back(last->keyframe);
-  for (const PlaceCandidate& candidate : places.find(frame.features->descriptors, query)) {
+  for (const PlaceCandidate& candidate : places.find(frame.features->corner_descriptors(), query)) {
     candidates.push_back(candidate.keyframe);
   }
   return locate_among(frame, map, candidates, last);

@@ -78,6 +78,7 @@ class RandomMap {
   std::shared_ptr<const Features> random_features(const Rig& rig) {
     auto features = std::make_shared<Features>();
     features->num_primary = num_primary_;
+    features->num_edges = num_primary_ / 5;
     for (std::uint32_t i = 0; i < num_primary_; ++i) {
       append_feature(*features, 0);
       features->descriptors.push_back(random_descriptor());
@@ -204,8 +205,13 @@ class RandomMap {
     map_.landmarks().for_each([&](LandmarkId id, const Landmark&) { ids.push_back(id); });
     for (const LandmarkId id : ids) {
       const Eigen::Vector3d direction(rng_.normal(), rng_.normal(), rng_.normal());
-      map_.set_appearance(id,
-                          {random_descriptor(), direction.normalized(), rng_.uniform(1e-3, 1.0)});
+      const bool is_edge = id.value % 2 != 0;
+      map_.set_appearance(
+          id,
+          {random_descriptor(),
+           direction.normalized(),
+           rng_.uniform(1e-3, 1.0),
+           is_edge ? Eigen::Vector3d(direction.unitOrthogonal()) : Eigen::Vector3d::Zero()});
     }
   }
 

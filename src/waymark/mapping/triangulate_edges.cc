@@ -1,0 +1,196 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/triangulate_edges.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
+namespace waymark {
+namespace {
+
+constexpr std::size_t kEdgeNeighbours = 10;
+/// Keyframes beside the one that the point is of.
+constexpr std::size_t kMinAgreeing = 3;
+/// The runner-up has at most this part of the votes.
+constexpr double kMaxRivalRatio = 0.5;
+/// Sine of the angle between an edge and its epipolar plane.
+constexpr double kMinEdgeSine = 0.5;
+constexpr double kMinEdgeCos = 0.9;  ///< Between directions across an edge in two keyframes.
+constexpr double kEdgeReachPx = 8.0;
+constexpr double kMinEdgeParallaxPx = 3.0;
+constexpr double kEdgeSigmaPx = 0.7;
+constexpr double kAgreementSigmas = 2.0;
+
+/// A point on an edge as camera 0 of its keyframe sees it.
+struct SeenEdge {
+  std::uint32_t feature;
+  Eigen::Vector3d bearing;
+  Eigen::Vector3d across;  ///< Unit, like `along` at a right angle to the bearing.
+  Eigen::Vector3d along;
+  double size_rad;
+};
+
+std::vector<SeenEdge> free_edges(const Keyframe& keyframe) {
+  const Features& features = *keyframe.features;
+  std::vector<SeenEdge> edges;
+  for (std::size_t i = features.num_corners(); i < features.num_primary; ++i) {
+    if (keyframe.landmarks[i].is_valid()) continue;
+    const float angle_rad = features.keypoints[i].angle_rad;
+    const Eigen::Vector2f in_image(std::cos(angle_rad), std::sin(angle_rad));
+    const Eigen::Vector3d bearing = features.bearings[i].cast<double>();
+    const Eigen::Vector3d across =
+        (features.level_pixel_from_bearing[i].transpose() * in_image).cast<double>().normalized();
+    edges.push_back({static_cast<std::uint32_t>(i),
+                     bearing,
+                     across,
+                     bearing.cross(across).normalized(),
+                     features.size_rad[i]});
+  }
+  return edges;
+}
+
+Rigid3 camera_pose(const Keyframe& keyframe) {
+  return keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+}
+
+/// Where a point may be, by a neighbour.
+struct Crossing {
+  double inverse_range;
+  double sigma;
+  KeyframeId keyframe;
+  std::uint32_t feature;
+};
+
+struct Neighbour {
+  KeyframeId id;
+  Rigid3 b_from_a;
+  std::vector<SeenEdge> edges;
+};
+
+/// By the law of sines in the epipolar plane, angles measured from the baseline.
+std::optional<Crossing> cross(const SeenEdge& a, const Neighbour& neighbour, const SeenEdge& b) {
+  const Eigen::Matrix3d turn = neighbour.b_from_a.rotation_matrix();
+  if ((turn * a.across).dot(b.across) < kMinEdgeCos) return std::nullopt;
+  const Eigen::Vector3d ray_a = turn * a.bearing;
+  const Eigen::Vector3d normal = neighbour.b_from_a.translation.cross(ray_a).normalized();
+  const double sine = normal.dot(b.along);
+  if (!(std::abs(sine) > kMinEdgeSine)) return std::nullopt;
+  const double step = -normal.dot(b.bearing) / sine;
+  if (std::abs(step) > kEdgeReachPx * b.size_rad) return std::nullopt;
+  const Eigen::Vector3d ray_b = (b.bearing + step * b.along).normalized();
+  const double baseline = neighbour.b_from_a.translation.norm();
+  // From the centre of a to that of b.
+  const Eigen::Vector3d axis = -neighbour.b_from_a.translation / baseline;
+  const auto angle = [&](const Eigen::Vector3d& ray) {
+    return std::atan2(axis.cross(ray).norm(), axis.dot(ray));
+  };
+  const double angle_a = angle(ray_a);
+  const double parallax = angle(ray_b) - angle_a;
+  if (parallax < kMinEdgeParallaxPx * std::max(a.size_rad, b.size_rad)) return std::nullopt;
+  const double sine_b = std::sin(angle_a + parallax);
+  if (axis.cross(ray_a).dot(axis.cross(ray_b)) <= 0.0 || sine_b < 0.05) return std::nullopt;
+  const double angle_sigma = kEdgeSigmaPx * std::hypot(a.size_rad, b.size_rad) / std::abs(sine);
+  return Crossing{std::sin(parallax) / (baseline * sine_b),
+                  angle_sigma * std::sin(angle_a) / (baseline * sine_b * sine_b),
+                  neighbour.id,
+                  b.feature};
+}
+
+/// The crossings, one per keyframe, that agree with one of them.
+std::vector<Crossing> agreeing(const std::vector<Crossing>& all, const Crossing& one) {
+  std::vector<Crossing> chosen;
+  for (const Crossing& other : all) {
+    const double off = std::abs(other.inverse_range - one.inverse_range);
+    if (off > kAgreementSigmas * std::hypot(one.sigma, other.sigma)) continue;
+    const auto same = std::ranges::find(chosen, other.keyframe, &Crossing::keyframe);
+    if (same == chosen.end()) {
+      chosen.push_back(other);
+    } else if (off < std::abs(same->inverse_range - one.inverse_range)) {
+      *same = other;
+    }
+  }
+  return chosen;
+}
+
+/// The largest set that agrees, if it is large enough and none that shares nothing comes near.
+std::vector<Crossing> consensus(const std::vector<Crossing>& all) {
+  std::vector<std::vector<Crossing>> sets;
+  for (const Crossing& one : all) sets.push_back(agreeing(all, one));
+  const auto best = std::ranges::max_element(sets, {}, &std::vector<Crossing>::size);
+  if (best == sets.end() || best->size() < kMinAgreeing) return {};
+  const auto centre = [&](const std::vector<Crossing>& set) {
+    return all[static_cast<std::size_t>(&set - sets.data())];
+  };
+  for (const std::vector<Crossing>& rival : sets) {
+    const Crossing a = centre(*best);
+    const Crossing b = centre(rival);
+    const bool is_apart = std::abs(a.inverse_range - b.inverse_range) >
+                          2.0 * kAgreementSigmas * std::hypot(a.sigma, b.sigma);
+    if (is_apart &&
+        static_cast<double>(rival.size()) > kMaxRivalRatio * static_cast<double>(best->size())) {
+      return {};
+    }
+  }
+  return std::move(*best);
+}
+
+double mean_inverse_range(const std::vector<Crossing>& set) {
+  double sum = 0.0;
+  double weights = 0.0;
+  for (const Crossing& crossing : set) {
+    const double weight = 1.0 / (crossing.sigma * crossing.sigma);
+    sum += weight * crossing.inverse_range;
+    weights += weight;
+  }
+  return sum / weights;
+}
+
+void add_edge_landmark(Map& map,
+                       KeyframeId id,
+                       const SeenEdge& edge,
+                       std::vector<Crossing> seen,
+                       DirtyLandmarks& dirty) {
+  const Keyframe& keyframe = map.keyframes().at(id);
+  const Eigen::Vector3d point =
+      camera_pose(keyframe).inverse() * (edge.bearing / mean_inverse_range(seen));
+  std::erase_if(seen, [&](const Crossing& crossing) {
+    return !agrees(map.keyframes().at(crossing.keyframe), crossing.feature, point);
+  });
+  if (seen.size() < kMinAgreeing) return;
+  const LandmarkId landmark = map.add_landmark(keyframe.submap, point, id);
+  map.observe(id, edge.feature, landmark);
+  for (const Crossing& crossing : seen) map.observe(crossing.keyframe, crossing.feature, landmark);
+  dirty.insert(landmark);
+}
+
+}  // namespace
+
+void triangulate_edges(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
+  const std::vector<SeenEdge> edges = free_edges(map.keyframes().at(id));
+  if (edges.empty()) return;
+  const Rigid3 a_from_world = camera_pose(map.keyframes().at(id));
+  std::vector<Neighbour> neighbours;
+  for (const KeyframeId other : strongest_neighbours(map, id, kEdgeNeighbours)) {
+    const Keyframe& keyframe = map.keyframes().at(other);
+    const Rigid3 b_from_a = camera_pose(keyframe) * a_from_world.inverse();
+    if (b_from_a.translation.norm() > 0.0) {
+      neighbours.push_back({other, b_from_a, free_edges(keyframe)});
+    }
+  }
+  std::vector<Crossing> crossings;
+  for (const SeenEdge& edge : edges) {
+    crossings.clear();
+    for (const Neighbour& neighbour : neighbours) {
+      const std::vector<LandmarkId>& landmarks = map.keyframes().at(neighbour.id).landmarks;
+      for (const SeenEdge& other : neighbour.edges) {
+        if (landmarks[other.feature].is_valid()) continue;
+        if (const auto crossing = cross(edge, neighbour, other)) crossings.push_back(*crossing);
+      }
+    }
+    const std::vector<Crossing> seen = consensus(crossings);
+    if (!seen.empty()) add_edge_landmark(map, id, edge, seen, dirty);
+  }
+}
+
+}  // namespace waymark
