@@ -69,8 +69,8 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
 FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
   return [&, live, report = report_frames(reporter, session.input->info())](
-             const FrameRecord& record) mutable {
-    report(record);
+             const FrameRecord& record, const std::string& warning) mutable {
+    report(record, warning);
     if (live) live->show(record);
     if (const auto failure = autosave.update(session.system->map())) {
       reporter.warning("autosave: " + *failure);

@@ -26,7 +26,7 @@ namespace {
 
 /// Whether its depth image could not be used: the one bad file that takes no frame away.
 bool is_without_depth(const FrameRecord& frame) {
-  return frame.state != FrameState::kUnreadable && frame.warning != nullptr;
+  return frame.state != FrameState::kUnreadable && frame.has_warning;
 }
 
 }  // namespace
@@ -145,7 +145,7 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
 
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
   return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
-             const FrameRecord& frame) mutable {
+             const FrameRecord& frame, const std::string& warning) mutable {
     const bool has_reason = frame.reason != FrameReason::kNone;
     const std::string state = fmt::format(
         "{}{}{}{}",
@@ -157,10 +157,9 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
       reporter.warning(fmt::format("frame {}: {}, skipped{}",
                                    frame.index,
                                    state,
-                                   frame.warning ? " (" + *frame.warning + ")" : ""));
+                                   warning.empty() ? "" : " (" + warning + ")"));
     } else if (is_without_depth(frame)) {
-      reporter.warning(
-          fmt::format("frame {}: used without depth ({})", frame.index, *frame.warning));
+      reporter.warning(fmt::format("frame {}: used without depth ({})", frame.index, warning));
     }
     const int num_candidates = frame.num_candidates;
     reporter.detail(

@@ -78,7 +78,7 @@ void FrameRecord::set_stages(std::span<const double> times_ms) {
   WAYMARK_CHECK(times_ms.size() <= kMaxStages);
   num_stages = static_cast<std::uint8_t>(times_ms.size());
   std::ranges::transform(
-      times_ms, stage_ms.begin(), [](double ms) { return static_cast<float>(ms); });
+      times_ms, stage_ms.begin(), [](double ms) { return static_cast<Eigen::half>(ms); });
 }
 
 TimeStatistics summarize_times(std::vector<double> samples_ms) {
@@ -119,7 +119,7 @@ std::vector<std::pair<std::string, TimeStatistics>> summarize_stages(const Frame
   for (std::size_t i = 0; i < table.stages.size(); ++i) {
     std::vector<double> samples_ms;
     for (const FrameRecord& frame : table.frames) {
-      if (frame.num_stages > 0) samples_ms.push_back(double{frame.stage_ms.at(i)});
+      if (frame.num_stages > 0) samples_ms.push_back(static_cast<double>(frame.stage_ms.at(i)));
     }
     stages.emplace_back(table.stages[i], summarize_times(std::move(samples_ms)));
   }
@@ -143,7 +143,8 @@ std::string format_frames_csv(const FrameTable& table) {
     if (frame.submap.is_valid()) fmt::format_to(out, "{}", frame.submap.value);
     WAYMARK_CHECK(frame.num_stages == 0 || frame.num_stages == table.stages.size());
     for (std::size_t i = 0; i < table.stages.size(); ++i) {
-      fmt::format_to(out, ",{:.4f}", frame.num_stages == 0 ? 0.0f : frame.stage_ms[i]);
+      fmt::format_to(
+          out, ",{:.4f}", frame.num_stages == 0 ? 0.0 : static_cast<double>(frame.stage_ms[i]));
     }
     text += '\n';
   }

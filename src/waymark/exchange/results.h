@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -20,16 +21,16 @@
 
 namespace waymark {
 
-/// One row of frames.csv.
+/// One row of frames.csv. Small: rows stay as long as a session.
 struct FrameRecord : FrameStatus {
-  std::size_t index = 0;                        ///< In the whole INPUT.
+  std::uint32_t index = 0;                      ///< In the whole INPUT.
   std::int64_t timestamp_ns = 0;                ///< Of the input.
-  bool is_keyframe = false;                     ///< Whether it was sent to the map.
-  std::uint8_t num_stages = 0;                  ///< 0 for a frame that was not processed.
-  static constexpr std::size_t kMaxStages = 8;  ///< Here, since rows stay as long as a session.
-  std::array<float, kMaxStages> stage_ms{};     ///< In the order of the table's stages.
-  /// What is wrong with a file of the frame, for people; in no file. Null: nothing.
-  std::shared_ptr<const std::string> warning = nullptr;
+  static constexpr std::size_t kMaxStages = 8;  ///< For an array of fixed size.
+  /// In the order of the table's stages, to 0.05 %.
+  std::array<Eigen::half, kMaxStages> stage_ms{};
+  std::uint8_t num_stages = 0;  ///< 0 for a frame that was not processed.
+  bool is_keyframe = false;     ///< Whether it was sent to the map.
+  bool has_warning = false;     ///< Something is wrong with a file of it.
 
   /// Takes the times of all stages over.
   void set_stages(std::span<const double> times_ms);

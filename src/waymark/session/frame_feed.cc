@@ -26,15 +26,11 @@ rusage resources() {
   return usage;
 }
 
-std::shared_ptr<const std::string> warning_of(const InputFrame& frame) {
-  return frame.warning.empty() ? nullptr : std::make_shared<const std::string>(frame.warning);
-}
-
 FrameRecord record_of_fault(const InputFrame& frame) {
   FrameRecord record;
-  record.index = frame.index;
+  record.index = static_cast<std::uint32_t>(frame.index);
   record.timestamp_ns = frame.timestamp_ns;
-  record.warning = warning_of(frame);
+  record.has_warning = !frame.warning.empty();
   if (frame.fault == FrameFault::kLate) {
     record.state = FrameState::kDropped;
     record.reason = FrameReason::kLate;
@@ -48,9 +44,9 @@ FrameRecord record_of_fault(const InputFrame& frame) {
 
 FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& result) {
   FrameRecord record;
-  record.index = frame.index;
+  record.index = static_cast<std::uint32_t>(frame.index);
   record.timestamp_ns = frame.timestamp_ns;
-  record.warning = warning_of(frame);
+  record.has_warning = !frame.warning.empty();
   static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
   record.set_stages(result.stages.ms);
@@ -78,8 +74,8 @@ void add_frame(const InputFrame& frame,
   }
   const TrackingResult result = feed(borrow(frame));
   if (result.frame == FrameId{0}) forget_session(frames);
-  frames.fed.push_back(frames.table.frames.size());
-  frames.tracking_ms.push_back(result.stages.tracking_ms());
+  frames.fed.push_back(static_cast<std::uint32_t>(frames.table.frames.size()));
+  frames.tracking_ms.push_back(static_cast<float>(result.stages.tracking_ms()));
   frames.table.frames.push_back(record_of_result(frame, result));
 }
 
@@ -107,7 +103,7 @@ FedFrames feed_all(Input& input,
       const std::optional<InputFrame> frame = input.next();
       if (!frame) break;
       add_frame(*frame, feed, frames);
-      if (observer) observer(frames.table.frames.back());
+      if (observer) observer(frames.table.frames.back(), frame->warning);
     }
   } catch (...) {
     if (frames.fed.empty()) throw;

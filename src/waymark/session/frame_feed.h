@@ -16,14 +16,15 @@
 
 namespace waymark {
 
-/// Hears of each frame once it is done.
-using FrameObserver = std::function<void(const FrameRecord&)>;
+/// Hears of each frame once it is done. warning: what is wrong with a file of it, for people;
+/// empty: nothing.
+using FrameObserver = std::function<void(const FrameRecord&, const std::string& warning)>;
 
 /// The rows of all frames, and which of them were fed: fed[i] is the row of the i-th one.
 struct FedFrames {
   FrameTable table;
-  std::vector<std::size_t> fed;
-  std::vector<double> tracking_ms;
+  std::vector<std::uint32_t> fed;
+  std::vector<float> tracking_ms;
   /// What the input or the feeding of a frame threw, which ended it all; null if nothing.
   std::exception_ptr failure;
 };

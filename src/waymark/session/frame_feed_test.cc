@@ -33,9 +33,10 @@ TEST(FeedAll, GivesEachFrameARowButFeedsTheSoundOnes) {
   MemoryInput input(std::move(frames));
   std::uint32_t num_fed = 0;
   std::vector<FrameReason> observed;
-  const FedFrames fed = feed_all(input, track_in(0, num_fed), nullptr, [&](const auto& row) {
-    observed.push_back(row.reason);
-  });
+  const FedFrames fed =
+      feed_all(input, track_in(0, num_fed), nullptr, [&](const auto& row, const auto&) {
+        observed.push_back(row.reason);
+      });
   EXPECT_EQ(num_fed, 2u);
   EXPECT_THAT(fed.fed, ElementsAre(0, 3));
   EXPECT_EQ(fed.tracking_ms.size(), 2u);

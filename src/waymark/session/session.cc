@@ -59,7 +59,7 @@ RunSummary summarize(const System& system, const FedFrames& frames) {
   summary.submaps = static_cast<std::size_t>(statistics.num_submaps);
   summary.loops = static_cast<std::size_t>(statistics.num_loops);
   summary.relocalizations = static_cast<std::size_t>(statistics.num_relocalizations);
-  summary.tracking_ms = summarize_times(frames.tracking_ms);
+  summary.tracking_ms = summarize_times({frames.tracking_ms.begin(), frames.tracking_ms.end()});
   summary.mapping_ms = summarize_times(statistics.mapping_ms);
   summary.stages_ms = summarize_stages(frames.table);
   return summary;
@@ -114,9 +114,9 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
     if (hooks.watch) hooks.watch->add(frame, system);
     return result;
   };
-  const auto observe = [&](const FrameRecord& record) {
+  const auto observe = [&](const FrameRecord& record, const std::string& warning) {
     if (hooks.watch) hooks.watch->add_time(record.index, record.timestamp_ns);
-    if (hooks.observer) hooks.observer(record);
+    if (hooks.observer) hooks.observer(record, warning);
   };
   FedFrames frames = feed_all(input, feed, hooks.should_stop, observe);
   finish(system, hooks, frames);
@@ -208,7 +208,7 @@ SessionResults localize_input(Input& input,
   summary.keyframes = map.keyframes().size();
   summary.landmarks = map.landmarks().size();
   for (const Submap& submap : map.submaps()) summary.submaps += !submap.joined_into.is_valid();
-  summary.tracking_ms = summarize_times(frames.tracking_ms);
+  summary.tracking_ms = summarize_times({frames.tracking_ms.begin(), frames.tracking_ms.end()});
   summary.stages_ms = summarize_stages(frames.table);
   add_trajectories(map, poses, results);
   results.table = std::move(frames.table);

@@ -75,7 +75,7 @@ TEST(RunSession, GoesFromInputToResults) {
   std::size_t num_fed = 0;
   int num_ends = 0;
   SessionHooks hooks;
-  hooks.observer = [&](const auto& row) { EXPECT_EQ(row.index, num_observed++); };
+  hooks.observer = [&](const auto& row, const auto&) { EXPECT_EQ(row.index, num_observed++); };
   hooks.on_result = [&](const auto&, const auto&) { ++num_fed; };
   hooks.on_input_end = [&] {
     ++num_ends;
@@ -169,7 +169,7 @@ TEST(RunSession, EndsEarlyWithWhatItHas) {
   std::size_t num_observed = 0;
   SessionHooks hooks;
   hooks.should_stop = [&] { return num_observed == 8; };
-  hooks.observer = [&](const auto&) { ++num_observed; };
+  hooks.observer = [&](const auto&, const auto&) { ++num_observed; };
   const SessionResults results = run_session(input, system, hooks);
   EXPECT_THAT(results.table.frames, SizeIs(8));
   EXPECT_EQ(results.summary.counts.tracked, 8u);
@@ -310,8 +310,8 @@ TEST(LocalizeInput, FindsStreamsAndSingleImagesInAMap) {
     MemoryInput input(rendered_frames());
     Localizer localizer(small_rig(), small_settings(), small_map());
     std::size_t num_observed = 0;
-    const SessionResults results =
-        localize_input(input, localizer, order, nullptr, [&](const auto&) { ++num_observed; });
+    const SessionResults results = localize_input(
+        input, localizer, order, nullptr, [&](const auto&, const auto&) { ++num_observed; });
     EXPECT_EQ(num_observed, kNumFrames);
     EXPECT_GE(*results.summary.localized, kNumFrames - 3);
     ASSERT_THAT(results.trajectories, SizeIs(1));
