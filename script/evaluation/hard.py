@@ -44,8 +44,11 @@ RECORDED = tuple(
 
 ALL_SETUPS = ("mono", "stereo", "rgbd")
 SHORT_EXPOSURE = ("--frames", 300, "--exposure", 5)
+WALK = ("--motion", "loop", "--frames", 300, "--rate", 15)
+# A blank flat, beside the same one with texture.
 SIMULATED = tuple(Simulated(motion, ALL_SETUPS, ("room", "--motion", motion, *SHORT_EXPOSURE))
-                  for motion in ("turns_150", "turns_250", "shaken"))
+                  for motion in ("turns_150", "turns_250", "shaken")) + tuple(
+                      Simulated(world, ALL_SETUPS, (world, *WALK)) for world in ("blank", "apartment"))
 
 
 def figures_of(sequence_run, true_pose, setup):
