@@ -148,7 +148,7 @@ PaddedImage make_blank_wall() {
 }
 
 TEST(FeatureExtractor, AddsPointsOnEdgesWhereCornersAreFew) {
-  FeatureExtractor extractor({});
+  FeatureExtractor extractor({.edges = true});
   const Extracted features = extract(extractor, make_blank_wall());
   ASSERT_GT(features.num_edges, 30u);
   ASSERT_EQ(features.descriptors.size(), features.keypoints.size());
@@ -161,7 +161,7 @@ TEST(FeatureExtractor, AddsPointsOnEdgesWhereCornersAreFew) {
     num_of_door += std::min(side, std::abs(keypoint.y_px - 200.5)) < 0.5;
   }
   EXPECT_GT(num_of_door, 30);
-  FeatureExtractor without({.edges = false});
+  FeatureExtractor without({});
   EXPECT_EQ(extract(without, make_blank_wall()).num_edges, 0u);
   EXPECT_EQ(extract(extractor, testing::make_texture(640, 480, 4, 2)).num_edges, 0u);
 }
@@ -171,7 +171,7 @@ TEST(FeatureExtractor, AddsNoEdgesWhereTheMaskIs) {
   for (int y = 0; y < 480; ++y) {
     for (int x = 0; x < 640; ++x) mask.row(y)[x] = x < 400 ? 8 : 0;
   }
-  FeatureExtractor extractor({});
+  FeatureExtractor extractor({.edges = true});
   const Extracted features = extract(extractor, make_blank_wall(), mask.view());
   EXPECT_GT(features.num_edges, 10u);
   for (const Keypoint& keypoint : features.keypoints) EXPECT_LT(keypoint.x_px, 402.0f);

@@ -13,7 +13,7 @@ namespace waymark {
 struct FeatureSettings {
   int count = 1000;      ///< Features per image.
   int min_contrast = 7;  ///< In grey values.
-  bool edges = true;     ///< Points on edges join in where corners are few.
+  bool edges = false;    ///< Points on edges join in where corners are few.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -32,7 +32,8 @@ struct FeatureSettings {
                       .help = "Corners with less contrast to their surroundings are ignored."});
     field("edges",
           self.edges,
-          SettingInfo{.help = "Points on edges join in where an image has few corners."});
+          SettingInfo{.help = "Points on edges join in where an image has few corners, as of "
+                              "blank walls."});
   }
 };
 

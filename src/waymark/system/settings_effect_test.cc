@@ -373,6 +373,7 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "global_latency",
                                               "features.count",
                                               "features.min_contrast",
+                                              "features.edges",  // Shown in image/extractor_test.
                                               "stereo.min_range_baselines",
                                               "depth.factor",
                                               "depth.lag_ms",
