@@ -84,6 +84,7 @@ struct Features {
 
   /// The primary features that are no points on edges come first.
   std::size_t num_corners() const { return num_primary - num_edges; }
+  /// Whether a feature is a point on an edge.
   bool is_edge(std::size_t feature) const {
     return feature >= num_corners() && feature < num_primary;
   }
