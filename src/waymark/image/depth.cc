@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "waymark/base/check.h"
+#include "waymark/image/features.h"
 #include "waymark/image/pyramid.h"
 
 namespace waymark {
@@ -36,6 +37,11 @@ constexpr double kMaxRelativeStep = 0.02;
 constexpr double kCornerSigmaPx = 0.5;
 /// That of a point along its edge, where it is as good as anywhere in its cell.
 constexpr double kAlongEdgeSigmaPx = 4.0;
+
+Eigen::Vector2d along_edge_px(const Keypoint& keypoint) {
+  const Eigen::Vector2d normal = edge_normal(keypoint.angle_rad).cast<double>();
+  return kAlongEdgeSigmaPx * Eigen::Vector2d(-normal.y(), normal.x());
+}
 
 struct Sample {
   double inverse_range;
@@ -184,11 +190,10 @@ void sample_depth(DepthView depth,
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     if (bearings[i].z() < kMinZPerRange) continue;
     const ZPerRange z = z_per_range(keypoints[i], bearings[i], level_pixel_from_bearing[i]);
-    const double angle_rad = keypoints[i].angle_rad;
-    const Eigen::Vector2d along(-std::sin(angle_rad), std::cos(angle_rad));
-    const double along_px = i + num_edges < keypoints.size() ? 0.0 : kAlongEdgeSigmaPx;
-    const std::optional<InverseRange> inverse =
-        measure(depth, settings, keypoints[i], z, along_px * along);
+    const bool is_edge = i + num_edges >= keypoints.size();
+    const Eigen::Vector2d along_px =
+        is_edge ? along_edge_px(keypoints[i]) : Eigen::Vector2d::Zero();
+    const std::optional<InverseRange> inverse = measure(depth, settings, keypoints[i], z, along_px);
     if (!inverse) continue;
     range_m[i] = static_cast<float>(1.0 / inverse->value);
     inverse_range_sigma[i] = static_cast<float>(inverse->sigma);

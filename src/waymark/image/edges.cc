@@ -13,9 +13,10 @@ namespace {
 
 /// Of what differentiate() gives: 16 for the smoothing, 8 for the derivative.
 constexpr float kGradientUnit = 1.0f / 128.0f;
+/// An edge is straight if it still is there this far along it to both sides, ...
 constexpr int kStraightPx = 4;
-constexpr float kStraightCos = 0.95f;
-constexpr float kLeastSteady = 0.5f;
+constexpr float kStraightCos = 0.95f;  ///< ... in the same direction ...
+constexpr float kLeastSteady = 0.5f;   ///< ... and with at least this part of its slope.
 
 }  // namespace
 

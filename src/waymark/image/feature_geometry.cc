@@ -95,6 +95,13 @@ void keep_across(Features& features) {
   }
 }
 
+Eigen::Vector3d edge_normal_in_cam(const Features& features, std::size_t feature) {
+  const Eigen::Vector2f normal = edge_normal(features.keypoints[feature].angle_rad);
+  return (features.level_pixel_from_bearing[feature].transpose() * normal)
+      .cast<double>()
+      .normalized();
+}
+
 void measure_stereo_ranges(const Rig& rig, Features& features) {
   constexpr double kFarAway = 1e9;  // In metres: as good as infinite.
   const Rigid3 cam1_from_cam0 = rig.cameras[1].cam_from_rig * rig.cameras[0].cam_from_rig.inverse();

@@ -22,6 +22,10 @@ std::vector<std::uint8_t> derive_geometry(const Rig& rig, Features& features);
 /// Leaves of level_pixel_from_bearing of points on edges what is across.
 void keep_across(Features& features);
 
+/// The unit vector in its camera at a right angle to the bearing of a point on an edge in which the
+/// distance from the edge grows fastest.
+Eigen::Vector3d edge_normal_in_cam(const Features& features, std::size_t feature);
+
 /// Ranges of the primary features that have a partner in camera 1, with their standard deviations:
 /// from the angle between the two in the epipolar plane. rig: two cameras, some distance apart.
 void measure_stereo_ranges(const Rig& rig, Features& features);

@@ -43,10 +43,15 @@ struct RigMotion {
   friend bool operator==(const RigMotion&, const RigMotion&) = default;
 };
 
-/// What an edge leaves of W: n n^T W, n being the unit vector across it in the image.
+/// The unit vector across an edge in the image, to its lighter side. angle_rad: of its keypoint.
+inline Eigen::Vector2f edge_normal(float angle_rad) {
+  return {std::cos(angle_rad), std::sin(angle_rad)};
+}
+
+/// What an edge leaves of W: n n^T W, n being its normal in the image.
 inline Matrix23f across_edge(const Matrix23f& level_pixel_from_bearing, float angle_rad) {
-  const Eigen::Vector2f across(std::cos(angle_rad), std::sin(angle_rad));
-  return across * (across.transpose() * level_pixel_from_bearing).eval();
+  const Eigen::Vector2f normal = edge_normal(angle_rad);
+  return normal * (normal.transpose() * level_pixel_from_bearing).eval();
 }
 
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of

@@ -7,6 +7,7 @@
 #include <span>
 
 #include "waymark/base/median.h"
+#include "waymark/image/feature_geometry.h"
 #include "waymark/image/hamming.h"
 
 namespace waymark {
@@ -37,12 +38,7 @@ Eigen::Vector3d across_edge(const Features& features,
                             std::uint32_t feature,
                             const Rigid3& cam_from_world) {
   if (!features.is_edge(feature)) return Eigen::Vector3d::Zero();
-  const float angle_rad = features.keypoints[feature].angle_rad;
-  const Eigen::Vector2f across(std::cos(angle_rad), std::sin(angle_rad));
-  // The slope of the distance from the edge, by the bearing: its steepest direction.
-  const Eigen::Vector3f by_bearing =
-      features.level_pixel_from_bearing[feature].transpose() * across;
-  return cam_from_world.rotation_matrix().transpose() * by_bearing.cast<double>().normalized();
+  return cam_from_world.rotation_matrix().transpose() * edge_normal_in_cam(features, feature);
 }
 
 }  // namespace

@@ -47,7 +47,7 @@ bool add_derivatives(const CalibrationParameters& parameters,
     calibration.first_derivative[measured.indices[k]] = all.size();
     for (std::size_t j = k * stride; j < (k + 1) * stride; j += 2) {
       const Eigen::Vector2d by((*derivatives)[j], (*derivatives)[j + 1]);
-      const Eigen::Vector2f counted = (measured.measured[k] * by).cast<float>();
+      const Eigen::Vector2f counted = (measured.projectors[k] * by).cast<float>();
       all.push_back(counted.x() / measured.level_scales[k]);
       all.push_back(counted.y() / measured.level_scales[k]);
     }

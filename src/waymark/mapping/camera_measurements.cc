@@ -15,11 +15,10 @@
 namespace waymark {
 namespace {
 
-Eigen::Matrix2d measured_part(const Features& features, std::uint32_t feature) {
+Eigen::Matrix2d projector_of(const Features& features, std::uint32_t feature) {
   if (!features.is_edge(feature)) return Eigen::Matrix2d::Identity();
-  const double angle_rad = features.keypoints[feature].angle_rad;
-  const Eigen::Vector2d across(std::cos(angle_rad), std::sin(angle_rad));
-  return across * across.transpose();
+  const Eigen::Vector2d normal = edge_normal(features.keypoints[feature].angle_rad).cast<double>();
+  return normal * normal.transpose();
 }
 
 }  // namespace
@@ -37,7 +36,7 @@ std::vector<CameraMeasurements> collect(const Map& map,
     camera.indices.push_back(i);
     camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
-    camera.measured.push_back(measured_part(*keyframe.features, observed[i].feature));
+    camera.projectors.push_back(projector_of(*keyframe.features, observed[i].feature));
   }
   return cameras;
 }
@@ -77,7 +76,7 @@ void linearize(const CameraMeasurements& measured,
     const Eigen::Vector3d bearing =
         direction + w.transpose() * (w * w.transpose()).ldlt().solve(off);
     observation.bearing = bearing.cast<float>();
-    observation.level_pixel_from_bearing = (measured.measured[k] * w).cast<float>();
+    observation.level_pixel_from_bearing = (measured.projectors[k] * w).cast<float>();
   }
 }
 

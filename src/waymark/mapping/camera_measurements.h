@@ -21,7 +21,7 @@ struct CameraMeasurements {
   std::vector<Eigen::Vector2d> pixels;  ///< Of level 0.
   std::vector<float> level_scales;      ///< Size of a pixel of the feature's level.
   /// What of a residual counts: all of it, or of points on edges what is across.
-  std::vector<Eigen::Matrix2d> measured;
+  std::vector<Eigen::Matrix2d> projectors;
 };
 
 /// Per camera of the rig. observed: of each observation of the problem, in the map.

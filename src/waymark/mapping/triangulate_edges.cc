@@ -6,9 +6,12 @@
 #include <cmath>
 #include <optional>
 
+#include "waymark/image/feature_geometry.h"
+
 namespace waymark {
 namespace {
 
+/// Keyframes in which the point is looked for.
 constexpr std::size_t kEdgeNeighbours = 10;
 /// Keyframes beside the one that the point is of.
 constexpr std::size_t kMinAgreeing = 3;
@@ -17,10 +20,14 @@ constexpr double kMaxRivalRatio = 0.5;
 /// Sine of the angle between an edge and its epipolar plane.
 constexpr double kMinEdgeSine = 0.5;
 constexpr double kMinEdgeCos = 0.9;  ///< Between directions across an edge in two keyframes.
+/// From the point on the other edge to where the epipolar plane crosses it: it is straight so far.
 constexpr double kEdgeReachPx = 8.0;
 constexpr double kMinEdgeParallaxPx = 3.0;
+/// Standard deviation of a point across its edge.
 constexpr double kEdgeSigmaPx = 0.7;
 constexpr double kAgreementSigmas = 2.0;
+/// Of the angle between the other ray and the baseline: beside it there is no crossing.
+constexpr double kMinBaselineSine = 0.05;
 
 /// A point on an edge as camera 0 of its keyframe sees it.
 struct SeenEdge {
@@ -36,11 +43,8 @@ std::vector<SeenEdge> free_edges(const Keyframe& keyframe) {
   std::vector<SeenEdge> edges;
   for (std::size_t i = features.num_corners(); i < features.num_primary; ++i) {
     if (keyframe.landmarks[i].is_valid()) continue;
-    const float angle_rad = features.keypoints[i].angle_rad;
-    const Eigen::Vector2f in_image(std::cos(angle_rad), std::sin(angle_rad));
     const Eigen::Vector3d bearing = features.bearings[i].cast<double>();
-    const Eigen::Vector3d across =
-        (features.level_pixel_from_bearing[i].transpose() * in_image).cast<double>().normalized();
+    const Eigen::Vector3d across = edge_normal_in_cam(features, i);
     edges.push_back({static_cast<std::uint32_t>(i),
                      bearing,
                      across,
@@ -89,7 +93,8 @@ std::optional<Crossing> cross(const SeenEdge& a, const Neighbour& neighbour, con
   const double parallax = angle(ray_b) - angle_a;
   if (parallax < kMinEdgeParallaxPx * std::max(a.size_rad, b.size_rad)) return std::nullopt;
   const double sine_b = std::sin(angle_a + parallax);
-  if (axis.cross(ray_a).dot(axis.cross(ray_b)) <= 0.0 || sine_b < 0.05) return std::nullopt;
+  if (axis.cross(ray_a).dot(axis.cross(ray_b)) <= 0.0 || sine_b < kMinBaselineSine)
+    return std::nullopt;
   const double angle_sigma = kEdgeSigmaPx * std::hypot(a.size_rad, b.size_rad) / std::abs(sine);
   return Crossing{std::sin(parallax) / (baseline * sine_b),
                   angle_sigma * std::sin(angle_a) / (baseline * sine_b * sine_b),

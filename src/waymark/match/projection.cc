@@ -123,7 +123,7 @@ void ProjectionMatcher::match_edge(std::size_t landmark,
   const auto consider = [&](std::uint32_t feature) {
     if (!features.is_edge(feature) || (!is_taken.empty() && is_taken[feature])) return;
     const Keypoint& keypoint = features.keypoints[feature];
-    const Eigen::Vector2d across(std::cos(keypoint.angle_rad), std::sin(keypoint.angle_rad));
+    const Eigen::Vector2d across = edge_normal(keypoint.angle_rad).cast<double>();
     if (across.dot(across_px_[landmark]) < kMinAcrossCos) return;
     const Eigen::Vector2d off = pixel - Eigen::Vector2d(keypoint.x_px, keypoint.y_px);
     const double off_across = std::abs(off.dot(across));

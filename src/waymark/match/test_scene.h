@@ -26,6 +26,15 @@ inline Rigid3 make_test_pose(const Eigen::Vector3d& position, const Eigen::Vecto
   return {turned.rotation, position};
 }
 
+/// A cloud and the points of a box that moves before it.
+inline PointCloud with_box(PointCloud cloud, const PointCloud& box, const Rigid3& world_from_box) {
+  for (PointLandmark corner : box.landmarks) {
+    corner.position = world_from_box * corner.position;
+    cloud.landmarks.push_back(corner);
+  }
+  return cloud;
+}
+
 /// The landmarks of a cloud as seen from an eye; ids are indices in the cloud.
 inline LandmarkSet true_landmarks(const PointCloud& cloud, const Eigen::Vector3d& eye) {
   LandmarkSet set;

@@ -72,14 +72,9 @@ TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
 
 /// A box of points that somebody turns before a wall of them.
 PointCloud turned_box(double turn_rad) {
-  PointCloud cloud = scatter_in({-4.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 300, 4.0, 3);
-  const Rigid3 moved = make_test_pose({0.8 + turn_rad, 0.3, 3.0}, {0.0, turn_rad, 0.5 * turn_rad});
-  const PointCloud box = scatter_in({-0.9, -0.9, -0.9}, {0.9, 0.9, 0.9}, 100, 3.0, 4);
-  for (PointLandmark corner : box.landmarks) {
-    corner.position = moved * corner.position;
-    cloud.landmarks.push_back(corner);
-  }
-  return cloud;
+  return with_box(scatter_in({-4.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 300, 4.0, 3),
+                  scatter_in({-0.9, -0.9, -0.9}, {0.9, 0.9, 0.9}, 100, 3.0, 4),
+                  make_test_pose({0.8 + turn_rad, 0.3, 3.0}, {0.0, turn_rad, 0.5 * turn_rad}));
 }
 
 TEST_P(AtRest, StaysWhateverMovesBeforeIt) {

@@ -171,14 +171,9 @@ TEST(Initializer, MonoStartsOnceTurningBecomesMoving) {
 
 /// A box of points that somebody turns before a wall of them.
 PointCloud box_before_wall(std::uint32_t frame) {
-  PointCloud cloud = scatter_in({-5.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 600, 6.0, 3);
-  const Rigid3 moved = pose_at(0.01 * frame, 0.2, 3.5, 0.02 * frame);
-  const PointCloud box = scatter_in({-0.6, -0.6, -0.6}, {0.6, 0.6, 0.6}, 250, 3.0, 4);
-  for (PointLandmark corner : box.landmarks) {
-    corner.position = moved * corner.position;
-    cloud.landmarks.push_back(corner);
-  }
-  return cloud;
+  return with_box(scatter_in({-5.0, -3.0, 5.0}, {5.0, 3.0, 5.5}, 600, 6.0, 3),
+                  scatter_in({-0.6, -0.6, -0.6}, {0.6, 0.6, 0.6}, 250, 3.0, 4),
+                  pose_at(0.01 * frame, 0.2, 3.5, 0.02 * frame));
 }
 
 TEST(Initializer, MonoWaitsForTheCameraToMoveWhateverMovesBeforeIt) {
