@@ -3,17 +3,13 @@
 """What moves along with the camera, and what moves before one at rest: recordings of both, and all
 others, in which nothing may be found. `static_*` are those of a camera at rest: no frame may have a
 pose."""
-from .program import map_sequence
+from .program import map_sequence, setups_of
 from .tables import table
-
-
-def setup_of(folder):
-    return "stereo" if (folder / "mav0/cam1").exists() or (folder / "image_1").exists() else "mono"
 
 
 def cells_of(folder, work, auto_mask):
     try:
-        run = map_sequence(folder, work / "along_out", setup_of(folder), "--set",
+        run = map_sequence(folder, work / "along_out", setups_of(folder)[0], "--set",
                            f"view.auto_mask={auto_mask}")
     except RuntimeError as error:
         return [str(error), "", ""]

@@ -54,3 +54,11 @@ def map_sequence(folder, out, setup, *options):
     run([PROGRAM, "run", folder, *config_of(folder), "--setup", setup, "--timing", "lockstep", "-o",
          out, "--quiet", "--log", out / "run.log", *options])
     return Run(out)
+
+
+def setups_of(folder):
+    """Set-ups that the layout of a sequence offers."""
+    if (folder / "depth.txt").exists():
+        return ["rgbd", "mono"]
+    is_pair = (folder / "mav0/cam1").exists() or (folder / "image_1").exists()
+    return ["stereo", "mono"] if is_pair else ["mono"]
