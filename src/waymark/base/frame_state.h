@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <string_view>
 
 #include "waymark/base/id.h"
@@ -9,7 +10,7 @@
 namespace waymark {
 
 /// What became of one input frame.
-enum class FrameState {
+enum class FrameState : std::uint8_t {
   kInitializing,  ///< Seen while the first map was not made yet.
   kTracked,
   kFilled,      ///< Got its pose after the fact, for example from before the initialisation.
@@ -19,7 +20,7 @@ enum class FrameState {
 };
 
 /// Why a frame has no pose.
-enum class FrameReason {
+enum class FrameReason : std::uint8_t {
   kNone,
   kNoFeatures,
   kTooLittleParallax,

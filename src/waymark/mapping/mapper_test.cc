@@ -93,7 +93,7 @@ Session run(const Setup& setup) {
   memory.settle(*session.map);
   for (const TrajectoryMemory::Entry& entry : memory.entries()) {
     session.states.push_back(entry.state);
-    session.poses.push_back(entry.pose);
+    session.poses.push_back(entry.pose());
   }
   return session;
 }

@@ -344,11 +344,10 @@ std::vector<TrajectoryFrame> System::Impl::trajectory() const {
   frames.reserve(memory_.entries().size());
   for (std::uint32_t i = 0; i < memory_.entries().size(); ++i) {
     const TrajectoryMemory::Entry& memory = memory_.entries()[i];
-    const KeyframeId reference = memory.pose.reference;
+    const auto [reference, scale, rig_from_reference] = memory.pose();
     // The newest frames may refer to a keyframe that the visible map does not contain yet.
     if (!has_pose(memory.state) || reference >= map()->keyframes().end_id()) continue;
-    const Rigid3 rig_from_world = map()->rig_from_world(
-        reference, memory.pose.rig_from_reference, memory.pose.reference_scale);
+    const Rigid3 rig_from_world = map()->rig_from_world(reference, rig_from_reference, scale);
     const KeyframeId living = map()->resolve(reference);
     frames.push_back({FrameId{i},
                       memory.timestamp_ns,

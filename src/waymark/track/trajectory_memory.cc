@@ -14,8 +14,26 @@ bool has_pose(const TrajectoryMemory::Entry& entry) {
 
 }  // namespace
 
+TrajectoryMemory::Entry::Entry(std::int64_t time_ns, FrameState state_in, const RelativePose& pose)
+    : timestamp_ns(time_ns), state(state_in) {
+  set_pose(pose);
+}
+
+RelativePose TrajectoryMemory::Entry::pose() const {
+  const Rigid3 rig_from_reference(Eigen::Quaterniond(rotation_.data()),
+                                  Eigen::Map<const Eigen::Vector3d>(translation_.data()));
+  return {reference_, reference_scale_, rig_from_reference};
+}
+
+void TrajectoryMemory::Entry::set_pose(const RelativePose& pose) {
+  reference_ = pose.reference;
+  reference_scale_ = pose.reference_scale;
+  Eigen::Map<Eigen::Quaterniond>(rotation_.data()) = pose.rig_from_reference.rotation;
+  Eigen::Map<Eigen::Vector3d>(translation_.data()) = pose.rig_from_reference.translation;
+}
+
 void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, const Map& map) {
-  entries_.push_back({frame.timestamp_ns, outcome.state, outcome.details.pose});
+  entries_.emplace_back(frame.timestamp_ns, outcome.state, outcome.details.pose);
   if (outcome.message) newest_sent_ = frame.id;
   // Long after the map has changed last it has settled, and the frame with it.
   const bool is_settled = frame.id.value - newest_sent_.value > kMaxSinceKeyframe;
@@ -29,7 +47,7 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
   for (const FilledPose& filled : outcome.details.filled) {
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
-    entry.pose = filled.pose;
+    entry.set_pose(filled.pose);
     unsettled_.push_back({filled.frame,
                           {},
                           filled.features,
@@ -51,7 +69,8 @@ void TrajectoryMemory::settle(const Map& map) {
 }
 
 void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
-  RelativePose& pose = entry_of(unsettled.frame).pose;
+  Entry& entry = entry_of(unsettled.frame);
+  const RelativePose pose = entry.pose();
   const KeyframeId living = map.resolve(pose.reference);
   const Keyframe& keyframe = map.keyframes().at(living);
   if (keyframe.frame == unsettled.frame) return;  // Adjusted with the map.
@@ -68,7 +87,7 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
   for (SeenLandmark& one : seen) one.inverse_depth -= offset;
   const auto refined = refiner_.refine(map, seen, guess);
   if (!refined) return;
-  pose = {living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()};
+  entry.set_pose({living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()});
 }
 
 std::optional<RigMotion> TrajectoryMemory::motion_in(FrameId frame, const Map& map) const {
@@ -76,7 +95,7 @@ std::optional<RigMotion> TrajectoryMemory::motion_in(FrameId frame, const Map& m
   if (index < 0 || index >= std::ssize(entries_)) return std::nullopt;
   const Entry& entry = entries_[static_cast<std::size_t>(index)];
   if (!has_pose(entry)) return std::nullopt;
-  const SubmapId submap = map.keyframes().at(map.resolve(entry.pose.reference)).submap;
+  const SubmapId submap = map.keyframes().at(map.resolve(entry.pose().reference)).submap;
   std::int64_t from = index, to = index;
   if (rig_from_world(index - 1, submap, map)) --from;
   if (rig_from_world(index + 1, submap, map)) ++to;
@@ -98,7 +117,7 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
   if (has_pose(entry) || neighbour < 0 || neighbour >= std::ssize(entries_)) return;
   const Entry& known = entries_[static_cast<std::size_t>(neighbour)];
   if (!has_pose(known)) return;
-  const KeyframeId living = map.resolve(known.pose.reference);
+  const KeyframeId living = map.resolve(known.pose().reference);
   const Keyframe& keyframe = map.keyframes().at(living);
   const Rigid3 near = *rig_from_world(neighbour, keyframe.submap, map);
   // The motion between the two frames beyond goes on.
@@ -108,7 +127,7 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
   const auto found = refiner_.refine(map, seen, guess);
   if (!found) return;
   entry.state = FrameState::kFilled;
-  entry.pose = {living, keyframe.applied_scale, *found * keyframe.rig_from_world.inverse()};
+  entry.set_pose({living, keyframe.applied_scale, *found * keyframe.rig_from_world.inverse()});
 }
 
 std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t index,
@@ -117,7 +136,7 @@ std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t index,
   if (index < 0 || index >= std::ssize(entries_)) return std::nullopt;
   const Entry& entry = entries_[static_cast<std::size_t>(index)];
   if (!has_pose(entry)) return std::nullopt;
-  const RelativePose& pose = entry.pose;
+  const RelativePose pose = entry.pose();
   if (map.keyframes().at(map.resolve(pose.reference)).submap != submap) return std::nullopt;
   return map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
 }

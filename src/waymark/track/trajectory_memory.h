@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <deque>
 #include <memory>
@@ -23,10 +24,23 @@ class TrajectoryMemory {
   static constexpr std::size_t kMaxUnposed = 300;
   static constexpr std::uint32_t kMaxSinceKeyframe = 300;
 
-  struct Entry {
-    std::int64_t timestamp_ns = 0;
-    FrameState state = FrameState::kLost;
-    RelativePose pose;  ///< Where state is kTracked or kFilled.
+  /// There is one for every frame for as long as a session lasts: packed, 80 bytes for 96.
+  class Entry {
+   public:
+    Entry(std::int64_t time_ns, FrameState state_in, const RelativePose& pose);
+
+    /// Where state is kTracked or kFilled.
+    RelativePose pose() const;
+    void set_pose(const RelativePose& pose);
+
+    std::int64_t timestamp_ns;
+    FrameState state;
+
+   private:
+    KeyframeId reference_;
+    double reference_scale_ = 1.0;
+    std::array<double, 4> rotation_{};  ///< Coefficients in the order of Eigen.
+    std::array<double, 3> translation_{};
   };
 
   /// first: the id of the first frame; those of the others follow.

@@ -44,7 +44,7 @@ class TrajectoryMemoryTest : public ::testing::Test {
   double error_m(std::uint32_t number) const { return error_m(memory_, number); }
 
   double error_m(const TrajectoryMemory& memory, std::uint32_t number) const {
-    const RelativePose& pose = memory.entries().at(number).pose;
+    const RelativePose pose = memory.entries().at(number).pose();
     const Rigid3 rig_from_world =
         scene_.map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
     return (rig_from_world.origin_in_source() - truth_.translation).norm();
@@ -154,8 +154,8 @@ TEST_F(TrajectoryMemoryTest, LeavesKeyframesToTheMap) {
   outcome.seen = seen_landmarks(*view_.features, scene_.true_associations(view_));
   memory_.add(frame(1), outcome, scene_.map);  // The second keyframe was made from frame 1.
   memory_.settle(scene_.map);
-  EXPECT_EQ(memory_.entries()[1].pose.reference, KeyframeId{1});
-  EXPECT_EQ(memory_.entries()[1].pose.rig_from_reference.translation.norm(), 0.0);
+  EXPECT_EQ(memory_.entries()[1].pose().reference, KeyframeId{1});
+  EXPECT_EQ(memory_.entries()[1].pose().rig_from_reference.translation.norm(), 0.0);
 }
 
 TEST_F(TrajectoryMemoryTest, SettlesTheOldestOnceThereAreMany) {
