@@ -116,14 +116,14 @@ struct KnownOfFov {
   double untold_sigma = kOfMost;  ///< Of the focal length where images do not tell it.
 };
 
-KnownOfFov known_of_fov(const InputInfo& info, const CalibrateOptions& options) {
+KnownOfFov known_of_fov(const InputInfo& info, LensModel model, const CalibrateOptions& options) {
   KnownOfFov known;
   if (options.fov_deg) {
     known.expected.rad = *options.fov_deg * kRadiansPerDegree;
     known.expected.is_known = true;
     known.focal_sigma = kByDataSheet;
   } else if (info.focal_px) {
-    known.expected.rad = 2.0 * std::atan(0.5 * info.width_px / *info.focal_px);
+    known.expected.rad = fov_of(model, *info.focal_px, info.width_px);
     known.expected.spread = kAsNoted;
     known.focal_sigma = known.untold_sigma = kAsNoted;
   }
@@ -194,7 +194,7 @@ EstimatedCalibration full_size(const Stretch& stretch, const CameraDescription& 
 }
 
 EstimatedCalibration calibrate_stretch(const Stretch& stretch,
-                                       const KnownOfFov& known,
+                                       const InputInfo& info,
                                        const CalibrateOptions& options) {
   AssumedLens assumed = look_at(stretch);
   if (assumed.model == LensModel::kEquirectangular) {
@@ -204,6 +204,7 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch,
     calibration.reason = "twice as wide as high, and the left border goes on at the right one";
     return calibration;
   }
+  const KnownOfFov known = known_of_fov(info, assumed.model, options);
   const std::vector<PixelMatches> pairs =
       match_stretch(stretch.images, stretch.masks, assumed.description);
   const DivisionLens found = find_division_lens(pairs, assumed.description, known.expected);
@@ -290,7 +291,6 @@ std::vector<std::string> report(const EstimatedCalibration& calibration) {
 
 EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
   std::optional<EstimatedCalibration> best;
-  const KnownOfFov known = known_of_fov(input.info(), options);
   const int num_stretches = input.info().is_live ? 1 : kMaxStretches;
   for (int i = 0; i < num_stretches && !is_stopped(options); ++i) {
     if (options.on_progress) {
@@ -300,7 +300,7 @@ EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
     }
     const Stretch stretch = read_stretch(input, options);
     if (stretch.images.empty() || (best && stretch.images.size() < kMinFrames)) break;
-    EstimatedCalibration next = calibrate_stretch(stretch, known, options);
+    EstimatedCalibration next = calibrate_stretch(stretch, input.info(), options);
     if (!best || next.sigmas[0] < best->sigmas[0]) best = std::move(next);
     if (best->is_sure) break;
   }

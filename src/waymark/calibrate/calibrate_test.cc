@@ -5,6 +5,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <cmath>
 #include <vector>
 
 #include "waymark/base/testing/errors.h"
@@ -24,10 +25,13 @@ class RenderedInput : public Input {
       : sequence_(spec_of(camera, motion, num_frames)) {}
 
   /// As cameras do in photos.
-  void note(double focal_px) {
-    info_.width_px = 400;
+  void note(double focal_px, int width_px) {
+    info_.width_px = width_px;
     info_.focal_px = focal_px;
   }
+
+  /// As fisheye lenses do: black is what lies farther from the centre.
+  void light_circle(double radius_px) { circle_px_ = radius_px; }
 
   const InputInfo& info() const override { return info_; }
   std::optional<InputFrame> next() override {
@@ -37,6 +41,7 @@ class RenderedInput : public Input {
     frame.index = static_cast<std::size_t>(next_++);
     frame.timestamp_ns = rendered.timestamp_ns;
     frame.images = std::move(rendered.images);
+    if (circle_px_ > 0.0) blacken_around(frame.images.front());
     return frame;
   }
 
@@ -51,8 +56,19 @@ class RenderedInput : public Input {
     return spec;
   }
 
+  void blacken_around(Image& image) const {
+    for (int y = 0; y < image.height_px; ++y) {
+      for (int x = 0; x < image.width_px; ++x) {
+        const double off_px = std::hypot(x - 0.5 * image.width_px, y - 0.5 * image.height_px);
+        if (off_px <= circle_px_) continue;
+        image.values[static_cast<std::size_t>(y * image.width_px + x)] = 0;
+      }
+    }
+  }
+
   SimulatedSequence sequence_;
   InputInfo info_;
+  double circle_px_ = 0.0;
   int next_ = 0;
 };
 
@@ -91,10 +107,20 @@ TEST(Calibrate, SaysWhereNothingTells) {
 
 TEST(Calibrate, BeginsWithWhatTheCameraNoted) {
   RenderedInput still(wide_lens(), "still", 12);
-  still.note(focal_length_of(LensModel::kPerspective, 85.0 * kRadiansPerDegree, 400));
+  still.note(focal_length_of(LensModel::kPerspective, 85.0 * kRadiansPerDegree, 400), 400);
   const EstimatedCalibration taken = calibrate(still, {});
   EXPECT_NEAR(taken.fov_deg, 85.0, 3.0);
   EXPECT_EQ(taken.sigmas[0], 0.1);
+}
+
+/// Angles, not tangents, are in proportion to pixels there.
+TEST(Calibrate, KnowsWhatAFocalLengthMeansOfAFisheyeLens) {
+  RenderedInput still(make_lens(LensModel::kFisheye, 110.0, 320, 320), "still", 12);
+  still.light_circle(150.0);
+  still.note(110.0, 320);
+  const EstimatedCalibration taken = calibrate(still, {});
+  EXPECT_EQ(taken.model, LensModel::kFisheye);
+  EXPECT_NEAR(taken.fov_deg, 320.0 / 110.0 / kRadiansPerDegree, 5.0);
 }
 
 TEST(Calibrate, SeesAllDirections) {
