@@ -66,7 +66,8 @@ void add_selection_options(CLI::App& command, InputOptions& reading) {
   command.add_option(
       "--mask",
       reading.mask,
-      "Mask image, or a folder with one per frame, by name or in order; black is not used [none]");
+      "Mask image, a folder with one per frame by name or in order, or a video of them; black is "
+      "not used [none]");
 }
 
 void add_fov_option(CLI::App& command, CalibrateOptions& options) {

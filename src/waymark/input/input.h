@@ -52,8 +52,9 @@ struct InputOptions {
   std::size_t first = 0;       ///< Index of the first frame used.
   std::optional<std::size_t> frames;  ///< At most so many frames.
   std::size_t every = 1;              ///< Of the frames from first on, each n-th one.
-  std::filesystem::path mask;  ///< One image, or a folder with one per frame by name; empty: none.
-  bool has_jpeg = false;       ///< Frames come with a JPEG file, too.
+  /// One image, a folder with one per frame by name or order, or a video; empty: none.
+  std::filesystem::path mask;
+  bool has_jpeg = false;  ///< Frames come with a JPEG file, too.
   /// Calibration from settings; takes the place of the one the data set carries.
   std::optional<CameraChain> calibration;
 };

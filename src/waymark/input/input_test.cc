@@ -272,6 +272,26 @@ void make_video(const std::filesystem::path& path, int num_frames) {
     writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20 * i)));
 }
 
+TEST(Mask, OnePerFrameOfAVideo) {
+  const TemporaryFolder folder;
+  for (int i = 0; i < 10; ++i) {
+    write_image(folder / ("images/" + std::to_string(i) + ".png"), 64, 48, 100);
+  }
+  make_video(folder / "masks.avi", 9);  // From the seventh on more light than dark.
+  InputOptions options;
+  options.mask = folder / "masks.avi";
+  options.first = 4;
+  options.every = 2;
+  const std::unique_ptr<Input> input = open_input(folder / "images", options);
+  EXPECT_EQ(input->next()->mask->view().at(30, 20), 0);
+  EXPECT_EQ(input->next()->mask->view().at(30, 20), 255);
+  EXPECT_EQ(input->next()->mask->view().at(30, 20), 255);
+  EXPECT_FALSE(input->next());
+  options.mask = folder.write("no.mp4", "x");
+  EXPECT_THAT(input_error_of([&] { open_input(folder / "images", options); }),
+              HasSubstr("no.mp4: cannot be opened as a video"));
+}
+
 TEST(Video, GivesFramesWithTheTimesOfTheContainer) {
   const TemporaryFolder folder;
   make_video(folder / "v.avi", 6);

@@ -47,7 +47,7 @@ std::optional<InputFrame> ListingInput::next() {
   return read(selection_.first + selection_.every * num_read_++);
 }
 
-InputFrame ListingInput::read(std::size_t index) const {
+InputFrame ListingInput::read(std::size_t index) {
   const ListedFrame& listed = listing_.frames[index];
   InputFrame frame;
   frame.index = index;

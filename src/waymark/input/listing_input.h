@@ -23,7 +23,7 @@ class ListingInput : public Input {
   std::optional<InputFrame> next() override;
 
  private:
-  InputFrame read(std::size_t index) const;
+  InputFrame read(std::size_t index);
   FrameFault read_images(const ListedFrame& listed, InputFrame& frame) const;
   void read_depth(const ListedFrame& listed, InputFrame& frame) const;
   std::size_t find_first_readable() const;

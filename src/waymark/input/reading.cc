@@ -11,6 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
+#include "waymark/input/video_reader.h"
 
 namespace waymark {
 
@@ -89,12 +90,31 @@ MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
     }
     return;
   }
+  if (is_video_name(path_)) {
+    video_ = std::make_unique<VideoReader>(path_);
+    return;
+  }
   fixed_ = read_grey_image(path_);
   if (!fixed_) throw InputError(path_.string(), describe_bad_image(path_, "a mask image"));
 }
 
+MaskSource::~MaskSource() = default;
+
 std::filesystem::path MaskSource::path_of(const std::string& stem) const {
-  return fixed_ ? path_ : by_name_.at(stem);
+  return fixed_ || video_ ? path_ : by_name_.at(stem);
+}
+
+std::optional<Image> MaskSource::read(const std::string& stem, std::size_t index) {
+  if (fixed_) return fixed_;
+  if (!video_) return read_grey_image(path_of(stem));
+  while (video_->num_grabbed() <= index) {
+    if (!video_->grab()) return std::nullopt;
+  }
+  std::optional<Image> mask = video_->decode();
+  if (!mask) return std::nullopt;
+  // Compression leaves no grey as it was.
+  for (std::uint8_t& value : mask->values) value = value < 128 ? 0 : 255;
+  return mask;
 }
 
 void MaskSource::match(const std::vector<std::string>& stems) {
@@ -111,11 +131,13 @@ void MaskSource::match(const std::vector<std::string>& stems) {
   for (std::size_t i = 0; i < stems.size(); ++i) by_name_[stems[i]] = in_order_[i];
 }
 
-bool MaskSource::has(const std::string& stem) const { return fixed_ || by_name_.contains(stem); }
+bool MaskSource::has(const std::string& stem) const {
+  return fixed_ || video_ || by_name_.contains(stem);
+}
 
-void MaskSource::attach(const std::string& stem, InputFrame& frame) const {
+void MaskSource::attach(const std::string& stem, InputFrame& frame) {
   if (!has(stem) || frame.images.empty()) return;
-  frame.mask = fixed_ ? fixed_ : read_grey_image(path_of(stem));
+  frame.mask = read(stem, frame.index);
   const ImageSize size = size_of(frame.images.front());
   if (!frame.mask) {
     frame.fault = FrameFault::kUnreadable;

@@ -8,6 +8,7 @@
 #include <cstddef>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
@@ -71,12 +72,16 @@ inline FrameSelection select_frames(const std::filesystem::path& path,
   return selection;
 }
 
+class VideoReader;
+
 /// Masks of camera 0: one image for all frames, or a folder with one image per frame, named as the
-/// frame's image but for the extension, or else in the order of the frames.
+/// frame's image but for the extension, or else in the order of the frames; or a video with as many
+/// frames as the input, from which they are read in order.
 class MaskSource {
  public:
   /// Path empty: no masks. Throws InputError when it is missing or unreadable.
   explicit MaskSource(const std::filesystem::path& path);
+  ~MaskSource();
 
   /// The names of all frames. Throws InputError for a folder of masks of which none has one of
   /// them, unless they are as many: then they belong to the frames in their order.
@@ -86,17 +91,19 @@ class MaskSource {
   bool has(const std::string& stem) const;
 
   /// Gives a frame with images its mask, if there is one. One that cannot be read or has not the
-  /// size of the image is a fault of the frame and takes its images away.
-  void attach(const std::string& stem, InputFrame& frame) const;
+  /// size of the image is a fault of the frame and takes its images away. Frames come in order.
+  void attach(const std::string& stem, InputFrame& frame);
 
   /// Throws InputError unless the frame, the first good one, got along with its mask.
   void check_first(const std::string& stem, const InputFrame& frame) const;
 
  private:
   std::filesystem::path path_of(const std::string& stem) const;
+  std::optional<Image> read(const std::string& stem, std::size_t index);
 
   std::filesystem::path path_;
   std::optional<Image> fixed_;
+  std::unique_ptr<VideoReader> video_;
   std::vector<std::filesystem::path> in_order_;
   std::map<std::string, std::filesystem::path> by_name_;
 };

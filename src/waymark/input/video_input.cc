@@ -14,78 +14,10 @@
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
+#include "waymark/input/video_reader.h"
 
 namespace waymark {
 namespace {
-
-constexpr double kAssumedVideoRateHz = 30.0;
-
-/// Frames of a video in order, each with the time of the container.
-class VideoReader {
- public:
-  explicit VideoReader(const std::filesystem::path& path) {
-    // Not CAP_ANY: given a file that is no video, it goes on to look for cameras.
-    try {
-      capture_.open(path.string(), cv::CAP_FFMPEG);
-    } catch (const cv::Exception&) {
-      capture_.release();
-    }
-    if (!capture_.isOpened()) {
-      throw InputError(path.string(),
-                       "cannot be opened as a video, expected mp4, mov, avi, mkv or the like");
-    }
-    const double rate_hz = capture_.get(cv::CAP_PROP_FPS);
-    rate_hz_ = std::isfinite(rate_hz) && rate_hz > 0.0 ? rate_hz : kAssumedVideoRateHz;
-  }
-
-  /// Steps to the next frame; false at the end.
-  bool grab() {
-    if (!capture_.grab()) return false;
-    const double time_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
-    const std::int64_t step_ns = static_cast<std::int64_t>(1e9 / rate_hz_);
-    std::int64_t time_ns =
-        std::isfinite(time_ms) && std::abs(time_ms) < 1e12 ? std::llround(time_ms * 1e6) : 0;
-    // Some containers give no times, or the same twice.
-    if (num_grabbed_ > 0 && time_ns <= timestamp_ns_) time_ns = timestamp_ns_ + step_ns;
-    timestamp_ns_ = time_ns;
-    ++num_grabbed_;
-    return true;
-  }
-
-  /// The frame grabbed last.
-  std::optional<Image> decode() {
-    try {
-      cv::Mat mat;
-      if (!capture_.retrieve(mat)) return std::nullopt;
-      return grey_of(mat);
-    } catch (const cv::Exception&) {
-      return std::nullopt;
-    }
-  }
-  /// The same, as a JPEG file; for one that could be decoded.
-  std::string encode() {
-    cv::Mat mat;
-    std::vector<std::uint8_t> bytes;
-    WAYMARK_CHECK(capture_.retrieve(mat) && cv::imencode(".jpg", mat, bytes));
-    return {bytes.begin(), bytes.end()};
-  }
-
-  std::size_t num_grabbed() const { return num_grabbed_; }
-  std::int64_t timestamp_ns() const { return timestamp_ns_; }
-  double rate_hz() const { return rate_hz_; }
-  /// Frames as the container states, which may be an estimate.
-  std::optional<std::size_t> num_frames() const {
-    const double count = capture_.get(cv::CAP_PROP_FRAME_COUNT);
-    if (!(count >= 1.0 && count < 1e9)) return std::nullopt;
-    return static_cast<std::size_t>(count);
-  }
-
- private:
-  cv::VideoCapture capture_;
-  double rate_hz_ = kAssumedVideoRateHz;
-  std::size_t num_grabbed_ = 0;
-  std::int64_t timestamp_ns_ = 0;
-};
 
 class VideoInput : public Input {
  public:
