@@ -245,6 +245,12 @@ void add_simulate_command(CLI::App& program, Command& command) {
           options->exposure_ms,
           "Milliseconds that the shutter is open, of a world: what moves meanwhile blurs [0]")
       ->check(number_between(0.0, 1000.0));
+  simulation
+      .add_option("--walkers",
+                  spec.num_walkers,
+                  "People who cross the view at any time; 3 hide up to half of it")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
   add_flaw_options(simulation, *options);
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");

@@ -45,10 +45,14 @@ RECORDED = tuple(
 ALL_SETUPS = ("mono", "stereo", "rgbd")
 SHORT_EXPOSURE = ("--frames", 300, "--exposure", 5)
 WALK = ("--motion", "loop", "--frames", 300, "--rate", 15)
-# A blank flat, beside the same one with texture.
+LONG_WALK = ("--motion", "loop", "--frames", 1200, "--rate", 12)
+# A blank flat beside the same one with texture, and with a crowd in it; places that look alike.
 SIMULATED = tuple(Simulated(motion, ALL_SETUPS, ("room", "--motion", motion, *SHORT_EXPOSURE))
                   for motion in ("turns_150", "turns_250", "shaken")) + tuple(
-                      Simulated(world, ALL_SETUPS, (world, *WALK)) for world in ("blank", "apartment"))
+                      Simulated(world, ALL_SETUPS, (world, *WALK)) for world in ("blank", "apartment")) + (
+                          Simulated("walkers", ALL_SETUPS, ("apartment", *WALK, "--walkers", 3)),
+                          Simulated("corridor", ALL_SETUPS, ("corridor", *LONG_WALK)),
+                          Simulated("shop", ALL_SETUPS, ("shop", *LONG_WALK)))
 
 
 def figures_of(sequence_run, true_pose, setup):

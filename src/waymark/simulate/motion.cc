@@ -76,11 +76,22 @@ std::vector<Course> courses() {
   const std::vector<Vector2d> aisle = {{4.0, 4.2}, {20.0, 4.2}, {20.0, 11.8}, {4.0, 11.8}};
   const std::vector<Vector2d> road = {{0.0, 0.0}, {40.0, 0.0}, {40.0, 28.0}, {0.0, 28.0}};
   const std::vector<Vector2d> both_rooms = rounds_of_both_rooms();
+  const std::vector<Vector2d> there_and_back = {{1.0, 0.7}, {49.0, 0.7}, {49.0, 1.6}, {1.0, 1.6}};
+  const std::vector<Vector2d> aisles = {{1.5, 1.5},
+                                        {22.5, 1.5},
+                                        {22.5, 4.5},
+                                        {1.5, 4.5},
+                                        {1.5, 7.5},
+                                        {22.5, 7.5},
+                                        {22.5, 10.5},
+                                        {1.5, 10.5}};
   return {{"room", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
           {"bare", around_table, 0.8, 1.5, 22.0, hand, {{1.5, 1.3, 1.5}, 35.0, -6.0, 0.0}},
           {"apartment", ring, 0.75, 1.5, 18.0, hand, {{1.5, 1.75, 1.5}, 0.0, -4.0, 0.0}},
           {"blank", ring, 0.75, 1.5, 18.0, hand, {{1.5, 1.75, 1.5}, 0.0, -4.0, 0.0}},
           {"hall", aisle, 2.0, 1.6, 20.0, hand, {{4.5, 4.5, 1.6}, 20.0, 2.0, 0.0}},
+          {"corridor", there_and_back, 0.6, 1.5, 12.0, hand, {{1.2, 1.1, 1.5}, 0.0, -4.0, 0.0}},
+          {"shop", aisles, 1.0, 1.5, 15.0, hand, {{1.5, 1.5, 1.5}, 0.0, -2.0, 0.0}},
           {"street", road, 8.0, 1.6, 0.0, wheels, {{10.0, 0.0, 1.6}, 0.0, 0.0, 0.0}},
           {"twins", both_rooms, 0.7, 1.5, 15.0, hand, {{2.25, 1.5, 1.5}, 90.0, -4.0, 0.0}}};
 }

@@ -61,7 +61,9 @@ Bounds measure(const Motion& motion) {
 
 /// Enough for a walk, or a drive in the street, at a usual speed.
 double usual_duration_s(const std::string& world, const std::string& motion) {
-  const double once_s = world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
+  if (motion.starts_with("turns_")) return 20.0;
+  const bool is_long = world == "corridor" || world == "shop";
+  const double once_s = is_long ? 120.0 : world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
   return motion == "rounds" ? 3.0 * once_s : motion == "thirty_rounds" ? 30.0 * once_s : once_s;
 }
 

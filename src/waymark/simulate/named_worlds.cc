@@ -314,6 +314,45 @@ World make_hall(std::uint64_t seed) {
   return builder.build("hall");
 }
 
+/// Twenty times the same stretch with a door and what hangs on the walls.
+World make_corridor(std::uint64_t seed) {
+  constexpr int kNumDoors = 20;
+  const Vector3d size(2.5, 2.2, 2.6);  // Of a stretch.
+  const Vector2d z(0.0, size.z());
+  WorldBuilder builder(seed, kRoomTexelM);
+  for (int i = 0; i < kNumDoors; ++i) {
+    builder.restart_textures(seed + 1);
+    const double x = size.x() * i;
+    const double end = x + size.x();
+    builder.add_wall({x, size.y()}, {end, size.y()}, z, {}, Style::kWall);
+    builder.add_wall({end, 0.0}, {x, 0.0}, z, {}, Style::kWall);
+    builder.add_ground({x, 0.0}, {end, size.y()}, 0.0, Style::kFloor);
+    builder.add(make_rectangle(
+                    {x, 0.0, size.z()}, Vector3d::UnitX(), Vector3d::UnitY(), {size.x(), size.y()}),
+                Style::kCeiling);
+    builder.add_box(
+        {{x + 0.8, size.y() - 0.05, 0.0}, {x + 1.8, size.y(), kDoorHeight}}, 0.0, Style::kCrate);
+    builder.add_box({{x + 0.3, 0.0, 0.0}, {x + 0.8, 0.25, 0.9}}, 0.0, Style::kMetal);
+  }
+  builder.restart_textures(seed);
+  const double length = kNumDoors * size.x();
+  builder.add_wall({length, size.y()}, {length, 0.0}, z, {}, Style::kWall);
+  builder.add_wall({0.0, 0.0}, {0.0, size.y()}, z, {}, Style::kWall);
+  return builder.build("corridor");
+}
+
+World make_shop(std::uint64_t seed) {
+  WorldBuilder builder(seed, kHallTexelM);
+  builder.add_room({{0.0, 0.0, 0.0}, {24.0, 15.0, 3.5}}, {}, Style::kWall);
+  for (const double y : {3.0, 6.0, 9.0, 12.0}) {
+    for (const double x : {6.5, 17.5}) {
+      builder.restart_textures(seed + 1);
+      builder.add_box(box_on({x, y, 0.0}, {7.0, 0.9, 2.0}), 0.0, Style::kBooks);
+    }
+  }
+  return builder.build("shop");
+}
+
 World make_street(std::uint64_t seed) {
   WorldBuilder builder(seed, kTexelM);
   Rng rng(seed, 1);
@@ -330,13 +369,15 @@ struct NamedWorld {
   World (*make)(std::uint64_t seed);
 };
 
-constexpr std::array<NamedWorld, 7> kWorlds = {{{"room", make_room},
+constexpr std::array<NamedWorld, 9> kWorlds = {{{"room", make_room},
                                                 {"apartment", make_apartment},
                                                 {"hall", make_hall},
                                                 {"street", make_street},
                                                 {"twins", make_twins},
                                                 {"bare", make_bare_room},
-                                                {"blank", make_blank_apartment}}};
+                                                {"blank", make_blank_apartment},
+                                                {"corridor", make_corridor},
+                                                {"shop", make_shop}}};
 
 }  // namespace
 

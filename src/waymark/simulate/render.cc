@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <span>
 #include <utility>
 
 #include "waymark/simulate/tracer.h"
@@ -195,10 +196,13 @@ void apply_depth_noise(const ImageEffects& effects,
 
 /// What is the same for all tiles of an image.
 struct Renderer::View {
-  View(const World& world, const Rigid3& world_from_cam)
-      : pose(world_from_cam), tracer(world, world_from_cam.translation) {}
+  View(std::span<const Surface> surfaces_in, const Rigid3& world_from_cam)
+      : pose(world_from_cam),
+        surfaces(surfaces_in),
+        tracer(surfaces_in, world_from_cam.translation) {}
 
   Rigid3 pose;
+  std::span<const Surface> surfaces;
   Tracer tracer;
   double units_per_metre = 0.0;
 };
@@ -239,18 +243,23 @@ void Renderer::for_tiles(ThreadPool& pool, int tile_height, Body body) const {
   });
 }
 
-Image Renderer::image(const Rigid3& world_from_cam, ThreadPool& pool) const {
+Image Renderer::image(const Rigid3& world_from_cam, ThreadPool& pool, double time_s) const {
   Image result(camera_->width_px(), camera_->height_px());
-  const View view(*world_, world_from_cam);
+  const std::vector<Surface> surfaces = world_->surfaces_at(time_s);
+  const View view(surfaces, world_from_cam);
   for_tiles(pool, kTileHeight, [&](const Tile& tile) { shade_tile(view, tile, result); });
   return result;
 }
 
 Image Renderer::rolling_image(const std::function<Rigid3(int row)>& world_from_cam,
-                              ThreadPool& pool) const {
+                              ThreadPool& pool,
+                              double time_s) const {
   Image result(camera_->width_px(), camera_->height_px());
+  const std::vector<Surface> surfaces = world_->surfaces_at(time_s);
   std::vector<View> views;
-  for (int row = 0; row < result.height_px; ++row) views.emplace_back(*world_, world_from_cam(row));
+  for (int row = 0; row < result.height_px; ++row) {
+    views.emplace_back(surfaces, world_from_cam(row));
+  }
   for_tiles(pool, 1, [&](const Tile& tile) {
     shade_tile(views[static_cast<std::size_t>(tile.y0)], tile, result);
   });
@@ -259,9 +268,11 @@ Image Renderer::rolling_image(const std::function<Rigid3(int row)>& world_from_c
 
 DepthImage Renderer::depth(const Rigid3& world_from_cam,
                            double units_per_metre,
-                           ThreadPool& pool) const {
+                           ThreadPool& pool,
+                           double time_s) const {
   DepthImage result(camera_->width_px(), camera_->height_px());
-  View view(*world_, world_from_cam);
+  const std::vector<Surface> surfaces = world_->surfaces_at(time_s);
+  View view(surfaces, world_from_cam);
   view.units_per_metre = units_per_metre;
   for_tiles(pool, kTileHeight, [&](const Tile& tile) { measure_tile(view, tile, result); });
   return result;
@@ -309,7 +320,7 @@ void Renderer::measure_tile(const View& view, const Tile& tile, DepthImage& resu
       if (rays.hit[k] < 0) continue;
       const Vector3d& bearing = bearing_at(x, y);
       const Vector3d direction = world_from_cam * bearing;
-      const Surface& surface = world_->surfaces[view.tracer.surface(rays.hit[k]).index];
+      const Surface& surface = view.surfaces[view.tracer.surface(rays.hit[k]).index];
       const std::optional<SurfaceHit> hit = intersect(surface, view.pose.translation, direction);
       // At an outline single precision may hit what the exact ray just misses.
       const double distance = hit ? hit->distance : static_cast<double>(rays.distance[k]);

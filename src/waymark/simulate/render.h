@@ -39,21 +39,27 @@ void apply_depth_noise(const ImageEffects& effects,
 /// Ray-casts a world for one camera of any model. Bearings are tabulated once. A pixel is the mean
 /// over its square: read from the texture with the pixel's footprint where one surface fills it,
 /// from 3 x 3 rays where an edge runs through. Pixels without bearings at all corners are 0. The
-/// result is the same for any number of threads.
+/// result is the same for any number of threads. time_s: of the walks of the world.
 class Renderer {
  public:
   /// Neither is null.
   Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Camera> camera);
 
   /// What the camera sees.
-  Image image(const Rigid3& world_from_cam, ThreadPool& pool) const;
+  Image image(const Rigid3& world_from_cam, ThreadPool& pool, double time_s = 0.0) const;
 
-  /// The same with a rolling shutter: each row is seen from a pose of its own.
-  Image rolling_image(const std::function<Rigid3(int row)>& world_from_cam, ThreadPool& pool) const;
+  /// The same with a rolling shutter: each row is seen from a pose of its own. Who walks stands
+  /// still meanwhile.
+  Image rolling_image(const std::function<Rigid3(int row)>& world_from_cam,
+                      ThreadPool& pool,
+                      double time_s = 0.0) const;
 
   /// Depth along the camera's z axis, exact at the pixel's centre, in units of 1/units_per_metre,
   /// rounded; 0 where there is none, or it is behind the camera or above 65535.
-  DepthImage depth(const Rigid3& world_from_cam, double units_per_metre, ThreadPool& pool) const;
+  DepthImage depth(const Rigid3& world_from_cam,
+                   double units_per_metre,
+                   ThreadPool& pool,
+                   double time_s = 0.0) const;
 
   /// Angle between neighbouring pixels in the middle of the image.
   double pixel_rad() const;

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/simulate/walkers.h"
 
 namespace waymark {
 namespace {
@@ -34,6 +35,14 @@ std::uint64_t stream_of(int frame, std::uint64_t stream) {
   return static_cast<std::uint64_t>(frame) * kStreamsPerFrame + stream;
 }
 
+std::shared_ptr<const World> populated_world(const SequenceSpec& spec, const Motion& motion) {
+  std::shared_ptr<const World> world = make_world(spec.world, spec.seed);
+  if (spec.num_walkers == 0) return world;
+  auto populated = std::make_shared<World>(*world);
+  add_walkers(spec.num_walkers, motion, spec.seed, *populated);
+  return populated;
+}
+
 }  // namespace
 
 CameraChain mono_chain(const CameraDescription& camera) {
@@ -56,8 +65,8 @@ SimulatedSequence::SimulatedSequence(SequenceSpec spec,
                                      const CameraRegistry& registry)
     : spec_(std::move(spec)),
       rig_(make_rig(spec_.chain, registry)),
-      world_(make_world(spec_.world, spec_.seed)),
       motion_(make_motion(spec_.world, spec_.motion, spec_.num_frames / spec_.rate_hz)),
+      world_(populated_world(spec_, motion_)),
       pool_(std::make_unique<ThreadPool>(num_threads)) {
   WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
   WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0);
@@ -84,14 +93,14 @@ Image SimulatedSequence::render(std::size_t camera, double time_s) {
   const Rigid3 rig_from_cam = rig_.cameras[camera].cam_from_rig.inverse();
   const Renderer& renderer = renderers_[camera];
   if (spec_.readout_s == 0.0) {
-    return renderer.image(motion_.world_from_rig(time_s) * rig_from_cam, *pool_);
+    return renderer.image(motion_.world_from_rig(time_s) * rig_from_cam, *pool_, time_s);
   }
   const int height_px = rig_.cameras[camera].camera->height_px();
   const auto pose_of_row = [&](int row) {
     const double share = height_px > 1 ? static_cast<double>(row) / (height_px - 1) - 0.5 : 0.0;
     return motion_.world_from_rig(time_s + share * spec_.readout_s) * rig_from_cam;
   };
-  return renderer.rolling_image(pose_of_row, *pool_);
+  return renderer.rolling_image(pose_of_row, *pool_, time_s);
 }
 
 Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
@@ -131,7 +140,7 @@ SimulatedFrame SimulatedSequence::frame(int index) {
     const Rigid3 world_from_cam =
         motion_.world_from_rig(time_s) * rig_.cameras[0].cam_from_rig.inverse();
     frame.depth_timestamp_ns = frame.timestamp_ns + std::llround(1e9 * spec_.depth_lag_s);
-    frame.depth = renderers_[0].depth(world_from_cam, *spec_.chain.depth_factor, *pool_);
+    frame.depth = renderers_[0].depth(world_from_cam, *spec_.chain.depth_factor, *pool_, time_s);
     Rng rng(spec_.seed, stream_of(index, kDepthStream));
     apply_depth_noise(effects, *spec_.chain.depth_factor, rng, frame.depth);
   }

@@ -36,6 +36,7 @@ struct SequenceSpec {
   int num_frames = 200;           ///< Which also say how long the motion takes.
   ImageEffects effects;           ///< Of the frames that no span holds.
   std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
+  int num_walkers = 0;            ///< People who cross the view at any time, see add_walkers().
   /// Rolling shutter: time from the first row to the last. A frame's time is that of its middle
   /// row; each row is as long exposed as a whole image otherwise.
   double readout_s = 0.0;
@@ -95,8 +96,8 @@ class SimulatedSequence {
 
   SequenceSpec spec_;
   Rig rig_;
-  std::shared_ptr<const World> world_;
   Motion motion_;
+  std::shared_ptr<const World> world_;
   std::vector<Renderer> renderers_;
   std::unique_ptr<ThreadPool> pool_;
 };

@@ -204,9 +204,9 @@ float TraceSurface::distance_along(const Vector3f& direction) const {
   return across < 0.0f ? -eye.z() / across : kInfinity;
 }
 
-Tracer::Tracer(const World& world, const Vector3d& eye) {
-  for (std::uint32_t i = 0; i < world.surfaces.size(); ++i) {
-    const TraceSurface surface = relative_to(world.surfaces[i], i, eye);
+Tracer::Tracer(std::span<const Surface> surfaces, const Vector3d& eye) {
+  for (std::uint32_t i = 0; i < surfaces.size(); ++i) {
+    const TraceSurface surface = relative_to(surfaces[i], i, eye);
     if (is_round(surface.kind) || surface.eye.z() > 0.0f) surfaces_.push_back(surface);
   }
   std::stable_sort(surfaces_.begin(), surfaces_.end(), [](const auto& a, const auto& b) {

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "waymark/simulate/world.h"
@@ -57,7 +58,7 @@ struct TraceSurface {
 /// and by distance once everything in the tile is covered.
 class Tracer {
  public:
-  Tracer(const World& world, const Eigen::Vector3d& eye);
+  Tracer(std::span<const Surface> surfaces, const Eigen::Vector3d& eye);
 
   /// Fills distance and hit of the tile.
   void trace(RayTile& tile) const;

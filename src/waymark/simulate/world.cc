@@ -228,6 +228,18 @@ Vector3d surface_point(const Surface& surface, const Vector2d& uv) {
   return point + uv.y() * surface.v_axis;
 }
 
+std::vector<Surface> World::surfaces_at(double time_s) const {
+  const Vector3d nowhere(0.0, 0.0, -1e6);
+  std::vector<Surface> moved = surfaces;
+  for (const Walk& walk : walks) {
+    const bool is_there = time_s >= walk.start_s && time_s < walk.end_s;
+    const Vector3d at =
+        is_there ? Vector3d(walk.start + (time_s - walk.start_s) * walk.velocity) : nowhere;
+    for (std::uint32_t i = walk.first_surface; i < walk.end_surface; ++i) moved[i].origin += at;
+  }
+  return moved;
+}
+
 std::optional<WorldHit> World::intersect(const Eigen::Vector3d& origin,
                                          const Eigen::Vector3d& direction) const {
   std::optional<WorldHit> nearest;

@@ -116,11 +116,25 @@ struct WorldHit {
   SurfaceHit hit;             ///< Where on it.
 };
 
+/// Somebody who walks straight on: surfaces that are there from one time to another.
+struct Walk {
+  std::uint32_t first_surface = 0;  ///< Indices in World::surfaces, where they stand at the origin.
+  std::uint32_t end_surface = 0;    ///< One past the last of them.
+  double start_s = 0.0;             ///< They are there from this time ...
+  double end_s = 0.0;               ///< ... to this one.
+  Eigen::Vector3d start = Eigen::Vector3d::Zero();     ///< Of the feet, in the world.
+  Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< In m/s.
+};
+
 /// Textured analytic surfaces; z points up, the ground is near z = 0. Immutable once made.
 struct World {
   std::string name;               ///< As make_world() knows it.
   std::vector<Surface> surfaces;  ///< In no order.
   std::vector<Texture> textures;  ///< That surfaces refer to by index.
+  std::vector<Walk> walks;        ///< Of surfaces that move.
+
+  /// The surfaces where they are at a time; those of walks that are not there lie below the world.
+  std::vector<Surface> surfaces_at(double time_s) const;
 
   /// The nearest surface along origin + t * direction, t > 0; nothing where there is only sky.
   std::optional<WorldHit> intersect(const Eigen::Vector3d& origin,
@@ -134,6 +148,9 @@ struct World {
 ///   street     a block of houses to drive around, 40 x 28 m
 ///   twins      two rooms that look exactly alike, with a corridor that does not
 ///   bare       the room with hardly any texture on its walls
+///   blank      the apartment with blank walls, floors and ceilings
+///   corridor   50 m with 20 doors that look exactly alike
+///   shop       24 x 16 m with eight shelves that look exactly alike
 std::vector<std::string> world_names();
 
 /// Makes a named world; the same name and seed give the same world. Throws InputError for an
