@@ -30,6 +30,8 @@ struct PoseObservations {
   void clear();
   /// Adds what was measured of a point; not where there are weights.
   void add(const Eigen::Vector3d& point, const Measurement& measured);
+  /// Adds one of others, but for its weight; all of them with ranges, or all without.
+  void add(const PoseObservations& other, std::size_t index);
 };
 
 struct PoseOptions {

@@ -76,6 +76,16 @@ void PoseObservations::add(const Eigen::Vector3d& point, const Measurement& meas
   inverse_range_sigma.push_back(measured.inverse_range_sigma);
 }
 
+void PoseObservations::add(const PoseObservations& other, std::size_t index) {
+  point_in_world.push_back(other.point_in_world[index]);
+  bearing.push_back(other.bearing[index]);
+  level_pixel_from_bearing.push_back(other.level_pixel_from_bearing[index]);
+  camera.push_back(other.camera[index]);
+  if (other.inverse_range.empty()) return;
+  inverse_range.push_back(other.inverse_range[index]);
+  inverse_range_sigma.push_back(other.inverse_range_sigma[index]);
+}
+
 void PoseObservations::clear() {
   point_in_world.clear();
   bearing.clear();

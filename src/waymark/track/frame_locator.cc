@@ -6,7 +6,6 @@
 #include <utility>
 
 namespace waymark {
-
 int num_valid(std::span<const LandmarkId> landmarks) {
   return static_cast<int>(std::ranges::count_if(landmarks, &LandmarkId::is_valid));
 }
@@ -25,8 +24,16 @@ LocatedFrame FrameLocator::locate(const Features& features,
                                   const Rigid3& initial_rig_from_world,
                                   std::vector<LandmarkId> landmarks) {
   collect(features, map, landmarks);
-  const PoseEstimate estimate =
+  PoseEstimate estimate =
       optimize_pose(*rig_, observations_, initial_rig_from_world, PoseOptions{}, workspace_);
+  if (const auto world = larger_motion_.find(observations_, initial_rig_from_world, estimate)) {
+    for (std::size_t k = 0; k < observations_.size(); ++k) {
+      if (!larger_motion_.is_contradicted(observations_, k, *world)) continue;
+      landmarks[feature_of_observation_[k]] = LandmarkId{};
+    }
+    collect(features, map, landmarks);
+    estimate = optimize_pose(*rig_, observations_, *world, PoseOptions{}, workspace_);
+  }
   LocatedFrame located;
   located.rig_from_world = estimate.rig_from_world;
   located.covariance = estimate.covariance;

@@ -10,6 +10,7 @@
 #include "waymark/map/map.h"
 #include "waymark/match/projection.h"
 #include "waymark/optimize/pose.h"
+#include "waymark/track/larger_motion.h"
 
 namespace waymark {
 
@@ -32,7 +33,8 @@ std::vector<LandmarkId> primary_landmarks(const Features& features,
 /// Pose of a frame from the landmarks that its features show. Keeps its buffers.
 class FrameLocator {
  public:
-  explicit FrameLocator(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
+  explicit FrameLocator(std::shared_ptr<const Rig> rig)
+      : rig_(rig), matcher_(rig), larger_motion_(rig) {}
 
   /// landmarks: per feature; primary features have candidates (living in the map). Of these
   /// outliers are cleared.
@@ -68,6 +70,7 @@ class FrameLocator {
   std::vector<std::uint32_t> feature_of_observation_;
   std::vector<std::uint8_t> is_taken_;
   PoseWorkspace workspace_;
+  LargerMotion larger_motion_;
 };
 
 }  // namespace waymark
