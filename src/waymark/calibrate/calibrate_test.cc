@@ -115,12 +115,12 @@ TEST(Calibrate, BeginsWithWhatTheCameraNoted) {
 
 /// Angles, not tangents, are in proportion to pixels there.
 TEST(Calibrate, KnowsWhatAFocalLengthMeansOfAFisheyeLens) {
-  RenderedInput still(make_lens(LensModel::kFisheye, 110.0, 320, 320), "still", 12);
-  still.light_circle(150.0);
-  still.note(110.0, 320);
+  RenderedInput still(make_lens(LensModel::kFisheye, 55.0, 160, 160), "still", 12);
+  still.light_circle(75.0);
+  still.note(55.0, 160);
   const EstimatedCalibration taken = calibrate(still, {});
   EXPECT_EQ(taken.model, LensModel::kFisheye);
-  EXPECT_NEAR(taken.fov_deg, 320.0 / 110.0 / kRadiansPerDegree, 5.0);
+  EXPECT_NEAR(taken.fov_deg, 160.0 / 55.0 / kRadiansPerDegree, 5.0);
 }
 
 TEST(Calibrate, SeesAllDirections) {
