@@ -314,7 +314,7 @@ World make_hall(std::uint64_t seed) {
   return builder.build("hall");
 }
 
-/// Twenty times the same stretch with a door and what hangs on the walls.
+/// Twenty times the same stretch, with a door and a locker.
 World make_corridor(std::uint64_t seed) {
   constexpr int kNumDoors = 20;
   const Vector3d size(2.5, 2.2, 2.6);  // Of a stretch.

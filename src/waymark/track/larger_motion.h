@@ -4,7 +4,7 @@
 
 #include <memory>
 #include <optional>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "waymark/camera/rig.h"
@@ -31,7 +31,7 @@ class LargerMotion {
                        const Rigid3& rig_from_world) const;
 
  private:
-  /// Of the landmark in the image, in variances.
+  /// Of the landmark in the image, in squared pixels of the level.
   double squared_error(const PoseObservations& observations,
                        std::size_t index,
                        const Rigid3& rig_from_world) const;
