@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/loop/beside.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
 #include "waymark/map/align.h"
@@ -178,10 +179,11 @@ bool close_revisit(Map& map,
 }
 
 void fuse_overlaps(Map& map, ProjectionMatcher& matcher, DirtyLandmarks& dirty) {
+  const KeyframePositions positions(map);
   const std::uint32_t end = map.keyframes().end_id().value;
   for (KeyframeId id{0}; id.value < end; ++id.value) {
     if (!map.keyframes().contains(id)) continue;
-    std::vector<KeyframeId> sources = find_beside(map, id, kOverlapping);
+    std::vector<KeyframeId> sources = positions.find_beside(map, id, kOverlapping);
     if (sources.size() > kMaxSources) sources.resize(kMaxSources);
     if (!sources.empty()) fuse_into(map, sources, id, matcher, dirty);
   }

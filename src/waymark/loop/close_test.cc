@@ -19,8 +19,7 @@ Revisit walk_until_found(LoopScene& scene, int from_step) {
   for (int step = from_step;; ++step) {
     const KeyframeId id = scene.add_keyframe(step);
     if (step < from_step + 4) continue;
-    const auto alike = find_alike(scene.map, scene.places, id);
-    if (const auto revisit = verifier.verify_alike(scene.map, id, alike)) return *revisit;
+    if (const auto found = verifier.verify_alike(scene.map, scene.places, id)) return *found;
   }
 }
 
@@ -131,8 +130,8 @@ TEST_F(LoopClosingTest, FusesWhatIsSeenFromBothSides) {
   ASSERT_EQ(scene.map.loop_edges().size(), 1u);
   EXPECT_TRUE(scene.map.has_loop_edge(revisit.query));
   // The place is not found again: the map knows now.
-  const auto alike = find_alike(scene.map, scene.places, revisit.query);
-  EXPECT_FALSE(RevisitVerifier(scene.rig, 1).verify_alike(scene.map, revisit.query, alike));
+  RevisitVerifier verifier(scene.rig, 1);
+  EXPECT_FALSE(verifier.verify_alike(scene.map, scene.places, revisit.query));
 }
 
 TEST_F(LoopClosingTest, KeepsOldLoopsClosed) {

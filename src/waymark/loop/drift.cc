@@ -97,7 +97,7 @@ ImpliedDrift implied_drift(const Map& map, const Revisit& revisit) {
           std::log(drift.scale)};
 }
 
-bool is_plausible_loop(const Map& map, const Revisit& revisit) {
+bool is_plausible_loop(const Map& map, const Revisit& revisit, double part) {
   const std::optional<GraphWay> way = shortest_way(map, revisit.query, revisit.match);
   if (!way) return false;
   const ImpliedDrift drift = implied_drift(map, revisit);
@@ -110,8 +110,8 @@ bool is_plausible_loop(const Map& map, const Revisit& revisit) {
       std::min(kMaxAngleRad + kMaxAnglePerStepRad * way->num_steps, kMaxAngleAtAllRad);
   const double max_log_scale =
       std::min(kMaxLogScale + kMaxLogScalePerStep * way->num_steps, kMaxLogScaleAtAll);
-  return drift.distance <= max_distance && drift.angle_rad <= max_angle &&
-         log_scale <= max_log_scale;
+  return drift.distance <= part * max_distance && drift.angle_rad <= part * max_angle &&
+         log_scale <= part * max_log_scale;
 }
 
 }  // namespace waymark

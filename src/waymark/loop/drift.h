@@ -50,7 +50,7 @@ struct ImpliedDrift {
 ImpliedDrift implied_drift(const Map& map, const Revisit& revisit);
 
 /// Whether a map can have drifted so far on the way that lies between query and match. Two rooms
-/// that are alike are told apart by this.
-bool is_plausible_loop(const Map& map, const Revisit& revisit);
+/// that are alike are told apart by this. part: of what is possible, so much is still believed.
+bool is_plausible_loop(const Map& map, const Revisit& revisit, double part = 1.0);
 
 }  // namespace waymark

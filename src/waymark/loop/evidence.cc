@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "waymark/loop/find.h"
+#include "waymark/track/enough.h"
 
 namespace waymark {
 namespace {
@@ -22,9 +23,10 @@ constexpr double kSightingRadiusPx = 4.0;
 constexpr std::size_t kNumSurroundings = 8;
 /// Landmarks that so many keyframes saw are expected to be seen again.
 constexpr std::size_t kMinObservers = 3;
-/// A keyframe near the query confirms if it finds so many landmarks, and such a share.
+/// A keyframe near the query confirms if it finds so many landmarks, or what is enough of its
+/// features, and such a share.
 constexpr std::size_t kMaxConfirming = 5;
-constexpr std::size_t kMinFoundToConfirm = 25;
+constexpr int kMinFoundToConfirm = 25;
 constexpr double kMinShareToConfirm = 0.1;
 
 Rigid3 cam_from_world(const Keyframe& keyframe) {
@@ -191,12 +193,14 @@ void EvidenceCollector::count_sightings(const Map& map, RevisitEvidence& evidenc
                revisit.match,
                pose_in_other_world(revisit.query_from_match.inverse(), query_from_world));
   for (KeyframeId id : strongest_neighbours(map, revisit.query, kMaxConfirming)) {
+    const Features& features = *map.keyframes().at(id).features;
     const Rigid3 id_from_query = map.keyframes().at(id).rig_from_world * query_from_world.inverse();
     const Sim3 id_from_match = Sim3(id_from_query) * revisit.query_from_match;
     const Sightings sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
-    evidence.num_confirming +=
-        sightings.num_found >= kMinFoundToConfirm && sightings.share() >= kMinShareToConfirm;
+    evidence.num_confirming += static_cast<int>(sightings.num_found) >=
+                                   enough_of(kMinFoundToConfirm, features.num_primary) &&
+                               sightings.share() >= kMinShareToConfirm;
   }
 }
 

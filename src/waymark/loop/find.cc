@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <iterator>
 
-#include "waymark/loop/drift.h"
-
 namespace waymark {
 namespace {
 
@@ -84,31 +82,6 @@ std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, Key
     if (num_linked < kMaxOfOnePlace) alike.push_back(id);
   }
   return alike;
-}
-
-std::vector<KeyframeId> find_beside(const Map& map,
-                                    KeyframeId query,
-                                    const BesideOptions& options) {
-  struct Beside {
-    double distance;
-    KeyframeId keyframe;
-  };
-  const Keyframe& here = map.keyframes().at(query);
-  const double depth = median_depth(map, query);
-  const std::vector<KeyframeId> known = within_steps(map, query, options.num_known_steps);
-  std::vector<Beside> found;
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& other) {
-    if (other.submap != here.submap || std::ranges::binary_search(known, id)) return;
-    const Rigid3 here_from_other = here.rig_from_world * other.rig_from_world.inverse();
-    const double distance = here_from_other.translation.norm() / depth;
-    const double angle = Eigen::AngleAxisd(here_from_other.rotation).angle();
-    if (distance >= options.distance || angle >= options.angle_rad) return;
-    found.push_back({distance + angle, id});
-  });
-  std::ranges::stable_sort(found, {}, &Beside::distance);
-  std::vector<KeyframeId> ids;
-  for (const Beside& beside : found) ids.push_back(beside.keyframe);
-  return ids;
 }
 
 }  // namespace waymark

@@ -30,14 +30,4 @@ std::vector<KeyframeId> with_neighbours(const Map& map, KeyframeId keyframe, std
 /// own surroundings do by far.
 std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query);
 
-/// What lies beside a keyframe though the map does not know that they show the same.
-struct BesideOptions {
-  int num_known_steps = 1;  ///< Keyframes so near in the covisibility graph are known.
-  double distance = 0.0;    ///< Between the rigs, in parts of the median depth of the scene.
-  double angle_rad = 0.0;   ///< Of the rotation between them.
-};
-
-/// Keyframes of the same sub-map beside the query where the map has it, nearest first.
-std::vector<KeyframeId> find_beside(const Map& map, KeyframeId query, const BesideOptions& options);
-
 }  // namespace waymark

@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/map/parts.h"
@@ -76,8 +77,7 @@ bool GlobalMapper::close(const std::optional<Revisit>& revisit) {
 }
 
 bool GlobalMapper::close_alike(KeyframeId query) {
-  const std::vector<KeyframeId> alike = find_alike(mapper_.map(), places_, query);
-  if (!close(verifier_.verify_alike(mapper_.map(), query, alike))) return false;
+  if (!close(verifier_.verify_alike(mapper_.map(), places_, query))) return false;
   unconsolidated_ = all_keyframes();
   return true;
 }
@@ -88,8 +88,7 @@ std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
   return ids;
 }
 
-bool GlobalMapper::close_beside(KeyframeId query) {
-  const std::vector<KeyframeId> beside = find_beside(mapper_.map(), query, kBeside);
+bool GlobalMapper::close_one_beside(KeyframeId query, std::span<const KeyframeId> beside) {
   return close(verifier_.verify_beside(mapper_.map(), query, beside));
 }
 
@@ -97,7 +96,22 @@ void GlobalMapper::consolidate_some(std::size_t max_count) {
   for (std::size_t i = 0; i < max_count && !unconsolidated_.empty(); ++i) {
     const KeyframeId query = unconsolidated_.back();
     unconsolidated_.pop_back();
-    if (mapper_.map().keyframes().contains(query)) close_beside(query);
+    if (!mapper_.map().keyframes().contains(query)) continue;
+    close_one_beside(query, find_beside(mapper_.map(), query, kBeside));
+  }
+}
+
+void GlobalMapper::consolidate_rest() {
+  std::optional<KeyframePositions> positions;
+  while (!unconsolidated_.empty()) {
+    const KeyframeId query = unconsolidated_.back();
+    unconsolidated_.pop_back();
+    if (!mapper_.map().keyframes().contains(query)) continue;
+    if (!positions) positions.emplace(mapper_.map());
+    // What was closed moved keyframes.
+    if (close_one_beside(query, positions->find_beside(mapper_.map(), query, kBeside))) {
+      positions.reset();
+    }
   }
 }
 
@@ -157,7 +171,7 @@ void GlobalMapper::finish() {
 
 void GlobalMapper::consolidate() {
   refine_globally(true);
-  consolidate_some(unconsolidated_.size());
+  consolidate_rest();
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) { fuse_overlaps(map, projection_, dirty); });
   refine_globally(false);
 }

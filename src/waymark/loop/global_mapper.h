@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "waymark/loop/settings.h"
@@ -70,9 +71,10 @@ class GlobalMapper {
 
  private:
   void update_places(const Mapper::Changes& changes);
-  bool close_beside(KeyframeId query);
+  bool close_one_beside(KeyframeId query, std::span<const KeyframeId> beside);
   bool close(const std::optional<Revisit>& revisit);
   void consolidate_some(std::size_t max_count);
+  void consolidate_rest();
   std::vector<KeyframeId> all_keyframes() const;
   void look_with_calibration(const std::shared_ptr<const Rig>& before);
   void refine_globally(bool with_calibration);

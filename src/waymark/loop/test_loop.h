@@ -48,6 +48,26 @@ inline PointCloud cloud_with_twins(int count) {
   return cloud;
 }
 
+/// One and the same stretch, so many times all round.
+inline PointCloud cloud_of_equal_stretches(int count, int num_stretches) {
+  PointCloud cloud = cloud_all_round(count);
+  const double stretch_rad = 2.0 * std::numbers::pi / num_stretches;
+  std::erase_if(cloud.landmarks, [&](const PointLandmark& point) {
+    const double angle = std::atan2(point.position.x(), point.position.z());
+    return angle < 0.0 || angle >= stretch_rad;
+  });
+  const std::vector<PointLandmark> originals = cloud.landmarks;
+  for (int stretch = 1; stretch < num_stretches; ++stretch) {
+    const Eigen::AngleAxisd turn(stretch * stretch_rad, Eigen::Vector3d::UnitY());
+    for (PointLandmark point : originals) {
+      point.position = turn * point.position;
+      point.tangent = turn * point.tangent;
+      cloud.landmarks.push_back(point);
+    }
+  }
+  return cloud;
+}
+
 /// A map as it is before loops are closed: the camera walks on a circle and keyframes associate
 /// what they see with landmarks of the last few keyframes only, so that a place seen again gets
 /// landmarks anew. The map drifts steadily from the truth.

@@ -10,32 +10,40 @@
 #include "waymark/camera/rig.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
+#include "waymark/loop/rivals.h"
+#include "waymark/track/enough.h"
 
 namespace waymark {
 namespace {
 
 /// What a revisit must have at least. In the shelves of a warehouse and the arcades of an atrium
 /// that are alike, false ones had up to 37 inliers and a share of 0.13.
+/// Where the images offer little, what is enough of that.
 struct Demand {
-  std::size_t num_inliers;
-  std::size_t num_found;
+  int num_inliers;
+  int num_found;
 };
 constexpr Demand kOfLoops{25, 40};
 constexpr Demand kOfJoins{30, 60};
 constexpr double kMinShare = 0.15;  ///< Of what both sides should see.
-/// Two revisits of one query agree within this, in radians and in parts of the depth of the scene.
-constexpr double kMaxDisagreement = 0.2;
 
 /// Features of the query that show landmarks of both sides, and their distances in the same ratio.
 constexpr std::size_t kMinPairsBeside = 10;
 constexpr double kMaxRatioError = 0.15;
 
-bool meets(const RevisitEvidence& evidence, const Demand& demand) {
+bool meets(const Map& map, const RevisitEvidence& evidence, const Demand& demand) {
+  const Revisit& revisit = evidence.revisit;
+  const std::size_t num_features =
+      std::min(map.keyframes().at(revisit.query).features->num_primary,
+               map.keyframes().at(revisit.match).features->num_primary);
+  const auto is_enough = [&](std::size_t count, int full) {
+    return static_cast<int>(count) >= enough_of(full, num_features);
+  };
   const Sightings both{evidence.in_query.num_found + evidence.in_match.num_found,
                        evidence.in_query.num_visible + evidence.in_match.num_visible};
-  return evidence.revisit.num_inliers >= demand.num_inliers &&
-         evidence.in_query.num_found >= demand.num_found &&
-         evidence.in_match.num_found >= demand.num_found && both.share() >= kMinShare &&
+  return is_enough(revisit.num_inliers, demand.num_inliers) &&
+         is_enough(evidence.in_query.num_found, demand.num_found) &&
+         is_enough(evidence.in_match.num_found, demand.num_found) && both.share() >= kMinShare &&
          evidence.num_confirming > 0;
 }
 
@@ -43,27 +51,13 @@ bool is_loop(const Map& map, const Revisit& revisit) {
   return map.keyframes().at(revisit.query).submap == map.keyframes().at(revisit.match).submap;
 }
 
-/// Whether two revisits of one query put it at the same place of the same sub-map.
-bool agree(const Map& map, const Revisit& a, const Revisit& b) {
-  const Keyframe& match_a = map.keyframes().at(a.match);
-  const Keyframe& match_b = map.keyframes().at(b.match);
-  if (match_a.submap != match_b.submap) return true;  // Of different worlds: nothing to compare.
-  const Rigid3 pose_a = pose_in_other_world(a.query_from_match, match_a.rig_from_world);
-  const Rigid3 pose_b = pose_in_other_world(b.query_from_match, match_b.rig_from_world);
-  const Rigid3 difference = pose_a * pose_b.inverse();
-  return difference.translation.norm() < kMaxDisagreement * median_depth(map, a.match) &&
-         Eigen::AngleAxisd(difference.rotation).angle() < kMaxDisagreement;
-}
-
 /// The one with most inliers, unless another contradicts it.
-std::optional<Revisit> choose(const Map& map,
-                              const std::vector<RevisitEvidence>& all,
-                              const Demand& demand) {
+std::optional<Revisit> choose_join(const Map& map, const std::vector<RevisitEvidence>& joins) {
   const RevisitEvidence& best = *std::ranges::max_element(
-      all, {}, [](const RevisitEvidence& one) { return one.revisit.num_inliers; });
+      joins, {}, [](const RevisitEvidence& one) { return one.revisit.num_inliers; });
   const bool is_clear = std::ranges::all_of(
-      all, [&](const RevisitEvidence& other) { return agree(map, best.revisit, other.revisit); });
-  return is_clear && meets(best, demand) ? std::optional(best.revisit) : std::nullopt;
+      joins, [&](const RevisitEvidence& other) { return agree(map, best.revisit, other.revisit); });
+  return is_clear && meets(map, best, kOfJoins) ? std::optional(best.revisit) : std::nullopt;
 }
 
 /// Features of a keyframe that show a landmark of its own and another one.
@@ -107,26 +101,43 @@ RevisitVerifier::RevisitVerifier(std::shared_ptr<const Rig> rig, std::uint64_t s
     : rig_(rig), evidence_(rig, seed), locator_(rig, seed) {}
 
 std::optional<Revisit> RevisitVerifier::verify_alike(const Map& map,
-                                                     KeyframeId query,
-                                                     std::span<const KeyframeId> candidates) {
+                                                     const PlaceIndex& places,
+                                                     KeyframeId query) {
   std::vector<RevisitEvidence> loops;
   std::vector<RevisitEvidence> joins;
-  bool is_ambiguous = false;
-  for (KeyframeId match : candidates) {
-    std::optional<RevisitEvidence> evidence = evidence_.collect(map, query, match);
-    if (!evidence || !meets(*evidence, kOfLoops)) continue;
-    if (!is_loop(map, evidence->revisit)) {
-      joins.push_back(std::move(*evidence));
-    } else if (is_plausible_loop(map, evidence->revisit)) {
-      loops.push_back(std::move(*evidence));
-    } else {
-      is_ambiguous = true;
-    }
+  for (RevisitEvidence& evidence : collect_alike(map, places, query)) {
+    (is_loop(map, evidence.revisit) ? loops : joins).push_back(std::move(evidence));
   }
-  if (!loops.empty()) return choose(map, loops, kOfLoops);
   // Where one sub-map has two places alike, one of them says nothing of another sub-map.
-  if (is_ambiguous || joins.empty()) return std::nullopt;
-  return choose(map, joins, kOfJoins);
+  std::optional<Revisit> chosen;
+  if (!loops.empty()) {
+    chosen = choose_loop(map, loops);
+  } else if (!joins.empty()) {
+    chosen = choose_join(map, joins);
+  }
+  return chosen && is_unrivalled(map, places, *chosen) ? chosen : std::nullopt;
+}
+
+std::vector<RevisitEvidence> RevisitVerifier::collect_alike(const Map& map,
+                                                            const PlaceIndex& places,
+                                                            KeyframeId query) {
+  std::vector<RevisitEvidence> found;
+  for (const KeyframeId match : find_alike(map, places, query)) {
+    std::optional<RevisitEvidence> evidence = evidence_.collect(map, query, match);
+    if (evidence && meets(map, *evidence, kOfLoops)) found.push_back(std::move(*evidence));
+  }
+  return found;
+}
+
+bool RevisitVerifier::is_unrivalled(const Map& map,
+                                    const PlaceIndex& places,
+                                    const Revisit& revisit) {
+  const bool is_join = !is_loop(map, revisit);
+  for (const RevisitEvidence& alike : collect_alike(map, places, revisit.match)) {
+    if (!is_loop(map, alike.revisit) || is_plausible_loop(map, alike.revisit)) continue;
+    if (is_join || !outdoes(map, revisit, drift_in_depths(map, alike.revisit))) return false;
+  }
+  return true;
 }
 
 std::optional<Revisit> RevisitVerifier::verify_beside(const Map& map,

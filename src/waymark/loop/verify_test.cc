@@ -4,20 +4,13 @@
 
 #include <gtest/gtest.h>
 
+#include "waymark/loop/beside.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/test_loop.h"
 
 namespace waymark {
 namespace {
-
-/// As the mapper looks for the place of a new keyframe.
-std::optional<Revisit> find_revisit(RevisitVerifier& verifier,
-                                    const LoopScene& scene,
-                                    KeyframeId query) {
-  const auto alike = find_alike(scene.map, scene.places, query);
-  return verifier.verify_alike(scene.map, query, alike);
-}
 
 struct Walk {
   int num_found = 0;
@@ -30,7 +23,7 @@ Walk walk(LoopScene& scene, RevisitVerifier& verifier, int from_step, int to_ste
   Walk result;
   for (int step = from_step; step < to_step; ++step) {
     const KeyframeId id = scene.add_keyframe(step);
-    const std::optional<Revisit> revisit = find_revisit(verifier, scene, id);
+    const std::optional<Revisit> revisit = verifier.verify_alike(scene.map, scene.places, id);
     if (!revisit) continue;
     if (++result.num_found > 1) continue;
     result.first_step = step;
@@ -135,6 +128,25 @@ TEST(VerifyAlikeTest, JoinsNothingAtAPlaceThatIsThereTwice) {
   walk(scene, verifier, 0, 30);  // The second ten are like the first, in another place.
   scene.start_submap(Sim3());
   EXPECT_EQ(walk(scene, verifier, 2, 8).num_found, 0);
+}
+
+TEST(VerifyAlikeTest, FindsThePlaceAmongEqualStretchesThatTheMapIsNearTo) {
+  LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, drift_of(0.05, 0.01, 0.0));
+  RevisitVerifier verifier(scene.rig, 1);
+  const Walk result = walk(scene, verifier, 0, kRound + 4);
+  ASSERT_TRUE(result.first);
+  EXPECT_GE(result.first_step, kRound - 6);
+  expect_true(scene, *result.first);
+}
+
+TEST(VerifyAlikeTest, ClosesNoLoopAmongEqualStretchesIfTheMapMayLieAtAny) {
+  // Stretches of 2.5 at a way of 25: were they not equal, the map might have drifted so far.
+  const Vector7d drift = drift_of(0.9, 0.1, 0.0);
+  LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, drift);
+  RevisitVerifier verifier(scene.rig, 1);
+  EXPECT_EQ(walk(scene, verifier, 0, kRound + 4).num_found, 0);
+  LoopScene unequal(cloud_all_round(kNumPoints), true, drift);
+  EXPECT_GT(walk(unequal, verifier, 0, kRound + 4).num_found, 0);
 }
 
 TEST(VerifyAlikeTest, SeesNothingWhereNothingIsSeenAgain) {

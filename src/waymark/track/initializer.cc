@@ -10,12 +10,14 @@
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
+#include "waymark/track/enough.h"
 #include "waymark/track/rest.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {
 namespace {
 
+/// A map begins with so many landmarks, or with what is enough of the features there are.
 constexpr int kMinLandmarks = 80;
 /// So many that a pose can rest on them even if the next frame finds just one in ten again.
 constexpr std::size_t kPlentyOfLandmarks = 200;
@@ -30,6 +32,15 @@ constexpr double kSearchRadiusPx = 60.0;
 constexpr double kSearchPart = 1.0 / 16.0;
 /// What noise moves a feature by at most; a camera at rest shows no more.
 constexpr double kRestPx = kMinParallaxPx / 4;
+
+int min_landmarks(const Features& features) {
+  return enough_of(kMinLandmarks, features.num_primary);
+}
+
+/// Of a pair: the image that offers less counts.
+int min_landmarks(const Features& a, const Features& b) {
+  return std::min(min_landmarks(a), min_landmarks(b));
+}
 
 /// Primary features whose range has at most this relative standard deviation.
 std::vector<std::uint32_t> features_with_range(const Features& features,
@@ -178,7 +189,7 @@ Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::ui
       projection_(rig) {}
 
 std::optional<Initialization> Initializer::add(const Frame& frame) {
-  if (frame.features->num_primary < kMinLandmarks) {
+  if (static_cast<int>(frame.features->num_primary) < min_landmarks(*frame.features)) {
     reason_ = FrameReason::kNoFeatures;
     return std::nullopt;
   }
@@ -195,7 +206,7 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
     const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
     start.submap.landmarks.push_back({world_from_cam * point, {i}});
   }
-  if (start.submap.landmarks.size() < kMinLandmarks) {
+  if (static_cast<int>(start.submap.landmarks.size()) < min_landmarks(features)) {
     reason_ = FrameReason::kTooFewMatches;
     return std::nullopt;
   }
@@ -206,8 +217,9 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
 std::optional<Initialization> Initializer::start_from_two_views(const Frame& frame) {
   reason_ = FrameReason::kTooFewMatches;
   for (Reference& reference : references_) match(reference, frame);
-  std::erase_if(references_, [](const Reference& reference) {
-    return static_cast<int>(reference.matches.size()) < kMinLandmarks;
+  std::erase_if(references_, [&](const Reference& reference) {
+    return static_cast<int>(reference.matches.size()) <
+           min_landmarks(*reference.frame.features, *frame.features);
   });
   for (const Reference& reference : references_) {
     if (!has_moved(reference, frame)) {
@@ -234,7 +246,8 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
 
 void Initializer::match(Reference& reference, const Frame& frame) {
   match_near_expected(reference, frame);
-  if (reference.matches.size() >= kMinLandmarks) return;
+  const int enough = min_landmarks(*reference.frame.features, *frame.features);
+  if (static_cast<int>(reference.matches.size()) >= enough) return;
   if (expect_turned(reference, frame)) match_near_expected(reference, frame);
 }
 
@@ -275,7 +288,8 @@ bool Initializer::has_moved(const Reference& reference, const Frame& frame) cons
     const Eigen::Vector3f& before = reference.frame.features->bearings[match.a];
     return (frame.features->bearings[match.b] - before).norm() >= kRestPx * pixel_rad_;
   };
-  if (std::ranges::count_if(reference.matches, moved) < kMinLandmarks) return false;
+  const int enough = min_landmarks(*reference.frame.features, *frame.features);
+  if (std::ranges::count_if(reference.matches, moved) < enough) return false;
   return !is_at_rest(
       *rig_->cameras[0].camera, *reference.frame.features, *frame.features, reference.matches);
 }
@@ -302,7 +316,8 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
   TwoViewOptions options;
   options.seed = seed_;
   options.stream = frame.id.value;
-  options.min_num_points = kMinLandmarks;
+  const int enough = min_landmarks(*reference.frame.features, *frame.features);
+  options.min_num_points = enough;
   options.min_parallax_rad = kMinParallaxPx * pixel_rad_;
   const TwoViewResult two_view = estimate_two_view(bearings.view(), options);
   if (!two_view.geometry) {
@@ -311,7 +326,7 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
   }
   const RefinedPair pair = refine_pair(
       *rig_, *reference.frame.features, *frame.features, reference.matches, *two_view.geometry);
-  if (pair.matches.size() < kMinLandmarks) {
+  if (static_cast<int>(pair.matches.size()) < enough) {
     reason_ = FrameReason::kTooFewInliers;
     return std::nullopt;
   }

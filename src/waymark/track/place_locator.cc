@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/optimize/locate.h"
+#include "waymark/track/enough.h"
 #include "waymark/track/place_confidence.h"
 
 namespace waymark {
@@ -29,6 +30,7 @@ constexpr double kSecondRadiusPx = 5.0;
 constexpr double kGuessRadiusPx = 40.0;
 /// Laxer than in tracking: light and cameras may have changed, and a few wrong ones do no harm.
 constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio = 0.9};
+/// Or what is enough of the features there are.
 constexpr int kMinInliers = 30;
 
 }  // namespace
@@ -74,9 +76,10 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
   attempt_.failure = FrameReason::kTooFewInliers;
   std::optional<LocatedFrame> located = find_consensus(features, map, stream, std::move(landmarks));
   if (!located) return std::nullopt;
-  constexpr std::array<std::pair<double, int>, 2> kRounds = {
-      {{kFirstRadiusPx, kMinInliers / 2}, {kSecondRadiusPx, kMinInliers}}};
-  for (const auto& [radius_px, min_inliers] : kRounds) {
+  const int enough = enough_of(kMinInliers, features.num_primary);
+  const std::array<std::pair<double, int>, 2> rounds = {
+      {{kFirstRadiusPx, enough / 2}, {kSecondRadiusPx, enough}}};
+  for (const auto& [radius_px, min_inliers] : rounds) {
     gather_local_map(map, primary_landmarks(features, located->landmarks), candidate, local_);
     located = locator_.locate_again(features,
                                     map,

@@ -119,6 +119,12 @@ std::optional<LocatedFrame> Tracker::locate_from_last(const Frame& frame, StageT
   return is_better ? by_image : wide;
 }
 
+std::optional<LocatedFrame> Tracker::locate_by_motion(const Frame& frame) {
+  const double radius_px = search_radii_px_.back();
+  auto located = locate_near(frame, last_.predict(frame.timestamp_ns), radius_px);
+  return located && located->num_inliers >= settings_.min_inliers ? located : std::nullopt;
+}
+
 std::optional<LocatedFrame> Tracker::locate_by_image(const Frame& frame) {
   const std::optional<Rigid3> predicted = predict_by_image(frame);
   if (!predicted) return std::nullopt;
@@ -156,7 +162,8 @@ std::optional<LocatedFrame> Tracker::recover(const Frame& frame, StageTimes& tim
   StageTimer timer(times, Stage::kRecover);
   if (mode_ == Mode::kLost) {
     last_.carry_over(*map_);
-    auto located = locate_by_image(frame);
+    auto located = locate_by_motion(frame);
+    if (!located) located = locate_by_image(frame);
     if (located && located->num_inliers >= settings_.min_inliers) {
       local_map_source_.reset();
       return located;
@@ -172,18 +179,21 @@ std::optional<LocatedFrame> Tracker::recover(const Frame& frame, StageTimes& tim
 }
 
 std::vector<KeyframeId> Tracker::recovery_keyframes() const {
-  std::vector<KeyframeId> keyframes;
-  if (purpose_ == TrackingPurpose::kLocalizing) {
-    keyframes = local_.keyframes;
-    keyframes.resize(std::min(keyframes.size(), kRecoveryKeyframes));
-    return keyframes;
-  }
   const SubmapId submap = map_->keyframes().at(map_->resolve(last_.reference())).submap;
+  std::vector<KeyframeId> keyframes;
+  const auto add = [&](KeyframeId id) {
+    const Keyframe* keyframe = map_->keyframes().find(id);
+    const bool is_known = std::ranges::find(keyframes, id) != keyframes.end();
+    if (keyframe && keyframe->submap == submap && !is_known) keyframes.push_back(id);
+    return keyframes.size() < kRecoveryKeyframes;
+  };
+  for (const KeyframeId id : local_.keyframes) {
+    if (!add(id)) return keyframes;
+  }
+  if (purpose_ == TrackingPurpose::kLocalizing) return keyframes;
+  // A sub-map that has just begun has no local map yet.
   for (std::uint32_t value = map_->keyframes().end_id().value; value-- > 0;) {
-    const Keyframe* keyframe = map_->keyframes().find(KeyframeId{value});
-    if (!keyframe || keyframe->submap != submap) continue;
-    keyframes.push_back(KeyframeId{value});
-    if (keyframes.size() == kRecoveryKeyframes) break;
+    if (!add(KeyframeId{value})) break;
   }
   return keyframes;
 }
@@ -212,7 +222,9 @@ std::optional<LocatedFrame> Tracker::relocalize(const Frame& frame, StageTimes& 
     last = {map_->resolve(last_.reference()), last_.rig_from_world()};
   }
   std::optional<LocatedFrame> located = relocalizer_.locate(frame, *map_, *places_, last);
-  if (located) local_map_source_.reset();
+  if (!located) return std::nullopt;
+  local_map_source_.reset();
+  last_.forget_motion();
   return located;
 }
 
@@ -299,7 +311,6 @@ TrackOutcome Tracker::lose(const Frame& frame, const FrameStatus& why, StageTime
   if (mode_ != Mode::kLost) {
     mode_ = Mode::kLost;
     num_lost_ = 0;
-    last_.forget_motion();
     initializer_.reset();
   }
   ++num_lost_;
@@ -345,6 +356,7 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame, StageTimes
   }
   start->submap.rig = rig_;
   outcome.message = std::move(start->submap);
+  last_.forget_motion();
   last_.set(frame, pose, start->rig_from_world, {});
   last_keyframe_frame_ = frame.id;
   mode_ = Mode::kTracking;

@@ -79,6 +79,7 @@ class Tracker {
                                           const Rigid3& rig_from_world,
                                           double radius_px);
   /// The same, the turn since then being told by the images.
+  std::optional<LocatedFrame> locate_by_motion(const Frame& frame);
   std::optional<LocatedFrame> locate_by_image(const Frame& frame);
   /// Its pose as the motion predicts it, but turned as its image tells. Nothing where that does not
   /// resemble the last one.

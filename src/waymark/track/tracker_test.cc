@@ -229,6 +229,23 @@ TEST_F(TrackerTest, SaysThatAFrameHasNoFeatures) {
   EXPECT_EQ(track(6, path(6)).state, FrameState::kTracked);
 }
 
+TEST_F(TrackerTest, GoesOnWithTheMotionWhereImagesShowedNothing) {
+  // Twenty points look like each, so that only where they should be tells which is seen.
+  auto& points = scene_.cloud.landmarks;
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    points[i].descriptor = points[i - i % 20].descriptor;
+  }
+  std::uint32_t number = 0;
+  for (; number < 10; ++number) {
+    ASSERT_EQ(track(number, path(6.0 * number)).state, FrameState::kTracked) << number;
+  }
+  for (; number < 18; ++number) EXPECT_EQ(track(number, Features{}).state, FrameState::kLost);
+  const Rigid3 ahead = path(6.0 * number);  // Farther than the widest search reaches.
+  const TrackOutcome outcome = track(number, ahead);
+  ASSERT_EQ(outcome.state, FrameState::kTracked);
+  expect_pose(outcome, ahead);
+}
+
 TEST_F(TrackerTest, FollowsASuddenTurn) {
   follow_path(10);
   // 40 px: more than the motion model expects, less than the widest search.

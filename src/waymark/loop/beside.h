@@ -1,0 +1,54 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "waymark/map/map.h"
+
+namespace waymark {
+
+/// What lies beside a keyframe though the map does not know that they show the same.
+struct BesideOptions {
+  int num_known_steps = 1;  ///< Keyframes so near in the covisibility graph are known.
+  double distance = 0.0;    ///< Between the rigs, in parts of the median depth of the scene.
+  double angle_rad = 0.0;   ///< Of the rotation between them.
+};
+
+/// Keyframes of the same sub-map beside the query where the map has it, nearest first. Looks at all
+/// keyframes: for one question.
+std::vector<KeyframeId> find_beside(const Map& map, KeyframeId query, const BesideOptions& options);
+
+/// Where the keyframes of a map are, for many questions: a tree that halves them again and again
+/// (Bentley 1975), so that an answer takes a time that follows what lies near.
+class KeyframePositions {
+ public:
+  explicit KeyframePositions(const Map& map);
+
+  /// The same as waymark::find_beside(), as long as no keyframe has moved or come since; erased
+  /// ones are passed over.
+  std::vector<KeyframeId> find_beside(const Map& map,
+                                      KeyframeId query,
+                                      const BesideOptions& options) const;
+
+ private:
+  struct Entry {
+    Eigen::Vector3d position;
+    KeyframeId keyframe;
+    std::uint8_t axis = 0;  ///< Along which it halves its part.
+  };
+
+  void halve(std::size_t begin, std::size_t end);
+  void list_within(std::size_t begin,
+                   std::size_t end,
+                   const Eigen::Vector3d& centre,
+                   double radius,
+                   std::vector<KeyframeId>& ids) const;
+
+  std::vector<Entry> entries_;  ///< What halves a part is in its middle.
+};
+
+}  // namespace waymark
