@@ -110,6 +110,8 @@ struct SimulateOptions {
   double exposure_ms = 0.0;
   double readout_ms = 0.0;
   double depth_lag_ms = 0.0;
+  double stitched_m = 0.0;
+  double stabilised_share = 0.0;
   std::vector<double> turn_deg;   ///< Of camera 1; empty: none.
   std::vector<std::string> told;  ///< KEY=VALUE each.
   bool is_list = false;
@@ -146,6 +148,8 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   SequenceSpec spec = plain_spec_of(options);
   spec.readout_s = 1e-3 * options.readout_ms;
   spec.depth_lag_s = 1e-3 * options.depth_lag_ms;
+  spec.stitched_m = options.stitched_m;
+  spec.stabilised_share = options.stabilised_share;
   turn_camera1(options.turn_deg, spec.chain);
   spec.told = parse_calibration_error(options.told);
   make_rig(
@@ -192,6 +196,17 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
                   options.depth_lag_ms,
                   "Milliseconds that depth images are taken after the others [0]")
       ->check(number_between(0.0, 1000.0));
+  simulation
+      .add_option("--stitched",
+                  options.stitched_m,
+                  "Metres between the two lenses that 360 degree images are stitched from [0]")
+      ->check(number_between(0.0, 1.0));
+  simulation
+      .add_option("--stabilised",
+                  options.stabilised_share,
+                  "Part of its width by which the picture is shifted at most, to hide how the "
+                  "camera shakes; 0.05 is usual [0]")
+      ->check(number_between(0.0, 0.2));
   simulation
       .add_option("--turn",
                   options.turn_deg,
@@ -249,6 +264,15 @@ void add_simulate_command(CLI::App& program, Command& command) {
       .add_option("--walkers",
                   spec.num_walkers,
                   "People who cross the view at any time; 3 hide up to half of it")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  simulation.add_flag("--operator",
+                      spec.has_operator,
+                      "Somebody who carries the camera on a pole above the head, seen below it");
+  simulation
+      .add_option("--changes",
+                  spec.num_changes,
+                  "Cupboards that are gone and doors that are open in the second half")
       ->check(CLI::Range(0, 20))
       ->capture_default_str();
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();

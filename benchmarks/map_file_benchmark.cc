@@ -11,9 +11,9 @@
 #include <ctime>
 #include <exception>
 #include <filesystem>
-#include <fstream>
 #include <string>
 
+#include "memory.h"
 #include "repeated_map.h"
 #include "waymark/base/text.h"
 #include "waymark/mapfile/map_file.h"
@@ -23,19 +23,9 @@ namespace {
 
 using waymark::Keyframe;
 using waymark::KeyframeId;
+using waymark::memory_mb;
+using waymark::reset_peak;
 using waymark::StoredMap;
-
-/// A line of /proc/self/status in MB.
-double memory_mb(const std::string& key) {
-  std::ifstream status("/proc/self/status");
-  for (std::string line; std::getline(status, line);) {
-    if (line.starts_with(key + ":")) return std::atof(line.c_str() + key.size() + 1) / 1024.0;
-  }
-  return 0.0;
-}
-
-/// From now on VmHWM tells the peak since now.
-void reset_peak() { std::ofstream("/proc/self/clear_refs") << "5"; }
 
 /// Of the processor, so that what else runs does not count.
 template <class Task>

@@ -7,6 +7,8 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/simulate/changes.h"
+#include "waymark/simulate/operator.h"
 #include "waymark/simulate/walkers.h"
 
 namespace waymark {
@@ -37,9 +39,11 @@ std::uint64_t stream_of(int frame, std::uint64_t stream) {
 
 std::shared_ptr<const World> populated_world(const SequenceSpec& spec, const Motion& motion) {
   std::shared_ptr<const World> world = make_world(spec.world, spec.seed);
-  if (spec.num_walkers == 0) return world;
+  if (spec.num_walkers == 0 && spec.num_changes == 0 && !spec.has_operator) return world;
   auto populated = std::make_shared<World>(*world);
+  add_changes(spec.num_changes, motion, spec.seed, *populated);
   add_walkers(spec.num_walkers, motion, spec.seed, *populated);
+  if (spec.has_operator) add_operator(motion, spec.seed, *populated);
   return populated;
 }
 
@@ -71,7 +75,36 @@ SimulatedSequence::SimulatedSequence(SequenceSpec spec,
   WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
   WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0);
   WAYMARK_CHECK(!rig_.cameras.empty() && rig_.cameras.size() < kDepthStream);
-  for (const RigCamera& camera : rig_.cameras) renderers_.emplace_back(world_, camera.camera);
+  prepare_flaws(registry);
+}
+
+void SimulatedSequence::prepare_flaws(const CameraRegistry& registry) {
+  CameraChain sensors = spec_.chain;
+  for (std::size_t i = 0; i < rig_.cameras.size(); ++i) {
+    const Camera& camera = *rig_.cameras[i].camera;
+    if (spec_.stitched_m > 0.0) {
+      if (camera.wrap_width_px() == 0.0) {
+        throw InputError("--stitched", "the camera does not see all round, expected one that does");
+      }
+      stitches_.emplace_back(camera);
+    }
+    if (spec_.stabilised_share > 0.0) {
+      CameraDescription& picture = sensors.cameras[i].description;
+      stabilizers_.emplace_back(
+          picture,
+          [&](int frame) { return world_from_cam(i, seconds(frame)); },
+          spec_.num_frames,
+          spec_.rate_hz,
+          spec_.stabilised_share);
+      picture = sensor_of(std::move(picture), spec_.stabilised_share);
+    }
+  }
+  if (!stabilizers_.empty() && spec_.chain.depth_factor) {
+    throw InputError("--stabilised", "the camera measures depth, expected one that does not");
+  }
+  for (const RigCamera& sensor : make_rig(sensors, registry).cameras) {
+    renderers_.emplace_back(world_, sensor.camera);
+  }
 }
 
 std::int64_t SimulatedSequence::timestamp_ns(int index) const {
@@ -89,16 +122,27 @@ const ImageEffects& SimulatedSequence::effects_of(int index) const {
   return spec_.effects;
 }
 
+Rigid3 SimulatedSequence::world_from_cam(std::size_t camera, double time_s) const {
+  return motion_.world_from_rig(time_s) * rig_.cameras[camera].cam_from_rig.inverse();
+}
+
 Image SimulatedSequence::render(std::size_t camera, double time_s) {
-  const Rigid3 rig_from_cam = rig_.cameras[camera].cam_from_rig.inverse();
+  if (stitches_.empty()) return render_from(camera, 0.0, time_s);
+  const double ahead_m = 0.5 * spec_.stitched_m;
+  return stitches_[camera].join(render_from(camera, ahead_m, time_s),
+                                render_from(camera, -ahead_m, time_s));
+}
+
+Image SimulatedSequence::render_from(std::size_t camera, double ahead_m, double time_s) {
+  const Rigid3 cam_from_lens(Eigen::Quaterniond::Identity(), {0.0, 0.0, ahead_m});
   const Renderer& renderer = renderers_[camera];
   if (spec_.readout_s == 0.0) {
-    return renderer.image(motion_.world_from_rig(time_s) * rig_from_cam, *pool_, time_s);
+    return renderer.image(world_from_cam(camera, time_s) * cam_from_lens, *pool_, time_s);
   }
   const int height_px = rig_.cameras[camera].camera->height_px();
   const auto pose_of_row = [&](int row) {
     const double share = height_px > 1 ? static_cast<double>(row) / (height_px - 1) - 0.5 : 0.0;
-    return motion_.world_from_rig(time_s + share * spec_.readout_s) * rig_from_cam;
+    return world_from_cam(camera, time_s + share * spec_.readout_s) * cam_from_lens;
   };
   return renderer.rolling_image(pose_of_row, *pool_, time_s);
 }
@@ -133,14 +177,14 @@ SimulatedFrame SimulatedSequence::frame(int index) {
     Image image = expose(camera, index, effects);
     Rng rng(spec_.seed, stream_of(index, camera));
     apply_exposure(effects, rng, image);
+    if (!stabilizers_.empty()) image = stabilizers_[camera].stabilize(image, index);
     frame.images.push_back(std::move(image));
   }
   if (spec_.chain.depth_factor) {
     const double time_s = seconds(index) + spec_.depth_lag_s;
-    const Rigid3 world_from_cam =
-        motion_.world_from_rig(time_s) * rig_.cameras[0].cam_from_rig.inverse();
     frame.depth_timestamp_ns = frame.timestamp_ns + std::llround(1e9 * spec_.depth_lag_s);
-    frame.depth = renderers_[0].depth(world_from_cam, *spec_.chain.depth_factor, *pool_, time_s);
+    frame.depth =
+        renderers_[0].depth(world_from_cam(0, time_s), *spec_.chain.depth_factor, *pool_, time_s);
     Rng rng(spec_.seed, stream_of(index, kDepthStream));
     apply_depth_noise(effects, *spec_.chain.depth_factor, rng, frame.depth);
   }

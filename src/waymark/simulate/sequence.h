@@ -14,6 +14,8 @@
 #include "waymark/simulate/calibration_error.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
+#include "waymark/simulate/stabilizer.h"
+#include "waymark/simulate/stitch.h"
 
 namespace waymark {
 
@@ -37,11 +39,19 @@ struct SequenceSpec {
   ImageEffects effects;           ///< Of the frames that no span holds.
   std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
   int num_walkers = 0;            ///< People who cross the view at any time, see add_walkers().
+  bool has_operator = false;      ///< Somebody carries the camera above the head: add_operator().
+  int num_changes = 0;            ///< Things that are gone or open later, see add_changes().
   /// Rolling shutter: time from the first row to the last. A frame's time is that of its middle
   /// row; each row is as long exposed as a whole image otherwise.
   double readout_s = 0.0;
   /// Depth images are taken so much later than the other images, as their own times say.
   double depth_lag_s = 0.0;
+  /// Distance between the two lenses, back to back, that images of a 360 degree camera are stitched
+  /// from, see Stitch; the front lens is half of it ahead of the camera. 0: there is one centre.
+  double stitched_m = 0.0;
+  /// Electronic stabilisation: the largest shift of the picture relative to its width, see
+  /// Stabilizer. The chain is that of the pictures, on the average. 0: none.
+  double stabilised_share = 0.0;
   CalibrationError told;  ///< Of the calibration that data sets come with.
 };
 
@@ -67,7 +77,8 @@ struct SimulatedFrame {
 /// for any number of threads. Not for use by several threads at a time.
 class SimulatedSequence {
  public:
-  /// Throws InputError for an unknown world, motion or camera model.
+  /// Throws InputError for an unknown world, motion or camera model, and for cameras that cannot be
+  /// stitched or stabilised where that is asked for.
   explicit SimulatedSequence(
       SequenceSpec spec,
       unsigned num_threads = 1,
@@ -90,7 +101,10 @@ class SimulatedSequence {
 
  private:
   double seconds(int index) const { return index / spec_.rate_hz; }
+  Rigid3 world_from_cam(std::size_t camera, double time_s) const;
   Image render(std::size_t camera, double time_s);
+  Image render_from(std::size_t camera, double ahead_m, double time_s);
+  void prepare_flaws(const CameraRegistry& registry);
   const ImageEffects& effects_of(int index) const;
   Image expose(std::size_t camera, int index, const ImageEffects& effects);
 
@@ -99,6 +113,8 @@ class SimulatedSequence {
   Motion motion_;
   std::shared_ptr<const World> world_;
   std::vector<Renderer> renderers_;
+  std::vector<Stitch> stitches_;         ///< Per camera, or none.
+  std::vector<Stabilizer> stabilizers_;  ///< Per camera, or none.
   std::unique_ptr<ThreadPool> pool_;
 };
 

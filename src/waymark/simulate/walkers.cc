@@ -14,7 +14,7 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kTexelM = 0.004;
+constexpr double kWalkerTexelM = 0.004;
 constexpr double kCrossing_s = 4.0;   ///< From one side of the view to the other.
 constexpr double kHalfWayPerM = 0.9;  ///< To the side of the view, per metre of distance.
 constexpr double kNearestM = 1.1;
@@ -22,7 +22,7 @@ constexpr double kFarthestM = 1.8;
 
 /// Body and head, upright, with the feet at the origin.
 World make_person(std::uint64_t seed, double height_m) {
-  WorldBuilder builder(seed, kTexelM);
+  WorldBuilder builder(seed, kWalkerTexelM);
   builder.add_cylinder(Vector3d::Zero(), 0.24, height_m - 0.28, Style::kBooks);
   builder.add_sphere({0.0, 0.0, height_m - 0.13}, 0.13, Style::kMetal);
   return builder.build("person");

@@ -237,6 +237,14 @@ std::vector<Surface> World::surfaces_at(double time_s) const {
         is_there ? Vector3d(walk.start + (time_s - walk.start_s) * walk.velocity) : nowhere;
     for (std::uint32_t i = walk.first_surface; i < walk.end_surface; ++i) moved[i].origin += at;
   }
+  for (const Carried& part : carried) {
+    const Rigid3 world_from_part = part.world_from_part(time_s);
+    for (std::uint32_t i = part.first_surface; i < part.end_surface; ++i) {
+      moved[i].origin = world_from_part * moved[i].origin;
+      moved[i].u_axis = world_from_part.rotation * moved[i].u_axis;
+      moved[i].v_axis = world_from_part.rotation * moved[i].v_axis;
+    }
+  }
   return moved;
 }
 

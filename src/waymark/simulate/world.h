@@ -5,12 +5,14 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "waymark/geometry/rigid3.h"
 #include "waymark/image/image.h"
 
 namespace waymark {
@@ -116,7 +118,8 @@ struct WorldHit {
   SurfaceHit hit;             ///< Where on it.
 };
 
-/// Somebody who walks straight on: surfaces that are there from one time to another.
+/// Somebody who walks straight on, or something that stands still: surfaces that are there from one
+/// time to another.
 struct Walk {
   std::uint32_t first_surface = 0;  ///< Indices in World::surfaces, where they stand at the origin.
   std::uint32_t end_surface = 0;    ///< One past the last of them.
@@ -126,12 +129,20 @@ struct Walk {
   Eigen::Vector3d velocity = Eigen::Vector3d::Zero();  ///< In m/s.
 };
 
+/// Surfaces fixed to something that moves, in whose axes they are given.
+struct Carried {
+  std::uint32_t first_surface = 0;                       ///< Indices in World::surfaces.
+  std::uint32_t end_surface = 0;                         ///< One past the last of them.
+  std::function<Rigid3(double time_s)> world_from_part;  ///< Defined at any time.
+};
+
 /// Textured analytic surfaces; z points up, the ground is near z = 0. Immutable once made.
 struct World {
   std::string name;               ///< As make_world() knows it.
   std::vector<Surface> surfaces;  ///< In no order.
   std::vector<Texture> textures;  ///< That surfaces refer to by index.
-  std::vector<Walk> walks;        ///< Of surfaces that move.
+  std::vector<Walk> walks;        ///< Of surfaces that move, come or go.
+  std::vector<Carried> carried;   ///< Likewise; no surface is in both.
 
   /// The surfaces where they are at a time; those of walks that are not there lie below the world.
   std::vector<Surface> surfaces_at(double time_s) const;

@@ -1,0 +1,66 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <memory>
+#include <optional>
+#include <utility>
+#include <variant>
+
+#include "waymark/loop/global_mapper.h"
+#include "waymark/simulate/testing/town_recording.h"
+#include "waymark/track/tracker.h"
+
+namespace waymark {
+
+/// Tracker, mapper and global adjustments on the features of a town's frames: what a session does
+/// behind extraction, on one thread. What is found out shows in the next frame.
+class TownSession {
+ public:
+  TownSession(std::shared_ptr<const Rig> rig, bool has_range)
+      : tracker_(rig, has_range, TrackingSettings{}, 1),
+        mapper_(rig, MappingSettings{}, LoopSettings{}, {.refine = "off"}, 1),
+        visible_(mapper_.snapshot()) {}
+
+  /// Goes on in a map made before.
+  void begin_in(const MapSnapshot& before) {
+    mapper_.take_over(before);
+    visible_ = mapper_.snapshot();
+    tracker_.begin_in(*visible_.map, TrackingPurpose::kMapping);
+    before.map->keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+      num_frames_ = std::max(num_frames_, keyframe.frame.value + 1);
+    });
+  }
+
+  TrackOutcome track(const TownFrame& seen) {
+    StageTimes times;
+    const Frame frame{FrameId{num_frames_}, 50'000'000 * std::int64_t{num_frames_}, seen.features};
+    ++num_frames_;
+    TrackOutcome outcome = tracker_.track(frame, visible_, times);
+    if (!outcome.message) return outcome;
+    std::visit([&](const auto& message) { mapper_.add(message); }, *outcome.message);
+    if (const std::optional<AdjustmentTask> task = mapper_.take_task()) {
+      mapper_.apply(*task, task->adjust());
+    }
+    visible_ = mapper_.snapshot();
+    return outcome;
+  }
+
+  void finish() {
+    mapper_.finish();
+    visible_ = mapper_.snapshot();
+  }
+
+  const Map& map() const { return *visible_.map; }
+  const MapSnapshot& snapshot() const { return visible_; }
+  int num_loops() const { return mapper_.num_loops(); }
+
+ private:
+  Tracker tracker_;
+  GlobalMapper mapper_;
+  MapSnapshot visible_;
+  std::uint32_t num_frames_ = 0;
+};
+
+}  // namespace waymark
