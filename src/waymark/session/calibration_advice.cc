@@ -145,4 +145,12 @@ std::optional<std::string> advise_on_residuals(const FocalCheck& check,
                      focal_length_px(camera));
 }
 
+std::optional<std::string> advise_on_pictures(const PictureMotion& motion) {
+  if (!motion.is_stabilised()) return std::nullopt;
+  return fmt::format(
+      "the images look stabilised: the picture moves in its frame by about {:.0f} px, which no "
+      "calibration describes; turn stabilisation off",
+      motion.scatter_px);
+}
+
 }  // namespace waymark

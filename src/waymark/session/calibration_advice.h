@@ -8,6 +8,7 @@
 
 #include "waymark/camera/camchain.h"
 #include "waymark/mapping/focal_check.h"
+#include "waymark/mapping/picture_motion.h"
 
 namespace waymark {
 
@@ -24,5 +25,8 @@ std::string describe(const FocalCheck& check);
 /// How what residuals say is put right; nothing where it is good. camera: number 0 as calibrated.
 std::optional<std::string> advise_on_residuals(const FocalCheck& check,
                                                const CameraDescription& camera);
+
+/// Of video that was stabilised; nothing where the pictures hold still.
+std::optional<std::string> advise_on_pictures(const PictureMotion& motion);
 
 }  // namespace waymark

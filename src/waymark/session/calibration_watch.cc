@@ -3,6 +3,7 @@
 #include "waymark/session/calibration_watch.h"
 
 #include "waymark/base/median.h"
+#include "waymark/mapping/picture_motion.h"
 #include "waymark/session/calibration_advice.h"
 
 namespace waymark {
@@ -67,6 +68,7 @@ void CalibrationWatch::finish(const System& system) {
   decide_on_pair();
   decide_on_depth();
   decide_on_residuals(system);
+  decide_on_pictures(system);
 }
 
 void CalibrationWatch::decide_on_times() {
@@ -93,6 +95,10 @@ void CalibrationWatch::decide_on_residuals(const System& system) {
   if (check == nullptr) return;
   are_residuals_known_ = true;
   report(advise_on_residuals(*check, camera0_));
+}
+
+void CalibrationWatch::decide_on_pictures(const System& system) {
+  if (const auto motion = find_picture_motion(*system.map())) report(advise_on_pictures(*motion));
 }
 
 }  // namespace waymark

@@ -42,6 +42,7 @@ class CalibrationWatch {
   void decide_on_pair();
   void decide_on_depth();
   void decide_on_residuals(const System& system);
+  void decide_on_pictures(const System& system);
 
   Listener listener_;
   std::vector<std::string> mistakes_;

@@ -43,24 +43,28 @@ CameraChain watched_pair() {
 
 CameraChain watched_depth() { return rgbd_chain(watched_camera(0.0), kUnitsPerMetre); }
 
+std::vector<InputFrame> render(SequenceSpec spec) {
+  spec.effects.noise_sigma = 2.0;
+  SimulatedSequence sequence(spec, std::thread::hardware_concurrency());
+  std::vector<InputFrame> frames(static_cast<std::size_t>(spec.num_frames));
+  for (int i = 0; i < spec.num_frames; ++i) {
+    SimulatedFrame simulated = sequence.frame(i);
+    InputFrame& frame = frames[static_cast<std::size_t>(i)];
+    frame.index = static_cast<std::size_t>(i);
+    frame.timestamp_ns = simulated.timestamp_ns;
+    frame.images = std::move(simulated.images);
+    if (spec.chain.depth_factor) frame.depth = std::move(simulated.depth);
+  }
+  return frames;
+}
+
 std::vector<InputFrame> render(const CameraChain& chain, const char* world, int num_frames) {
   SequenceSpec spec;
   spec.chain = chain;
   spec.world = world;
   spec.motion = world == std::string("room") ? "slide" : "loop";
   spec.num_frames = num_frames;
-  spec.effects.noise_sigma = 2.0;
-  SimulatedSequence sequence(spec, std::thread::hardware_concurrency());
-  std::vector<InputFrame> frames(static_cast<std::size_t>(num_frames));
-  for (int i = 0; i < num_frames; ++i) {
-    SimulatedFrame simulated = sequence.frame(i);
-    InputFrame& frame = frames[static_cast<std::size_t>(i)];
-    frame.index = static_cast<std::size_t>(i);
-    frame.timestamp_ns = simulated.timestamp_ns;
-    frame.images = std::move(simulated.images);
-    if (chain.depth_factor) frame.depth = std::move(simulated.depth);
-  }
-  return frames;
+  return render(std::move(spec));
 }
 
 const std::vector<InputFrame>& pair_frames() {
@@ -136,6 +140,18 @@ TEST(CalibrationWatch, NamesPairsThatDoNotFit) {
       mistakes_of(pair_frames(),
                   with_transform(watched_pair(), {right.rotation, 1000.0 * right.translation})),
       ElementsAre(HasSubstr("is T_cn_cnm1 in millimetres?")));
+}
+
+TEST(CalibrationWatch, NamesStabilisedPictures) {
+  SequenceSpec spec;
+  spec.chain = mono_chain(watched_camera(0.0));
+  spec.world = "hall";
+  spec.motion = "inspect";
+  spec.num_frames = 90;
+  spec.stabilised_share = 0.05;
+  EXPECT_THAT(mistakes_of(render(spec), spec.chain),
+              ElementsAre(AllOf(HasSubstr("the images look stabilised"),
+                                HasSubstr("turn stabilisation off"))));
 }
 
 TEST(CalibrationWatch, NamesUnitsOfDepth) {

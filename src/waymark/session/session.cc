@@ -120,8 +120,8 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   };
   FedFrames frames = feed_all(input, feed, hooks.should_stop, observe);
   finish(system, hooks, frames);
-  if (hooks.watch) hooks.watch->finish(system);
   reserve.release();
+  if (hooks.watch) hooks.watch->finish(system);
   malloc_trim(0);  // What frames saw is settled and gone: lists of results take its place.
   update_states(system, frames);
 
