@@ -44,7 +44,7 @@ void add_calibrate_command(CLI::App& program, Command& command) {
   CLI::App& calibrate_command = *program.add_subcommand(
       "calibrate", "Find the camera model and calibration of INPUT from its images");
   calibrate_command
-      .add_option("INPUT", options->input, "Data set folder, folder of images, or video file")
+      .add_option("INPUT", options->input, "Data set folder, folder of images, video file or bag")
       ->required();
   calibrate_command.add_option(
       "-o,--out", options->out, "Write the calibration to this file, for -c [not written]");

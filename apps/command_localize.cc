@@ -88,11 +88,10 @@ int localize(LocalizeOptions options, Reporter& reporter) {
 
   SessionResults results = localize_all(options, stored.map, prepared, reporter);
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
-  results.summary.setup = to_string(prepared.input->info().setup);
   results.summary.timing = to_string(Timing::kInline);
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
   results.summary.version = WAYMARK_VERSION;
-  add_calibration(prepared, results.summary);
+  add_input(prepared, results.summary);
   save_each(
       {[&] { write_results(options.report.out, results); },
        [&] { write_calibration(options.report.out, prepared, prepared.rig, results.summary); },

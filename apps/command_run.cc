@@ -251,12 +251,11 @@ std::optional<int> map_once(const RunOptions& options,
   SessionResults results = map_input(session, images, autosave, shown, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
-  results.summary.setup = to_string(session.input->info().setup);
   results.summary.timing = to_string(options.session.timing);
   results.summary.seed = static_cast<std::uint64_t>(session.settings.seed);
   results.summary.version = WAYMARK_VERSION;
   results.summary.refined_calibration = session.system->calibration();
-  add_calibration(session, results.summary);
+  add_input(session, results.summary);
   return finish(options, session, std::move(results), autosave, shown, first, reporter);
 }
 

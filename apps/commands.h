@@ -27,6 +27,7 @@ void add_simulate_command(CLI::App& program, Command& command);
 void add_config_command(CLI::App& program, Command& command);
 void add_export_command(CLI::App& program, Command& command);
 void add_import_command(CLI::App& program, Command& command);
+void add_info_command(CLI::App& program, Command& command);
 void add_view_command(CLI::App& program, Command& command);
 void add_demo_command(CLI::App& program, Command& command, Program run_program);
 

@@ -24,16 +24,44 @@
 namespace waymark {
 namespace {
 
-/// Whether its depth image could not be used: the one bad file that takes no frame away.
-bool is_without_depth(const FrameRecord& frame) {
+/// Whether its depth or its image of camera 1 could not be used: bad files that take no frame away.
+bool is_without_partner(const FrameRecord& frame) {
   return frame.state != FrameState::kUnreadable && frame.has_warning;
 }
 
 }  // namespace
 
-void add_input_options(CLI::App& command, SessionOptions& options) {
-  command.add_option("INPUT", options.input, "Data set folder, folder of images, or video file")
+void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
+  command.add_option("INPUT", input, "Data set folder, folder of images, video file or bag of ROS")
       ->required();
+  command.add_option(
+      "RIGHT", reading.right, "Images or video of camera 1, INPUT being those of camera 0 [none]");
+  command
+      .add_option("--format",
+                  reading.format,
+                  "Kind of INPUT: euroc, kitti, tum, images, video or bag [recognised]")
+      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video", "bag"}));
+  command
+      .add_option("--topics",
+                  reading.topics,
+                  "Of a bag: the images of camera 0, and those of camera 1 or the depth [found]")
+      ->delimiter(',')
+      ->type_name("A[,B]")
+      ->allow_extra_args(false);
+  command.add_option("--depth", reading.depth, "Depth images of a folder of images [none]");
+  command
+      .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")
+      ->check(number_between(0.01, 10000.0));
+  add_choice<std::optional<Setup>>(
+      command,
+      "--setup",
+      reading.setup,
+      {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
+      "mono, stereo or rgbd [all that INPUT offers]");
+}
+
+void add_input_options(CLI::App& command, SessionOptions& options) {
+  add_reading_options(command, options.input, options.reading);
   command
       .add_option("-c,--config",
                   options.configs,
@@ -44,17 +72,6 @@ void add_input_options(CLI::App& command, SessionOptions& options) {
       .add_option(
           "--set", options.assignments, "One setting as KEY=VALUE, e.g. features.count=1500 [none]")
       ->allow_extra_args(false);
-  command
-      .add_option("--format",
-                  options.reading.format,
-                  "Layout of INPUT: euroc, kitti, tum, images or video [recognised]")
-      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video"}));
-  add_choice<std::optional<Setup>>(
-      command,
-      "--setup",
-      options.reading.setup,
-      {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
-      "mono, stereo or rgbd [all that INPUT offers]");
 }
 
 void add_selection_options(CLI::App& command, InputOptions& reading) {
@@ -90,7 +107,11 @@ void warn_unless_sure(Reporter& reporter, const PreparedInput& prepared, std::st
   reporter.warning(fmt::format("calibration: {}; {}", prepared.estimated->reason, what));
 }
 
-void add_calibration(const PreparedInput& prepared, RunSummary& summary) {
+void add_input(const PreparedInput& prepared, RunSummary& summary) {
+  const InputInfo& info = prepared.input->info();
+  summary.setup = to_string(info.setup);
+  summary.out_of_order = info.counts.out_of_order;
+  summary.without_partner = info.counts.without_partner;
   if (!prepared.estimated) return;
   const EstimatedCalibration& calibration = *prepared.estimated;
   EstimatedCalibrationSummary& told = summary.calibration.emplace();
@@ -145,7 +166,8 @@ void add_report_options(CLI::App& command, ReportOptions& options, std::optional
 }
 
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
-  return [&reporter, total = info.num_frames, num_done = std::size_t{0}](
+  const char* partner = info.setup == Setup::kStereo ? "camera 1" : "depth";
+  return [&reporter, partner, total = info.num_frames, num_done = std::size_t{0}](
              const FrameRecord& frame, const std::string& warning) mutable {
     const bool has_reason = frame.reason != FrameReason::kNone;
     const std::string state = fmt::format(
@@ -159,8 +181,9 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
                                    frame.index,
                                    state,
                                    warning.empty() ? "" : " (" + warning + ")"));
-    } else if (is_without_depth(frame)) {
-      reporter.warning(fmt::format("frame {}: used without depth ({})", frame.index, warning));
+    } else if (is_without_partner(frame)) {
+      reporter.warning(
+          fmt::format("frame {}: used without {} ({})", frame.index, partner, warning));
     }
     const int num_candidates = frame.num_candidates;
     reporter.detail(
@@ -176,14 +199,15 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
 
 void report_reasons(Reporter& reporter, const FrameTable& table) {
   std::map<FrameReason, int> counts;
-  int num_without_depth = 0;
+  int num_without_partner = 0;
   for (const FrameRecord& frame : table.frames) {
     if (frame.reason != FrameReason::kNone) ++counts[frame.reason];
-    num_without_depth += is_without_depth(frame);
+    num_without_partner += is_without_partner(frame);
   }
-  if (num_without_depth > 0) {
+  if (num_without_partner > 0) {
     reporter.info(
-        fmt::format("used without depth, which could not be read: {} frames", num_without_depth));
+        fmt::format("used with camera 0 alone, as other files could not be read: {} frames",
+                    num_without_partner));
   }
   if (counts.empty()) return;
   std::vector<std::pair<FrameReason, int>> sorted(counts.begin(), counts.end());

@@ -32,7 +32,9 @@ struct ReportOptions {
   }
 };
 
-/// INPUT, its cameras, the settings.
+/// INPUT and how to read it.
+void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading);
+/// The same, its cameras, the settings.
 void add_input_options(CLI::App& command, SessionOptions& options);
 /// Which part of the input and of the images.
 void add_selection_options(CLI::App& command, InputOptions& reading);
@@ -47,8 +49,8 @@ CalibrateOptions reported(CalibrateOptions options, Reporter& reporter);
 /// Warns where the images of an input without a calibration do not tell it. what: to expect.
 void warn_unless_sure(Reporter& reporter, const PreparedInput& prepared, std::string_view what);
 
-/// What became of the calibration, beside what the summary says already.
-void add_calibration(const PreparedInput& prepared, RunSummary& summary);
+/// What the input was, in the end, and what became of its calibration.
+void add_input(const PreparedInput& prepared, RunSummary& summary);
 /// Tells what the images have changed beyond doubt, in one line, if anything.
 void report_calibration(Reporter& reporter, const RunSummary& summary);
 /// Writes calibration.yaml, for -c: the rig in use. Nothing where it was given and the images do

@@ -52,6 +52,7 @@ int run_program(const std::vector<std::string>& arguments) {
   Command command;
   add_demo_command(program, command, run_program);
   add_run_command(program, command);
+  add_info_command(program, command);
   add_localize_command(program, command);
   add_map_command(program, command);
   add_view_command(program, command);

@@ -4,6 +4,7 @@
 """The contract of the command line: inputs, outputs, exit status, one-line errors."""
 import array
 import fcntl
+import json
 import os
 import pathlib
 import pty
@@ -76,7 +77,7 @@ class Usage(CliTest):
 
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
-        self.assert_fails(waymark("fly"), 2, "'fly'", "run, localize, map, view, eval, simulate")
+        self.assert_fails(waymark("fly"), 2, "'fly'", "run, info, localize, map, view, eval, simulate")
         self.assert_fails(waymark("run"), 2, "INPUT")
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
@@ -172,6 +173,29 @@ class Inputs(CliTest):
         source = self.sequence("rgbd")
         summary = self.assert_maps(source, "-c", source / "camchain.yaml")
         self.assertEqual(summary["setup"], "rgbd")
+
+    def test_two_folders_are_a_pair(self):
+        source = self.sequence("stereo")
+        left, right = (source / "mav0" / camera / "data" for camera in ("cam0", "cam1"))
+        sorted(right.iterdir())[20].unlink()
+        summary = self.assert_maps(left, right, "-c", source / "camchain.yaml", "--fps", 20)
+        self.assertEqual((summary["setup"], summary["without_partner"]), ("stereo", 1))
+        (source / "mav0" / "left").mkdir()
+        for images, name in ((left, "left"), (right, "right")):
+            images.rename(source / "mav0" / "left" / name)
+        done = self.run_on(source / "mav0" / "left")
+        self.assertEqual(done.returncode, 2)
+        self.assertIn("left/ and right/ hold 40 and 39 images: for a stereo pair say waymark run", done.stderr)
+
+    def test_info(self):
+        source = self.sequence("stereo")
+        done = waymark("info", source, "--json")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        info = json.loads(done.stdout)
+        self.assertEqual((info["format"], info["setup"], info["frames"]), ("euroc", "stereo", NUM_FRAMES))
+        self.assertEqual([camera["width_px"] for camera in info["cameras"]], [376, 376])
+        self.assertEqual(info["gaps"], [])
+        self.assertIn("gaps: none", waymark("info", source).stdout)
 
     def test_image_folder(self):
         self.assert_maps(self.image_folder(), "-c", self.folder / "camchain.yaml")

@@ -6,16 +6,14 @@ import json
 import math
 import pathlib
 import sys
-import tempfile
 import unittest
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "script"))
 from cli_support import CliTest, waymark  # noqa: E402
 from evaluation.drift import drift  # noqa: E402
-from evaluation.hard import FLAWS, median_figures, row_of  # noqa: E402
 from evaluation.kidnapped import Case, Verdict  # noqa: E402
 from evaluation.rotations import rotation_of  # noqa: E402
-from evaluation.splice import Part, Sequence, SplicedFrame, write_black_png  # noqa: E402
+from evaluation.splice import Part, SplicedFrame  # noqa: E402
 from evaluation.trajectories import (Pose, Truth, align, ate, end_to_end_error,  # noqa: E402
                                      read_trajectory)
 
@@ -162,36 +160,6 @@ class Comparing(CliTest):
         self.assertAlmostEqual(short["stretch_m"], 30.0)
         self.assertAlmostEqual(short["translation_m"], 2.0, places=6)
         self.assertIsNone(drift(list(zip(true, true))[:90], False))
-
-
-class HardSceneTest(unittest.TestCase):
-    def test_skipping_keeps_every_third_frame_at_its_time(self):
-        with tempfile.TemporaryDirectory() as name:
-            folder = pathlib.Path(name) / "walk"
-            (folder / "rgb").mkdir(parents=True)
-            stamps = [Walk().stamps[i] for i in range(8)]
-            for i, stamp in enumerate(stamps):
-                write_black_png(folder / f"rgb/{i}.png", 4, 3)
-            (folder / "rgb.txt").write_text("".join(
-                f"{s // 10**9}.{s % 10**9:09d} rgb/{i}.png\n" for i, s in enumerate(stamps)))
-            (folder / "camchain.yaml").write_text("cam0:\n")
-            (folder / "groundtruth.txt").write_text("".join(
-                format_pose(s, (i, 0, 0), 0.0) for i, s in enumerate(stamps)))
-            frames = FLAWS["skip"](Sequence(folder, "mono"), 2, pathlib.Path(name) / "out")
-            self.assertEqual([f.index for f in frames], [0, 3, 6])
-            self.assertEqual(frames[2].stamp - frames[1].stamp, 3 * STEP_NS)
-            self.assertEqual(frames[2].true_pose().position[0], 6.0)
-            listed = (pathlib.Path(name) / "out/rgb.txt").read_text().split("\n")
-            self.assertEqual(len([line for line in listed if line]), 3)
-
-    def test_rows_tell_the_median_and_the_ratio(self):
-        def figures(ate_m):
-            return {"coverage": 1.0, "parts": 1, "ate_m": ate_m, "mean_ms": 4.0, "p95_ms": 8.0}
-        middle = median_figures([figures(a) for a in (0.3, 0.1, 0.2)])
-        self.assertEqual(row_of("x", "mono", middle, figures(0.1)),
-                         ["x", "mono", "1.000", "1", "0.2000", "2.00", "4.0", "2.0"])
-        without = median_figures([figures(0.1), figures(None)])
-        self.assertEqual(row_of("x", "mono", without, figures(0.1))[4:6], ["-", "-"])
 
 
 if __name__ == "__main__":

@@ -135,7 +135,7 @@ void bind_images(py::module_& module) {
 --
 
 Opens what `waymark run` reads and returns an Input: a folder in the layout of EuRoC / TUM-VI, KITTI
-odometry or TUM RGB-D, a folder of images, or a video file.
+odometry or TUM RGB-D, a folder of images, a video file, or a bag of ROS.
 
 cameras: path of a camchain, dict or Calibration; takes the place of what the data set carries.
 setup: 'mono', 'stereo' or 'rgbd'. None: all that the input offers.

@@ -154,6 +154,8 @@ std::string format_frames_csv(const FrameTable& table) {
 std::string format_summary_json(const RunSummary& summary) {
   Json json;
   append_counts(json, summary.counts, summary.num_trajectory_lines);
+  json["out_of_order"] = summary.out_of_order;
+  json["without_partner"] = summary.without_partner;
   if (summary.localized) json["localized"] = *summary.localized;
   json["keyframes"] = summary.keyframes;
   json["landmarks"] = summary.landmarks;

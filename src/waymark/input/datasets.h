@@ -26,7 +26,7 @@ struct EurocImage {
   std::string where;  ///< File and line, for errors.
 };
 
-/// Rows "nanoseconds,name", times increasing, at least one. Throws InputError; name is what it
+/// Rows "nanoseconds,name", at least one, in any order. Throws InputError; name is what it
 /// calls the file.
 std::vector<EurocImage> parse_euroc_images(std::string_view text, const std::string& name);
 
@@ -71,7 +71,7 @@ struct TumImage {
   std::string name;  ///< Below the folder of the data set.
 };
 
-/// Rows "seconds name", times increasing, at least one. Throws InputError; name is what it calls
+/// Rows "seconds name", at least one, in any order. Throws InputError; name is what it calls
 /// the file.
 std::vector<TumImage> parse_tum_images(std::string_view text, const std::string& name);
 
@@ -84,8 +84,9 @@ std::vector<std::optional<std::size_t>> pair_depth(const std::vector<std::int64_
 /// Data set in the layout of TUM RGB-D (Sturm et al. 2012): rgb.txt and, for depth, depth.txt.
 Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& options);
 
-/// Folder of images, or one that holds them in images/. Times come from times.txt in the folder or
-/// beside it; without one the images are taken to be 1/30 s apart.
+/// Folder of images, or one that holds them in images/; with options.right a second one for stereo,
+/// with options.depth one of depth images. Times come from times.txt in the folder or beside it;
+/// without one the images are taken to be 1/30 s apart, or what options.fps says.
 Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options);
 
 /// The file of true poses that belongs to an input, if its layout has one and it is there:
@@ -97,6 +98,10 @@ std::optional<std::filesystem::path> find_groundtruth(const std::filesystem::pat
 /// Opens a video file. Times come from times.txt beside it (one per frame), else from the
 /// container. Reads the first frame. Throws InputError.
 std::unique_ptr<Input> open_video(const std::filesystem::path& path, const InputOptions& options);
+
+/// Opens a bag of ROS: a .bag, .mcap or .db3 file, or the folder of a bag of ROS 2. Reads the first
+/// frame. Throws InputError.
+std::unique_ptr<Input> open_bag(const std::filesystem::path& path, const InputOptions& options);
 
 /// Opens a camera, "camera:N" or a device such as /dev/video0, and reads its first frame. Asks for
 /// images of the size that the calibration states. Throws InputError.

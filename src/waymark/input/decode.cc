@@ -73,11 +73,6 @@ std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
   }
 }
 
-std::optional<cv::Mat> decode(const std::filesystem::path& path, int flags) {
-  const std::optional<std::string> bytes = read_bytes(path);
-  return bytes ? decode_bytes(*bytes, flags) : std::nullopt;
-}
-
 std::string encode(const cv::Mat& image, const char* extension) {
   std::vector<std::uint8_t> bytes;
   WAYMARK_CHECK(cv::imencode(extension, image, bytes));
@@ -96,9 +91,14 @@ BasicImage<T> copy_rows(const cv::Mat& mat) {
 }  // namespace
 
 std::optional<Image> read_grey_image(const std::filesystem::path& path) {
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? decode_grey_image(*bytes) : std::nullopt;
+}
+
+std::optional<Image> decode_grey_image(std::string_view bytes) {
   constexpr double kScale = 255.0 / 65535.0;
-  std::optional<cv::Mat> mat =
-      decode(path, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+  std::optional<cv::Mat> mat = decode_bytes(
+      bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
   if (!mat) return std::nullopt;
   if (mat->type() == CV_16UC1) mat->convertTo(*mat, CV_8U, kScale);
   if (mat->type() != CV_8UC1) return std::nullopt;
@@ -106,7 +106,12 @@ std::optional<Image> read_grey_image(const std::filesystem::path& path) {
 }
 
 std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
-  const std::optional<cv::Mat> mat = decode(path, cv::IMREAD_UNCHANGED);
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? decode_depth_image(*bytes) : std::nullopt;
+}
+
+std::optional<DepthImage> decode_depth_image(std::string_view bytes) {
+  const std::optional<cv::Mat> mat = decode_bytes(bytes, cv::IMREAD_UNCHANGED);
   if (!mat || mat->type() != CV_16UC1) return std::nullopt;
   return copy_rows<std::uint16_t>(*mat);
 }
@@ -146,12 +151,15 @@ std::optional<ColorImage> decode_color_image(std::string_view bytes) {
 }
 
 std::optional<std::string> read_as_jpeg(const std::filesystem::path& path) {
-  std::optional<std::string> bytes = read_bytes(path);
-  if (!bytes) return std::nullopt;
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? as_jpeg(*bytes) : std::nullopt;
+}
+
+std::optional<std::string> as_jpeg(std::string_view bytes) {
   std::optional<std::string> unused;
-  if (bytes->starts_with(kJpegStart) && vet(*bytes, unused)) return bytes;
+  if (bytes.starts_with(kJpegStart) && vet(bytes, unused)) return std::string(bytes);
   const std::optional<cv::Mat> mat =
-      decode_bytes(*bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+      decode_bytes(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
   if (!mat) return std::nullopt;
   return encode(*mat, ".jpg");
 }

@@ -17,8 +17,13 @@ namespace waymark {
 /// large or no image.
 std::optional<Image> read_grey_image(const std::filesystem::path& path);
 
+/// The same of the bytes of such a file.
+std::optional<Image> decode_grey_image(std::string_view bytes);
+
 /// Decodes a single-channel 16-bit image, otherwise nothing.
 std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
+/// The same of the bytes of such a file.
+std::optional<DepthImage> decode_depth_image(std::string_view bytes);
 
 /// Why an image file could not be read, as messages go on after its name: "is 60000x60000 px,
 /// expected at most ...". `expected`: what it should have been.
@@ -31,6 +36,8 @@ std::optional<ColorImage> decode_color_image(std::string_view bytes);
 
 /// The image of a file as a JPEG: the file itself if it is one. Nothing when it is no image.
 std::optional<std::string> read_as_jpeg(const std::filesystem::path& path);
+/// The same of the bytes of such a file.
+std::optional<std::string> as_jpeg(std::string_view bytes);
 
 /// The bytes of an image file.
 std::string encode_jpeg(const ColorImage& image);

@@ -2,20 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
-#include <cstdlib>
-
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/base/config_value.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/pairing.h"
 
 namespace waymark {
 namespace {
 
-/// Cameras of a pair are triggered together; their stamps may differ by the readout.
-constexpr std::int64_t kMaxPairDifferenceNs = 5'000'000;
 constexpr int kMaxImageSize = 1 << 16;
 
 std::filesystem::path mav0_of(const std::filesystem::path& folder) {
@@ -80,20 +77,32 @@ std::vector<EurocImage> read_images(const std::filesystem::path& mav0, std::size
                             path.string());
 }
 
-void check_pairs(const std::filesystem::path& mav0,
-                 const std::vector<EurocImage>& left,
-                 const std::vector<EurocImage>& right) {
-  if (left.size() != right.size()) {
-    throw InputError((mav0 / "cam1" / "data.csv").string(),
-                     fmt::format("{} images, expected {} as cam0 has", right.size(), left.size()));
+/// The images of a camera, as far as their times increase.
+std::vector<EurocImage> keep_increasing_images(Listing& listing,
+                                               const std::filesystem::path& mav0,
+                                               std::size_t camera) {
+  const std::vector<EurocImage> images = read_images(mav0, camera);
+  std::vector<std::int64_t> times_ns;
+  for (const EurocImage& image : images) times_ns.push_back(image.timestamp_ns);
+  const std::filesystem::path path = mav0 / fmt::format("cam{}", camera) / "data.csv";
+  std::vector<EurocImage> used;
+  for (const std::size_t i : keep_increasing(listing, times_ns, path.string())) {
+    used.push_back(images[i]);
   }
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    if (std::abs(right[i].timestamp_ns - left[i].timestamp_ns) <= kMaxPairDifferenceNs) continue;
-    throw InputError(
-        right[i].where,
-        fmt::format(
-            "time {}, expected {} as cam0 has", right[i].timestamp_ns, left[i].timestamp_ns));
+  return used;
+}
+
+void add_right_images(Listing& listing, const std::filesystem::path& mav0) {
+  std::vector<std::int64_t> left_ns;
+  for (const ListedFrame& frame : listing.frames) left_ns.push_back(frame.timestamp_ns);
+  std::vector<std::int64_t> right_ns;
+  std::vector<std::filesystem::path> right;
+  for (const EurocImage& image : keep_increasing_images(listing, mav0, 1)) {
+    right_ns.push_back(image.timestamp_ns);
+    right.push_back(mav0 / "cam1" / "data" / image.name);
   }
+  const std::string where = (mav0 / "cam1" / "data.csv").string();
+  add_partners(listing, partners_by_time(left_ns, right_ns), right, right_ns, where);
 }
 
 }  // namespace
@@ -104,9 +113,6 @@ std::vector<EurocImage> parse_euroc_images(std::string_view text, const std::str
   while (rows.next()) {
     rows.expect_at_least(2, "2: nanoseconds,file name");
     EurocImage image{rows.nanoseconds(0), rows.relative_path(1), rows.where()};
-    if (!images.empty() && image.timestamp_ns <= images.back().timestamp_ns) {
-      throw InputError(image.where, "not later than the time before, expected increasing times");
-    }
     images.push_back(std::move(image));
   }
   if (images.empty()) throw InputError(name, "empty, expected rows of nanoseconds,file name");
@@ -152,17 +158,10 @@ Listing list_euroc(const std::filesystem::path& folder, const InputOptions& opti
   listing.format = "euroc";
   listing.title = "EuRoC / TUM-VI";
   listing.setup = choose_setup(folder, offered, options.setup);
-  const std::vector<EurocImage> left = read_images(mav0, 0);
-  for (const EurocImage& image : left) {
+  for (const EurocImage& image : keep_increasing_images(listing, mav0, 0)) {
     listing.frames.push_back({image.timestamp_ns, {mav0 / "cam0" / "data" / image.name}, {}});
   }
-  if (listing.setup == Setup::kStereo) {
-    const std::vector<EurocImage> right = read_images(mav0, 1);
-    check_pairs(mav0, left, right);
-    for (std::size_t i = 0; i < right.size(); ++i) {
-      listing.frames[i].images.push_back(mav0 / "cam1" / "data" / right[i].name);
-    }
-  }
+  if (listing.setup == Setup::kStereo) add_right_images(listing, mav0);
   if (!options.calibration)
     listing.calibration = read_calibration(mav0, num_cameras(listing.setup));
   return listing;

@@ -94,6 +94,11 @@ void set_equidistant(CameraDescription& camera, std::vector<double> coeffs) {
   camera.distortion_coeffs = std::move(coeffs);
 }
 
+bool is_ros_model(std::string_view model) {
+  return model == "equidistant" || model == "fisheye" || model == "plumb_bob" ||
+         model == "rational_polynomial";
+}
+
 CameraChain checked_chain(const CameraDescription& camera) {
   CameraChain chain;
   chain.cameras.push_back({camera, Rigid3()});
@@ -205,17 +210,27 @@ CameraChain read_ros_calibration(const ConfigSource& source) {
   const ConfigNode* node = find_any(root, {"distortion_coefficients", "D", "d"});
   std::vector<double> coeffs;
   if (node != nullptr) coeffs = matrix_values(*node, "distortion_coefficients");
-  if (model == "equidistant" || model == "fisheye") {
-    set_equidistant(camera, std::move(coeffs));
-  } else if (model == "plumb_bob" || model == "rational_polynomial") {
-    set_radial_tangential(camera, std::move(coeffs), node ? node->where() : source.name);
-  } else {
-    throw InputError(model_node.where(),
+  const bool is_of_model = is_ros_model(model) && node != nullptr;
+  set_ros_distortion(
+      camera, model, std::move(coeffs), is_of_model ? node->where() : model_node.where());
+  return checked_chain(camera);
+}
+
+void set_ros_distortion(CameraDescription& camera,
+                        std::string_view model,
+                        std::vector<double> coeffs,
+                        const std::string& where) {
+  if (!is_ros_model(model)) {
+    throw InputError(where,
                      fmt::format("distortion_model is {}, expected plumb_bob, "
                                  "rational_polynomial, equidistant or fisheye",
-                                 describe_value(model_node)));
+                                 quote_for_message(model)));
   }
-  return checked_chain(camera);
+  if (model == "equidistant" || model == "fisheye") {
+    set_equidistant(camera, std::move(coeffs));
+  } else {
+    set_radial_tangential(camera, std::move(coeffs), where);
+  }
 }
 
 CameraChain read_colmap_calibration(const ConfigSource& source) {

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
@@ -26,6 +27,13 @@ CameraChain read_opencv_calibration(const ConfigSource& source);
 /// ROS: a sensor_msgs/CameraInfo as camera_calibration saves it or `ros2 topic echo` prints it.
 /// distortion_model plumb_bob, rational_polynomial, equidistant or fisheye.
 CameraChain read_ros_calibration(const ConfigSource& source);
+
+/// Sets the distortion as a sensor_msgs/CameraInfo states it: its distortion_model and D. Throws
+/// InputError at `where` for a model that has no counterpart.
+void set_ros_distortion(CameraDescription& camera,
+                        std::string_view model,
+                        std::vector<double> coeffs,
+                        const std::string& where);
 
 /// COLMAP: cameras.txt of a text model; its first camera. COLMAP counts pixels from the corner of
 /// the image; the result counts from the centre of the first pixel.

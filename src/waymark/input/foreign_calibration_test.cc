@@ -161,7 +161,7 @@ TEST(ForeignCalibration, FaultsAreNamed) {
     return input_error_of([&] { ros(replaced(kRos, from, to)); });
   };
   EXPECT_THAT(ros_error("plumb_bob", "thin_prism"),
-              HasSubstr("a.yaml:8: distortion_model is thin_prism, expected plumb_bob"));
+              HasSubstr("a.yaml:8: distortion_model is 'thin_prism', expected plumb_bob"));
   EXPECT_THAT(ros_error("distortion_model: plumb_bob", ""), HasSubstr("has no distortion_model"));
   const auto colmap_error = [](const std::string& text) {
     return input_error_of([&] { colmap(text); });

@@ -6,26 +6,29 @@
 
 #include <array>
 
+#include "waymark/bag/bag.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing_input.h"
+#include "waymark/input/pairing.h"
 
 namespace waymark {
 namespace {
 
-constexpr const char* kKnownFormats = "euroc, kitti, tum, images or video";
+constexpr const char* kKnownFormats = "euroc, kitti, tum, images, video or bag";
 
 std::string recognize_folder(const std::filesystem::path& folder) {
   if (is_euroc(folder)) return "euroc";
   if (is_kitti(folder)) return "kitti";
   if (std::filesystem::exists(folder / "rgb.txt")) return "tum";
+  if (is_bag_folder(folder)) return "bag";
   if (std::filesystem::is_directory(folder / "images")) return "images";
   const std::size_t num_videos = list_videos(folder).size();
   if (num_videos == 1) return "video";
   if (num_videos > 1) {
-    throw InputError(folder.string(), fmt::format("holds {} videos, expected one", num_videos));
+    throw InputError(folder.string(), suggest_command(folder, /*are_videos=*/true));
   }
   return "images";
 }
@@ -33,9 +36,10 @@ std::string recognize_folder(const std::filesystem::path& folder) {
 std::string recognize(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path)) return recognize_folder(path);
   if (is_video_name(path)) return "video";
+  if (is_bag_file(path)) return "bag";
   throw InputError(path.string(),
-                   "is neither folder nor video, expected a data set (EuRoC, KITTI, TUM RGB-D), a "
-                   "folder of images or a video");
+                   "is neither folder nor video nor bag, expected a data set (EuRoC, KITTI, TUM "
+                   "RGB-D), a folder of images, a video or a bag of ROS");
 }
 
 std::filesystem::path video_of(const std::filesystem::path& path) {
@@ -46,6 +50,23 @@ std::filesystem::path video_of(const std::filesystem::path& path) {
     throw InputError(videos.front().string(), "is no regular file, expected a video");
   }
   throw InputError(path.string(), fmt::format("holds {} videos, expected one", videos.size()));
+}
+
+/// That what comes beside INPUT is of its kind.
+void check_companions(const std::string& format, const InputOptions& options) {
+  const auto fail = [&](const std::string& where, std::string_view expected) {
+    throw InputError(
+        where, fmt::format("cannot go with an input of kind {}, expected {}", format, expected));
+  };
+  const bool is_folder = std::filesystem::is_directory(options.right);
+  if (!options.right.empty() && !(format == "images" && is_folder) &&
+      !(format == "video" && !is_folder)) {
+    fail(options.right.string(), "two folders of images, or two videos");
+  }
+  if (!options.depth.empty() && (format != "images" || !options.right.empty())) {
+    fail("--depth", "one folder of images");
+  }
+  if (!options.topics.empty() && format != "bag") fail("--topics", "a bag");
 }
 
 Listing list_files(const std::filesystem::path& path,
@@ -72,14 +93,19 @@ bool is_camera(const std::filesystem::path& path) {
 
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
   silence_image_library();
-  if (is_camera(path)) return open_camera(path, options);
+  if (is_camera(path)) {
+    check_companions("camera", options);
+    return open_camera(path, options);
+  }
   if (!std::filesystem::exists(path)) {
     throw InputError(path.string(),
-                     "does not exist, expected a data set, a folder of images or a video");
+                     "does not exist, expected a data set, a folder of images, a video or a bag");
   }
   const std::string format = options.format.empty() ? recognize(path) : options.format;
+  check_companions(format, options);
   try {
     if (format == "video") return open_video(video_of(path), options);
+    if (format == "bag") return open_bag(path, options);
     return std::make_unique<ListingInput>(path, list_files(path, format, options), options);
   } catch (const std::filesystem::filesystem_error& error) {
     throw InputError(

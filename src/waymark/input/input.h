@@ -47,16 +47,40 @@ struct InputFrame {
 
 /// What to take of an input, and how.
 struct InputOptions {
-  std::string format;          ///< "euroc", "kitti", "tum", "images", "video"; empty: recognised.
-  std::optional<Setup> setup;  ///< Nothing: all that the input offers.
-  std::size_t first = 0;       ///< Index of the first frame used.
-  std::optional<std::size_t> frames;  ///< At most so many frames.
-  std::size_t every = 1;              ///< Of the frames from first on, each n-th one.
+  /// "euroc", "kitti", "tum", "images", "video", "bag"; empty: recognised.
+  std::string format = {};
+  std::optional<Setup> setup = {};         ///< Nothing: all that the input offers.
+  std::size_t first = 0;                   ///< Index of the first frame used.
+  std::optional<std::size_t> frames = {};  ///< At most so many frames.
+  std::size_t every = 1;                   ///< Of the frames from first on, each n-th one.
+  /// Images of camera 1 where the input is one folder of images, or one video, per camera.
+  std::filesystem::path right = {};
+  /// Depth images of a folder of images, by name or order; empty: none.
+  std::filesystem::path depth = {};
+  std::optional<double> fps = {};  ///< Frames per second where nothing tells their times.
   /// One image, a folder with one per frame by name or order, or a video; empty: none.
-  std::filesystem::path mask;
+  std::filesystem::path mask = {};
   bool has_jpeg = false;  ///< Frames come with a JPEG file, too.
+  /// Of a bag: the images of camera 0, and those of camera 1 or the depth; empty: found.
+  std::vector<std::string> topics = {};
   /// Calibration from settings; takes the place of the one the data set carries.
-  std::optional<CameraChain> calibration;
+  std::optional<CameraChain> calibration = {};
+};
+
+/// What of a recording is imperfect, which is made the best of.
+struct InputCounts {
+  /// Frames left out as they are not later than another: their times are double or out of order.
+  std::size_t out_of_order = 0;
+  /// Frames of which camera 0 alone is used: there is no image of camera 1, or no depth.
+  std::size_t without_partner = 0;
+};
+
+/// A topic of a bag.
+struct TopicInfo {
+  std::string name;              ///< "/camera/image_raw".
+  std::string type;              ///< As ROS 1 writes it, "sensor_msgs/Image".
+  std::size_t num_messages = 0;  ///< In all files.
+  bool is_used = false;          ///< By the frames.
 };
 
 /// What was understood of an input.
@@ -73,7 +97,10 @@ struct InputInfo {
   /// About, as the camera noted it in the first image that can be read, where nothing calibrates
   /// it.
   std::optional<double> focal_px = std::nullopt;
-  std::vector<std::string> lines;  ///< The same in words, for people.
+  InputCounts counts = {};                  ///< Of the whole input, before --first, --every.
+  std::vector<TopicInfo> topics = {};       ///< Of a bag.
+  std::vector<std::int64_t> times_ns = {};  ///< Of all frames, where that is known.
+  std::vector<std::string> lines;           ///< The same in words, for people.
 };
 
 /// A recorded input, read frame after frame. For one thread.
@@ -92,9 +119,12 @@ bool is_camera(const std::filesystem::path& path);
 
 /// Recognises what path holds and opens it: a folder in the layout of EuRoC / TUM-VI, KITTI
 /// odometry or TUM RGB-D, a folder of images, a video file, a folder that holds one video or
-/// images/, or a camera (its frames have no end; their times are those of their arrival). Reads the
-/// first image. Throws InputError that names the file (and line) for what is missing or malformed,
-/// and for a first image that contradicts the calibration.
+/// images/, a bag of ROS, or a camera (its frames have no end; their times are those of their
+/// arrival). Reads the first image. Throws InputError that names the file (and line) for what is
+/// missing or malformed, and for a first image that contradicts the calibration.
+///
+/// Times that are not later than the one before are left out up to a tenth of the input, and frames
+/// that lack the image of camera 1 or the depth are used without: InputInfo::counts.
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options);
 
 }  // namespace waymark

@@ -14,6 +14,7 @@
 #include "waymark/base/text.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/testing/images.h"
+#include "waymark/input/testing/videos.h"
 
 namespace waymark {
 namespace {
@@ -21,6 +22,7 @@ namespace {
 using ::testing::ElementsAre;
 using ::testing::HasSubstr;
 using testing::input_error_of;
+using testing::make_video;
 using testing::TemporaryFolder;
 using testing::truncate_file;
 using testing::write_image;
@@ -53,7 +55,7 @@ TEST(OpenInput, SaysWhatItWants) {
   InputOptions options;
   options.format = "eurok";
   EXPECT_EQ(error(folder.path(), options),
-            "--format: is 'eurok', expected euroc, kitti, tum, images or video");
+            "--format: is 'eurok', expected euroc, kitti, tum, images, video or bag");
   options.format = "kitti";
   EXPECT_THAT(error(folder / "a.txt", options),
               HasSubstr("is a file, expected a folder for format kitti"));
@@ -263,15 +265,6 @@ TEST(Mask, OnePerFrameInOrderWhereNamesDiffer) {
   for (int i = 2; i < 11; ++i) EXPECT_EQ(input->next()->mask->view().at(0, 0), 10 * i);
 }
 
-/// Frames of value 20, 40, ... at 10 per second.
-void make_video(const std::filesystem::path& path, int num_frames) {
-  cv::VideoWriter writer(
-      path.string(), cv::VideoWriter::fourcc('M', 'J', 'P', 'G'), 10.0, {64, 48});
-  ASSERT_TRUE(writer.isOpened());
-  for (int i = 1; i <= num_frames; ++i)
-    writer.write(cv::Mat(48, 64, CV_8UC3, cv::Scalar::all(20 * i)));
-}
-
 TEST(Mask, OnePerFrameOfAVideo) {
   const TemporaryFolder folder;
   for (int i = 0; i < 10; ++i) {
@@ -290,83 +283,6 @@ TEST(Mask, OnePerFrameOfAVideo) {
   options.mask = folder.write("no.mp4", "x");
   EXPECT_THAT(input_error_of([&] { open_input(folder / "images", options); }),
               HasSubstr("no.mp4: cannot be opened as a video"));
-}
-
-TEST(Video, GivesFramesWithTheTimesOfTheContainer) {
-  const TemporaryFolder folder;
-  make_video(folder / "v.avi", 6);
-  const std::unique_ptr<Input> input = open_input(folder.path(), {});
-  EXPECT_EQ(input->info().format, "video");
-  EXPECT_EQ(input->info().num_frames, std::size_t{6});
-  EXPECT_EQ(input->info().width_px, 64);
-  for (int i = 0; i < 6; ++i) {
-    const std::optional<InputFrame> frame = input->next();
-    ASSERT_TRUE(frame);
-    EXPECT_EQ(frame->index, static_cast<std::size_t>(i));
-    EXPECT_EQ(frame->timestamp_ns, i * 100'000'000);
-    EXPECT_NEAR(frame->images.at(0).view().at(8, 6), 20 * (i + 1), 3);
-  }
-  EXPECT_FALSE(input->next());
-}
-
-TEST(Video, GivesFramesAsJpegWhereAsked) {
-  const TemporaryFolder folder;
-  make_video(folder / "v.avi", 3);
-  InputOptions options;
-  options.has_jpeg = true;
-  const std::unique_ptr<Input> input = open_input(folder / "v.avi", options);
-  for (int i = 1; i <= 3; ++i) {
-    const std::optional<InputFrame> frame = input->next();
-    ASSERT_TRUE(frame);
-    const std::optional<ColorImage> image = decode_color_image(frame->jpeg);
-    ASSERT_TRUE(image);
-    EXPECT_NEAR(image->row(3)[5][2], 20 * i, 3);
-  }
-}
-
-TEST(Video, TakesTimesBesideItAndTheFramesAskedFor) {
-  const TemporaryFolder folder;
-  make_video(folder / "v.avi", 6);
-  folder.write("times.txt", "1\n2\n3\n4\n5\n");
-  InputOptions options;
-  options.first = 1;
-  options.every = 2;
-  const std::unique_ptr<Input> input = open_input(folder / "v.avi", options);
-  EXPECT_EQ(input->info().num_frames, std::size_t{2});
-  EXPECT_THAT(input->info().lines, ::testing::Contains(HasSubstr("5 times for 6 frames")));
-  std::optional<InputFrame> frame = input->next();
-  EXPECT_EQ(frame->timestamp_ns, 2'000'000'000);
-  EXPECT_NEAR(frame->images.at(0).view().at(8, 6), 40, 3);
-  frame = input->next();
-  EXPECT_EQ(frame->index, 3u);
-  EXPECT_NEAR(frame->images.at(0).view().at(8, 6), 80, 3);
-  EXPECT_FALSE(input->next());
-}
-
-TEST(Video, SaysWhatIsWrong) {
-  const TemporaryFolder folder;
-  folder.write("a.mp4", "garbage");
-  EXPECT_THAT(input_error_of([&] { open_input(folder / "a.mp4", {}); }),
-              HasSubstr("a.mp4: cannot be opened as a video"));
-  folder.write("b.mp4", "garbage");
-  EXPECT_THAT(input_error_of([&] { open_input(folder.path(), {}); }),
-              HasSubstr("holds 2 videos, expected one"));
-  make_video(folder / "c.avi", 3);
-  folder.write("times.txt", "\n");
-  EXPECT_THAT(input_error_of([&] { open_input(folder / "c.avi", {}); }),
-              HasSubstr("times.txt: empty"));
-  folder.write("times.txt", "1\n2\n3\n4\n5\n6\n");
-  InputOptions options;
-  options.first = 5;
-  EXPECT_THAT(input_error_of([&] { open_input(folder / "c.avi", options); }),
-              HasSubstr("ends before the first frame"));
-  options.first = 0;
-  options.calibration = CameraChain{};
-  options.calibration->cameras.resize(1);
-  options.calibration->cameras[0].description.width_px = 640;
-  options.calibration->cameras[0].description.height_px = 480;
-  EXPECT_THAT(input_error_of([&] { open_input(folder / "c.avi", options); }),
-              HasSubstr("is 64x48 px, expected 640x480 px"));
 }
 
 }  // namespace

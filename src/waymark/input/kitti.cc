@@ -8,6 +8,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/pairing.h"
 
 namespace waymark {
 namespace {
@@ -39,19 +40,18 @@ ChainCamera camera_from_projection(const RowReader& rows) {
   return camera;
 }
 
-void check_pairs(const std::vector<std::filesystem::path>& left,
-                 const std::vector<std::filesystem::path>& right) {
-  if (left.size() != right.size()) {
-    throw InputError(
-        right.front().parent_path().string(),
-        fmt::format("{} images, expected {} as image_0 has", right.size(), left.size()));
-  }
-  for (std::size_t i = 0; i < left.size(); ++i) {
-    if (left[i].stem() == right[i].stem()) continue;
-    throw InputError(
-        right[i].string(),
-        fmt::format("has no partner in image_0, expected {}", left[i].stem().string()));
-  }
+/// The sequences have 10 images per second.
+constexpr double kKittiRateHz = 10.0;
+
+std::vector<std::int64_t> frame_times(const std::filesystem::path& folder,
+                                      std::size_t num_images,
+                                      const InputOptions& options,
+                                      Listing& listing) {
+  const std::filesystem::path path = folder / "times.txt";
+  if (std::filesystem::exists(path)) return read_times(path, num_images, "image_0");
+  const double rate_hz = options.fps.value_or(kKittiRateHz);
+  listing.notes.push_back(fmt::format("no times.txt: {:g} images per second assumed", rate_hz));
+  return even_times(num_images, rate_hz);
 }
 
 std::optional<CameraChain> read_calibration(const std::filesystem::path& folder, Setup setup) {
@@ -98,14 +98,16 @@ Listing list_kitti(const std::filesystem::path& folder, const InputOptions& opti
   listing.title = "KITTI odometry";
   listing.setup = choose_setup(folder, offered, options.setup);
   const std::vector<std::filesystem::path> left = list_images(folder / "image_0");
-  const std::vector<std::int64_t> times_ns =
-      read_times(folder / "times.txt", left.size(), "image_0");
-  for (std::size_t i = 0; i < left.size(); ++i)
+  const std::vector<std::int64_t> times_ns = frame_times(folder, left.size(), options, listing);
+  std::vector<std::filesystem::path> used;
+  for (const std::size_t i : keep_increasing(listing, times_ns, (folder / "times.txt").string())) {
+    used.push_back(left[i]);
     listing.frames.push_back({times_ns[i], {left[i]}, {}});
+  }
   if (listing.setup == Setup::kStereo) {
-    const std::vector<std::filesystem::path> right = list_images(folder / "image_1");
-    check_pairs(left, right);
-    for (std::size_t i = 0; i < right.size(); ++i) listing.frames[i].images.push_back(right[i]);
+    const std::filesystem::path right = folder / "image_1";
+    const std::vector<std::filesystem::path> others = list_images(right);
+    add_partners(listing, partners_by_name(used, others), others, {}, right.string());
   }
   if (!options.calibration) listing.calibration = read_calibration(folder, listing.setup);
   return listing;

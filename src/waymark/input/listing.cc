@@ -11,6 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/pairing.h"
 
 namespace waymark {
 namespace {
@@ -75,7 +76,7 @@ std::vector<std::filesystem::path> list_files(const std::filesystem::path& folde
   return paths;
 }
 
-constexpr std::int64_t kAssumedRateHz = 30;
+constexpr double kAssumedRateHz = 30.0;
 
 std::filesystem::path find_image_times(const std::filesystem::path& images) {
   for (const std::filesystem::path& folder : {images, images / ".."}) {
@@ -83,6 +84,26 @@ std::filesystem::path find_image_times(const std::filesystem::path& images) {
     if (std::filesystem::exists(candidate)) return candidate;
   }
   return {};
+}
+
+std::filesystem::path images_folder_of(const std::filesystem::path& folder) {
+  return std::filesystem::is_directory(folder / "images") ? folder / "images" : folder;
+}
+
+std::vector<std::int64_t> image_times(const std::vector<std::filesystem::path>& images,
+                                      const InputOptions& options,
+                                      Listing& listing) {
+  const std::filesystem::path folder = images.front().parent_path();
+  const std::filesystem::path times_path = find_image_times(folder);
+  if (!times_path.empty()) {
+    listing.notes.push_back(fmt::format("times from {}", times_path.string()));
+    return read_times(times_path, images.size(), folder.string());
+  }
+  const double rate_hz = options.fps.value_or(kAssumedRateHz);
+  listing.notes.push_back(
+      options.fps ? fmt::format("no times.txt: {:g} images per second, as --fps says", rate_hz)
+                  : fmt::format("no times.txt: {:g} images per second assumed", rate_hz));
+  return even_times(images.size(), rate_hz);
 }
 
 }  // namespace
@@ -117,9 +138,22 @@ Setup choose_setup(const std::filesystem::path& path,
 
 std::vector<std::filesystem::path> list_images(const std::filesystem::path& folder) {
   std::vector<std::filesystem::path> images = list_files(folder, kImageExtensions);
-  if (images.empty())
-    throw InputError(folder.string(), "holds no image, expected png, jpg or the like");
-  return images;
+  if (!images.empty()) return images;
+  const std::string suggestion = suggest_command(folder, /*are_videos=*/false);
+  throw InputError(
+      folder.string(),
+      suggestion.empty() ? "holds no image, expected png, jpg or the like" : suggestion);
+}
+
+std::size_t count_images(const std::filesystem::path& folder) {
+  std::error_code error;
+  std::size_t count = 0;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    const std::string name = entry->path().filename().string();
+    count += !name.starts_with('.') && has_extension(name, kImageExtensions);
+  }
+  return count;
 }
 
 std::vector<std::filesystem::path> list_videos(const std::filesystem::path& folder) {
@@ -133,13 +167,33 @@ bool is_video_name(const std::filesystem::path& path) {
 std::vector<std::int64_t> read_times(const std::filesystem::path& path,
                                      std::size_t num_images,
                                      std::string_view what) {
-  const std::string text = read_text_file(path, "one time in seconds per image");
-  std::vector<std::int64_t> times_ns = parse_times(text, path.string());
+  std::vector<std::int64_t> times_ns = read_times(path);
   if (times_ns.size() != num_images) {
     throw InputError(
         path.string(),
         fmt::format(
             "{} times, expected {}: one per image of {}", times_ns.size(), num_images, what));
+  }
+  return times_ns;
+}
+
+std::vector<std::int64_t> read_times(const std::filesystem::path& path) {
+  const std::string text = read_text_file(path, "one time in seconds per image");
+  std::vector<std::int64_t> times_ns;
+  RowReader rows(text, path.string(), ' ');
+  while (rows.next()) {
+    rows.expect_exactly(1, "1: a time in seconds");
+    times_ns.push_back(rows.seconds_as_ns(0));
+  }
+  if (times_ns.empty())
+    throw InputError(path.string(), "empty, expected one time in seconds per row");
+  return times_ns;
+}
+
+std::vector<std::int64_t> even_times(std::size_t num_frames, double rate_hz) {
+  std::vector<std::int64_t> times_ns;
+  for (std::size_t i = 0; i < num_frames; ++i) {
+    times_ns.push_back(static_cast<std::int64_t>(static_cast<double>(i) * 1e9 / rate_hz));
   }
   return times_ns;
 }
@@ -153,29 +207,27 @@ std::string describe_rate(const std::vector<std::int64_t>& times_ns) {
 }
 
 Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options) {
+  const Setup richest = !options.right.empty()   ? Setup::kStereo
+                        : !options.depth.empty() ? Setup::kRgbd
+                                                 : Setup::kMono;
   Listing listing;
   listing.format = "images";
   listing.title = "folder of images";
-  listing.setup = choose_setup(folder, {Setup::kMono}, options.setup);
+  listing.setup = choose_setup(folder, {Setup::kMono, richest}, options.setup);
 
-  const bool is_nested = std::filesystem::is_directory(folder / "images");
-  const std::filesystem::path images_folder = is_nested ? folder / "images" : folder;
-  const std::vector<std::filesystem::path> images = list_images(images_folder);
-  const std::filesystem::path times_path = find_image_times(images_folder);
-  std::vector<std::int64_t> times_ns;
-  if (times_path.empty()) {
-    for (std::size_t i = 0; i < images.size(); ++i) {
-      times_ns.push_back(static_cast<std::int64_t>(i) * 1'000'000'000 / kAssumedRateHz);
-    }
-    listing.notes.push_back(
-        fmt::format("no times.txt: {} images per second assumed", kAssumedRateHz));
-  } else {
-    times_ns = read_times(times_path, images.size(), images_folder.string());
-    listing.notes.push_back(fmt::format("times from {}", times_path.string()));
-  }
-  for (std::size_t i = 0; i < images.size(); ++i) {
+  const std::vector<std::filesystem::path> images = list_images(images_folder_of(folder));
+  const std::vector<std::int64_t> times_ns = image_times(images, options, listing);
+  const std::string where = images.front().parent_path().string();
+  std::vector<std::filesystem::path> used;
+  for (const std::size_t i : keep_increasing(listing, times_ns, where)) {
+    used.push_back(images[i]);
     listing.frames.push_back({times_ns[i], {images[i]}, {}});
   }
+  if (listing.setup == Setup::kMono) return listing;
+  const std::filesystem::path& others_folder =
+      listing.setup == Setup::kStereo ? options.right : options.depth;
+  const std::vector<std::filesystem::path> others = list_images(images_folder_of(others_folder));
+  add_partners(listing, partners_by_name(used, others), others, {}, others_folder.string());
   return listing;
 }
 

@@ -31,6 +31,8 @@ ListingInput::ListingInput(const std::filesystem::path& path,
       has_jpeg_(options.has_jpeg) {
   info_.format = listing_.format;
   info_.setup = listing_.setup;
+  info_.counts = listing_.counts;
+  for (const ListedFrame& frame : listing_.frames) info_.times_ns.push_back(frame.timestamp_ns);
   info_.num_frames = selection_.count(listing_.frames.size());
   info_.calibration =
       choose_calibration(path, options.calibration, listing_.calibration, info_.setup);
@@ -44,7 +46,21 @@ ListingInput::ListingInput(const std::filesystem::path& path,
 
 std::optional<InputFrame> ListingInput::next() {
   if (num_read_ == *info_.num_frames) return std::nullopt;
-  return read(selection_.first + selection_.every * num_read_++);
+  InputFrame frame = read(selection_.first + selection_.every * num_read_++);
+  if (frame.images.size() == num_cameras(info_.setup)) has_begun_ = true;
+  if (!has_begun_ && frame.fault == FrameFault::kNone) hold_back(frame, "image of camera 1");
+  return frame;
+}
+
+/// A bad image of camera 1 leaves the frame with camera 0, once there is a map with its scale.
+void ListingInput::use_without_partner(InputFrame& frame) {
+  if (!has_begun_ || frame.images.size() != 1 || frame.fault == FrameFault::kNone) return;
+  frame.fault = FrameFault::kNone;
+  ++info_.counts.without_partner;
+}
+
+std::string ListingInput::describe_camera(std::size_t camera) const {
+  return info_.setup == Setup::kStereo ? fmt::format(" (camera {})", camera) : "";
 }
 
 InputFrame ListingInput::read(std::size_t index) {
@@ -53,6 +69,7 @@ InputFrame ListingInput::read(std::size_t index) {
   frame.index = index;
   frame.timestamp_ns = listed.timestamp_ns;
   frame.fault = read_images(listed, frame);
+  use_without_partner(frame);
   if (frame.fault != FrameFault::kNone) {
     frame.images.clear();
     return frame;
@@ -68,7 +85,8 @@ FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& fram
     const std::filesystem::path& path = listed.images[i];
     std::optional<Image> image = read_grey_image(path);
     if (!image) {
-      frame.warning = fmt::format("{}: {}", path.string(), describe_bad_image(path));
+      frame.warning =
+          fmt::format("{}{}: {}", path.string(), describe_camera(i), describe_bad_image(path));
       return FrameFault::kUnreadable;
     }
     if (!sizes_.empty() && sizes_[i] != size_of(*image)) {
@@ -100,11 +118,18 @@ std::size_t ListingInput::find_first_readable() const {
   for (std::size_t i = 0; i < num_tried; ++i) {
     const std::size_t index = selection_.first + selection_.every * i;
     InputFrame frame;
-    if (read_images(listing_.frames[index], frame) == FrameFault::kNone) return index;
+    const bool is_good = read_images(listing_.frames[index], frame) == FrameFault::kNone;
+    if (is_good && frame.images.size() == num_cameras(info_.setup)) return index;
   }
   const std::vector<std::filesystem::path>& first = listing_.frames[selection_.first].images;
   const auto bad = std::ranges::find_if(first, [](const auto& p) { return !read_grey_image(p); });
-  WAYMARK_CHECK(bad != first.end());
+  if (bad == first.end()) {
+    throw InputError(
+        first.front().string(),
+        fmt::format("none of {} frames from it on has an image of camera 1 that can be "
+                    "read, expected pairs",
+                    num_tried));
+  }
   throw InputError(
       bad->string(),
       fmt::format(
@@ -147,11 +172,9 @@ void ListingInput::check_first_depth() const {
 }
 
 void ListingInput::describe(const std::filesystem::path& path, const InputOptions& options) {
-  std::vector<std::int64_t> times_ns;
-  for (const ListedFrame& frame : listing_.frames) times_ns.push_back(frame.timestamp_ns);
   info_.lines.push_back(
       fmt::format("{}: {} ({})", path.string(), listing_.title, to_string(info_.setup)));
-  info_.lines.push_back(describe_rate(times_ns));
+  info_.lines.push_back(describe_rate(info_.times_ns));
   std::string sizes;
   for (const ImageSize& size : sizes_) {
     sizes += fmt::format("{}{}x{}", sizes.empty() ? "" : " and ", size.width_px, size.height_px);

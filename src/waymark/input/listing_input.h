@@ -25,6 +25,8 @@ class ListingInput : public Input {
  private:
   InputFrame read(std::size_t index);
   FrameFault read_images(const ListedFrame& listed, InputFrame& frame) const;
+  void use_without_partner(InputFrame& frame);
+  std::string describe_camera(std::size_t camera) const;
   void read_depth(const ListedFrame& listed, InputFrame& frame) const;
   std::size_t find_first_readable() const;
   void check_first_frame(std::size_t index);
@@ -38,6 +40,7 @@ class ListingInput : public Input {
   InputInfo info_;
   std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
   std::size_t num_read_ = 0;
+  bool has_begun_ = false;  ///< A frame that was whole was given.
 };
 
 }  // namespace waymark

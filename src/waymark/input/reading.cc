@@ -81,6 +81,62 @@ std::string describe_calibration(bool is_given, const std::optional<CameraChain>
   return text;
 }
 
+std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times_ns,
+                                          const std::string& where,
+                                          std::string_view what) {
+  constexpr std::size_t kNone = SIZE_MAX;
+  // Of the increasing parts of each length the one that ends earliest, and what comes before each.
+  std::vector<std::size_t> ends;
+  std::vector<std::size_t> before(times_ns.size(), kNone);
+  for (std::size_t i = 0; i < times_ns.size(); ++i) {
+    const auto at = std::ranges::lower_bound(
+        ends, times_ns[i], {}, [&](std::size_t end) { return times_ns[end]; });
+    if (at != ends.begin()) before[i] = *(at - 1);
+    // Of equal times the first stays.
+    if (at == ends.end()) {
+      ends.push_back(i);
+    } else if (times_ns[i] < times_ns[*at]) {
+      *at = i;
+    }
+  }
+  std::vector<std::size_t> used;
+  for (std::size_t i = ends.empty() ? kNone : ends.back(); i != kNone; i = before[i]) {
+    used.push_back(i);
+  }
+  std::ranges::reverse(used);
+  const std::size_t num_left_out = times_ns.size() - used.size();
+  if (10 * num_left_out <= times_ns.size()) return used;
+  throw InputError(where,
+                   fmt::format("{} of {} {} have a time that is not later than the one before, "
+                               "expected increasing times but for a tenth",
+                               num_left_out,
+                               times_ns.size(),
+                               what));
+}
+
+std::string describe_out_of_order(std::size_t count, std::string_view what) {
+  return fmt::format(
+      "note: {} {} left out, whose time is not later than the one before", count, what);
+}
+
+std::int64_t median_step_ns(const std::vector<std::int64_t>& times_ns) {
+  std::vector<std::int64_t> steps;
+  for (std::size_t i = 1; i < times_ns.size(); ++i) steps.push_back(times_ns[i] - times_ns[i - 1]);
+  if (steps.empty()) return 0;
+  const auto middle = steps.begin() + static_cast<std::ptrdiff_t>(steps.size() / 2);
+  std::ranges::nth_element(steps, middle);
+  return *middle;
+}
+
+void hold_back(InputFrame& frame, std::string_view partner) {
+  frame.fault = FrameFault::kUnreadable;
+  frame.images.clear();
+  frame.mask.reset();
+  if (frame.warning.empty()) {
+    frame.warning = fmt::format("no {} at this moment, expected it to begin with", partner);
+  }
+}
+
 MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
   if (path_.empty()) return;
   if (std::filesystem::is_directory(path_)) {

@@ -12,6 +12,7 @@
 #include <opencv2/core.hpp>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "waymark/base/check.h"
@@ -71,6 +72,22 @@ inline FrameSelection select_frames(const std::filesystem::path& path,
   }
   return selection;
 }
+
+/// Which of these times to use: the longest part of them that increases (Fredman 1975), most often
+/// all. Throws InputError at `where` when more than a tenth has to be left out. what: "images", ...
+std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times_ns,
+                                          const std::string& where,
+                                          std::string_view what);
+
+/// "3 images are left out: ...", for a number above 0.
+std::string describe_out_of_order(std::size_t count, std::string_view what);
+
+/// The middle one of the steps from time to time; 0 for fewer than two.
+std::int64_t median_step_ns(const std::vector<std::int64_t>& times_ns);
+
+/// Takes the images of a frame away that comes before the first pair, or before the first depth:
+/// with it a map without scale would begin. partner: what it lacks.
+void hold_back(InputFrame& frame, std::string_view partner);
 
 class VideoReader;
 

@@ -7,6 +7,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/pairing.h"
 
 namespace waymark {
 namespace {
@@ -27,9 +28,15 @@ std::vector<std::int64_t> times_of(const std::vector<TumImage>& images) {
   return times_ns;
 }
 
-std::vector<TumImage> read_tum_images(const std::filesystem::path& path) {
+/// The images of a list, as far as their times increase.
+std::vector<TumImage> read_tum_images(const std::filesystem::path& path, Listing& listing) {
   const std::string text = read_text_file(path, "the image list of a TUM RGB-D data set");
-  return parse_tum_images(text, path.string());
+  const std::vector<TumImage> images = parse_tum_images(text, path.string());
+  std::vector<TumImage> used;
+  for (const std::size_t i : keep_increasing(listing, times_of(images), path.string())) {
+    used.push_back(images[i]);
+  }
+  return used;
 }
 
 }  // namespace
@@ -40,9 +47,6 @@ std::vector<TumImage> parse_tum_images(std::string_view text, const std::string&
   while (rows.next()) {
     rows.expect_exactly(2, "2: seconds and file name");
     TumImage image{rows.seconds_as_ns(0), rows.relative_path(1)};
-    if (!images.empty() && image.timestamp_ns <= images.back().timestamp_ns) {
-      throw InputError(rows.where(), "not later than the time before, expected increasing times");
-    }
     images.push_back(std::move(image));
   }
   if (images.empty()) throw InputError(name, "empty, expected rows of seconds and file name");
@@ -71,13 +75,13 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
   listing.format = "tum";
   listing.title = "TUM RGB-D";
   listing.setup = choose_setup(folder, offered, options.setup);
-  const std::vector<TumImage> colour = read_tum_images(folder / "rgb.txt");
+  const std::vector<TumImage> colour = read_tum_images(folder / "rgb.txt", listing);
   for (const TumImage& image : colour) {
     listing.frames.push_back({image.timestamp_ns, {folder / image.name}, {}});
   }
   if (listing.setup != Setup::kRgbd) return listing;
 
-  const std::vector<TumImage> depth = read_tum_images(folder / "depth.txt");
+  const std::vector<TumImage> depth = read_tum_images(folder / "depth.txt", listing);
   const auto pairs = pair_depth(times_of(colour), times_of(depth), kMaxDepthDifferenceNs);
   std::size_t num_pairs = 0;
   for (std::size_t i = 0; i < pairs.size(); ++i) {
@@ -91,6 +95,7 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
         (folder / "depth.txt").string(),
         "no depth image within 0.02 s of a colour image, expected pairs (or --setup mono)");
   }
+  listing.counts.without_partner = colour.size() - num_pairs;
   listing.notes.push_back(
       fmt::format("{} of {} colour images have depth", num_pairs, colour.size()));
   return listing;

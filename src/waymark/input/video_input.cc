@@ -22,19 +22,21 @@ namespace {
 class VideoInput : public Input {
  public:
   VideoInput(const std::filesystem::path& path, const InputOptions& options)
-      : reader_(path), masks_(options.mask), has_jpeg_(options.has_jpeg) {
+      : reader_(path), masks_(options.mask), has_jpeg_(options.has_jpeg), fps_(options.fps) {
     info_.format = "video";
-    info_.setup = choose_setup(path, {Setup::kMono}, options.setup);
+    const Setup richest = options.right.empty() ? Setup::kMono : Setup::kStereo;
+    info_.setup = choose_setup(path, {Setup::kMono, richest}, options.setup);
+    if (info_.setup == Setup::kStereo) right_.emplace(options.right);
     read_times_beside(path);
     const std::optional<std::size_t> num_frames =
-        times_ns_.empty() ? reader_.num_frames() : std::optional(times_ns_.size());
+        used_.empty() ? reader_.num_frames() : std::optional(used_.size());
     selection_ = select_frames(path, options, num_frames);
     if (num_frames) {
       info_.num_frames = selection_.count(*num_frames);
       match_masks(*num_frames);
     }
     info_.calibration = choose_calibration(path, options.calibration, std::nullopt, info_.setup);
-    start(path);
+    start(path, options);
     describe(path, options, num_frames);
   }
 
@@ -49,8 +51,11 @@ class VideoInput : public Input {
   void read_times_beside(const std::filesystem::path& path) {
     const std::filesystem::path times_path = path.parent_path() / "times.txt";
     if (!std::filesystem::exists(times_path)) return;
-    times_ns_ = parse_times(read_text_file(times_path, "one time in seconds per frame"),
-                            times_path.string());
+    const std::vector<std::int64_t> times_ns = read_times(times_path);
+    used_ = increasing_times(times_ns, times_path.string(), "times");
+    for (const std::size_t i : used_) info_.times_ns.push_back(times_ns[i]);
+    info_.counts.out_of_order = times_ns.size() - used_.size();
+    num_times_ = times_ns.size();
   }
 
   void match_masks(std::size_t num_frames) {
@@ -62,17 +67,49 @@ class VideoInput : public Input {
   /// The next selected frame of any kind, or nothing at the end of video, times or selection.
   std::optional<InputFrame> read() {
     if (selection_.limit && num_read_ >= *selection_.limit) return std::nullopt;
-    const std::size_t index = selection_.first + selection_.every * num_read_;
-    if (!times_ns_.empty() && index >= times_ns_.size()) return std::nullopt;
+    const std::size_t place = selection_.first + selection_.every * num_read_;
+    if (!used_.empty() && place >= used_.size()) return std::nullopt;
+    const std::size_t index = used_.empty() ? place : used_[place];
     while (reader_.num_grabbed() <= index) {
       if (!reader_.grab()) return std::nullopt;
     }
     ++num_read_;
     InputFrame frame;
     frame.index = index;
-    frame.timestamp_ns = times_ns_.empty() ? reader_.timestamp_ns() : times_ns_[index];
+    frame.timestamp_ns = used_.empty() ? time_of(index) : info_.times_ns[place];
     take_image(frame);
+    if (right_) take_right_image(frame);
     return frame;
+  }
+
+  std::int64_t time_of(std::size_t index) const {
+    if (!fps_) return reader_.timestamp_ns();
+    return static_cast<std::int64_t>(static_cast<double>(index) * 1e9 / *fps_);
+  }
+
+  /// Steps the video of camera 1 to the frame of this moment, within half a frame; false if it has
+  /// none.
+  bool grab_right() {
+    const auto half_ns = static_cast<std::int64_t>(0.5e9 / reader_.rate_hz());
+    const std::int64_t time_ns = reader_.timestamp_ns();
+    while (right_->num_grabbed() == 0 || right_->timestamp_ns() < time_ns - half_ns) {
+      if (!right_->grab()) return false;
+    }
+    return right_->timestamp_ns() <= time_ns + half_ns;
+  }
+
+  void take_right_image(InputFrame& frame) {
+    const bool is_there = grab_right();
+    if (frame.fault != FrameFault::kNone) return;
+    std::optional<Image> image = is_there ? right_->decode() : std::nullopt;
+    const bool is_good = image && (!right_size_ || size_of(*image) == *right_size_);
+    if (is_good) {
+      right_size_ = size_of(*image);
+      frame.images.push_back(*std::move(image));
+      return;
+    }
+    ++info_.counts.without_partner;
+    if (is_there) frame.warning = "the frame of camera 1 cannot be used";
   }
 
   void take_image(InputFrame& frame) {
@@ -91,7 +128,7 @@ class VideoInput : public Input {
     masks_.attach(mask_name(frame.index), frame);
   }
 
-  void start(const std::filesystem::path& path) {
+  void start(const std::filesystem::path& path, const InputOptions& options) {
     first_ = read();
     if (!first_)
       throw InputError(path.string(),
@@ -101,8 +138,17 @@ class VideoInput : public Input {
       throw InputError(path.string(),
                        "the first frame cannot be decoded, expected a video of 8 bits per channel");
     }
+    if (right_ && first_->images.size() < 2) {
+      throw InputError(
+          options.right.string(),
+          "has no frame beside the first one asked for, expected two videos that begin "
+          "together");
+    }
     const ImageSize size{first_->images[0].width_px, first_->images[0].height_px};
     if (info_.calibration) fit_first_image(*info_.calibration, 0, size, path);
+    if (info_.calibration && right_) {
+      fit_first_image(*info_.calibration, 1, *right_size_, options.right);
+    }
     info_.width_px = size.width_px;
     info_.height_px = size.height_px;
   }
@@ -113,20 +159,24 @@ class VideoInput : public Input {
     info_.lines.push_back(fmt::format("{}: video ({})", path.string(), to_string(info_.setup)));
     info_.lines.push_back(describe_frames(num_frames));
     info_.lines.push_back(fmt::format("images of {}x{} px", info_.width_px, info_.height_px));
-    info_.lines.push_back(times_ns_.empty() ? "times from the video" : "times from times.txt");
+    if (right_) info_.lines.push_back(fmt::format("camera 1: {}", options.right.string()));
+    info_.lines.push_back(!used_.empty() ? "times from times.txt"
+                          : fps_         ? fmt::format("times of {:g} frames per second", *fps_)
+                                         : "times from the video");
+    if (info_.counts.out_of_order > 0)
+      info_.lines.push_back(describe_out_of_order(info_.counts.out_of_order, "times"));
     const std::optional<std::size_t> counted = reader_.num_frames();
-    if (!times_ns_.empty() && counted && *counted != times_ns_.size()) {
-      info_.lines.push_back(
-          fmt::format("note: {} times for {} frames", times_ns_.size(), *counted));
+    if (!used_.empty() && counted && *counted != num_times_) {
+      info_.lines.push_back(fmt::format("note: {} times for {} frames", num_times_, *counted));
     }
     info_.lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
   }
 
   std::string describe_frames(std::optional<std::size_t> num_frames) const {
-    if (!times_ns_.empty()) return describe_rate(times_ns_);
+    if (!used_.empty()) return describe_rate(info_.times_ns);
     const std::string count =
         num_frames ? fmt::format("{} frames", *num_frames) : "frames not counted";
-    return fmt::format("{}, {:.4g} per second", count, reader_.rate_hz());
+    return fmt::format("{}, {:.4g} per second", count, fps_.value_or(reader_.rate_hz()));
   }
 
   /// Masks of a video are named by the index of the frame, six digits.
@@ -136,7 +186,11 @@ class VideoInput : public Input {
   MaskSource masks_;
   bool has_jpeg_;
   FrameSelection selection_;
-  std::vector<std::int64_t> times_ns_;
+  std::optional<double> fps_;
+  std::optional<VideoReader> right_;  ///< Of camera 1.
+  std::optional<ImageSize> right_size_;
+  std::vector<std::size_t> used_;  ///< The frames that times.txt has a time for; empty: all.
+  std::size_t num_times_ = 0;
   InputInfo info_;
   std::optional<InputFrame> first_;
   std::size_t num_read_ = 0;

@@ -1,0 +1,71 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+namespace waymark {
+
+/// How the messages of a topic are written.
+enum class RosEncoding {
+  kRos1,
+  kCdr,      ///< Of ROS 2.
+  kUnknown,  ///< Not ROS: is counted, not read.
+};
+
+/// A topic of a bag.
+struct BagTopic {
+  std::string name;
+  std::string type;  ///< As ROS 1 writes it, for example "sensor_msgs/Image".
+  RosEncoding encoding = RosEncoding::kUnknown;
+  std::size_t num_messages = 0;
+
+  /// Whether its messages are listed: images and what tells of cameras. Of others the number.
+  bool is_listed() const;
+};
+
+/// Where in a file a message is.
+struct BagPlace {
+  std::uint32_t file = 0;  ///< Of the files of a bag.
+  /// Of the compressed chunks of the file; kNoChunk: it is in the file itself.
+  std::uint32_t chunk = UINT32_MAX;
+  std::uint64_t offset = 0;  ///< Of its first byte in the chunk, or the row of a data base.
+  std::uint64_t size = 0;    ///< Bytes.
+};
+
+inline constexpr std::uint32_t kNoChunk = UINT32_MAX;
+
+/// A message, not yet read.
+struct BagMessage {
+  std::uint32_t topic = 0;  ///< Index into the topics.
+  /// Of its header; when it was recorded where the header has none. Not negative.
+  std::int64_t timestamp_ns = 0;
+  BagPlace place;
+};
+
+/// Bytes of a message that hold its time.
+inline constexpr std::size_t kMessageStartBytes = 12;
+
+/// What scanning bag files found.
+struct BagContent {
+  std::vector<BagTopic> topics;      ///< In order of their appearance.
+  std::vector<BagMessage> messages;  ///< Of listed topics, in the order of the files.
+  std::vector<std::string> faults;   ///< What is damaged or missing, for people.
+  std::size_t num_unstamped = 0;     ///< Listed messages without a time in their header.
+
+  /// The topic of that name and type, new if need be. type: as in ROS 1 or ROS 2.
+  std::uint32_t topic_of(std::string_view name, std::string_view type, RosEncoding encoding);
+
+  /// Counts a message and lists it if its topic is. start: its first kMessageStartBytes, or fewer.
+  void add(std::uint32_t topic,
+           std::int64_t recorded_ns,
+           const BagPlace& place,
+           std::string_view start);
+};
+
+}  // namespace waymark

@@ -1,0 +1,61 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "waymark/bag/bag_content.h"
+
+namespace waymark {
+
+// Messages of ROS: as ROS 1 serialises them, and in CDR (the "plain CDR" of OMG's DDS-XTypes, least
+// significant byte first) as ROS 2 does. Sequences are views of the bytes of the message.
+
+/// sensor_msgs/Image.
+struct RosImage {
+  std::string frame_id;
+  std::uint32_t height_px = 0;
+  std::uint32_t width_px = 0;
+  std::string encoding;  ///< "mono8", "bgr8", ...
+  bool is_bigendian = false;
+  std::uint32_t step = 0;  ///< Bytes from row to row.
+  std::string_view data;
+};
+
+/// sensor_msgs/CompressedImage.
+struct RosCompressedImage {
+  std::string frame_id;
+  std::string format;  ///< "jpeg", "16UC1; compressedDepth png", ...
+  std::string_view data;
+};
+
+/// sensor_msgs/CameraInfo.
+struct RosCameraInfo {
+  std::string frame_id;
+  std::uint32_t height_px = 0;
+  std::uint32_t width_px = 0;
+  std::string distortion_model;
+  std::vector<double> d;
+  std::array<double, 9> k = {};   ///< Row by row.
+  std::array<double, 9> r = {};   ///< Row by row: what rectifies, rectified_from_cam.
+  std::array<double, 12> p = {};  ///< Row by row: of the rectified image.
+  std::uint32_t binning_x = 0;    ///< 0 as 1.
+  std::uint32_t binning_y = 0;
+  std::uint32_t roi_x_px = 0;
+  std::uint32_t roi_y_px = 0;
+  std::uint32_t roi_height_px = 0;  ///< 0: the whole image.
+  std::uint32_t roi_width_px = 0;
+};
+
+/// Each gives nothing for bytes that are no such message.
+std::optional<RosImage> parse_ros_image(std::string_view bytes, RosEncoding encoding);
+std::optional<RosCompressedImage> parse_ros_compressed_image(std::string_view bytes,
+                                                             RosEncoding encoding);
+std::optional<RosCameraInfo> parse_ros_camera_info(std::string_view bytes, RosEncoding encoding);
+
+}  // namespace waymark

@@ -1,0 +1,396 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <utility>
+
+#include "waymark/bag/bag.h"
+#include "waymark/base/check.h"
+#include "waymark/base/text.h"
+#include "waymark/input/bag_calibration.h"
+#include "waymark/input/bag_image.h"
+#include "waymark/input/bag_topics.h"
+#include "waymark/input/datasets.h"
+#include "waymark/input/listing.h"
+#include "waymark/input/reading.h"
+
+namespace waymark {
+namespace {
+
+/// As drivers give depth in 16 bits (REP 118).
+constexpr double kUnitsPerMetre = 1000.0;
+constexpr std::size_t kMaxBadMessagesAtStart = 50;
+
+/// Of the messages of a bag those of a moment.
+struct BagFrame {
+  const BagMessage* first = nullptr;
+  const BagMessage* second = nullptr;  ///< Null: none.
+};
+
+/// Every image topic with what its first message tells.
+std::vector<ImageTopic> list_image_topics(Bag& bag) {
+  std::vector<ImageTopic> images;
+  std::vector<bool> is_seen(bag.content().topics.size());
+  for (const BagMessage& message : bag.content().messages) {
+    const BagTopic& topic = bag.content().topics[message.topic];
+    if (is_seen[message.topic] || topic.type == "sensor_msgs/CameraInfo") continue;
+    is_seen[message.topic] = true;
+    ImageTopic& image = images.emplace_back(
+        ImageTopic{message.topic, topic.name, "", "damaged", false, topic.num_messages});
+    try {
+      const BagImageHeader header = read_bag_image_header(bag.read(message), topic, topic.name);
+      image.frame_id = header.frame_id;
+      image.encoding = header.encoding;
+      image.is_depth = header.is_depth;
+    } catch (const InputError&) {
+      // A later message may be whole.
+    }
+  }
+  return images;
+}
+
+/// The camera info that belongs to images: beside them, or of the same coordinate frame.
+std::optional<RosCameraInfo> find_info(Bag& bag, const ImageTopic& image) {
+  std::optional<RosCameraInfo> of_frame;
+  std::vector<bool> is_seen(bag.content().topics.size());
+  for (const BagMessage& message : bag.content().messages) {
+    const BagTopic& topic = bag.content().topics[message.topic];
+    if (is_seen[message.topic] || topic.type != "sensor_msgs/CameraInfo") continue;
+    is_seen[message.topic] = true;
+    std::optional<RosCameraInfo> info = parse_ros_camera_info(bag.read(message), topic.encoding);
+    if (!info) continue;
+    if (topic.name == image.camera() + "/camera_info") return info;
+    if (!image.frame_id.empty() && info->frame_id == image.frame_id) of_frame = std::move(info);
+  }
+  return of_frame;
+}
+
+std::optional<CameraChain> calibration_of(Bag& bag, const TopicChoice& choice) {
+  const bool is_rectified = choice.first.is_rectified();
+  const std::optional<RosCameraInfo> left = find_info(bag, choice.first);
+  if (!left) return std::nullopt;
+  std::optional<ChainCamera> camera = camera_of_info(*left, is_rectified, choice.first.name);
+  if (!camera) return std::nullopt;
+  CameraChain chain;
+  chain.cameras.push_back(*std::move(camera));
+  if (choice.setup == Setup::kRgbd) chain.depth_factor = kUnitsPerMetre;
+  if (choice.setup != Setup::kStereo) return chain;
+  const std::string& where = choice.second->name;
+  const std::optional<RosCameraInfo> right = find_info(bag, *choice.second);
+  if (!right) return std::nullopt;
+  camera = camera_of_info(*right, choice.second->is_rectified(), where);
+  const std::optional<Rigid3> cam_from_rig = right_from_left(*left, *right, is_rectified, where);
+  if (!camera || !cam_from_rig) return std::nullopt;
+  camera->cam_from_rig = *cam_from_rig;
+  chain.cameras.push_back(*std::move(camera));
+  return chain;
+}
+
+[[noreturn]] void fail_without_choice(const std::string& path,
+                                      const std::vector<ImageTopic>& images,
+                                      const BagContent& content) {
+  if (!images.empty()) {
+    throw InputError(path,
+                     fmt::format("names do not tell which images to use, expected --topics A[,B]: "
+                                 "those of camera 0 and of camera 1 or the depth, of {}",
+                                 describe(images)));
+  }
+  std::string topics;
+  for (const BagTopic& topic : content.topics) {
+    topics += fmt::format(
+        "{}{} ({})", topics.empty() ? "" : ", ", printable(topic.name), printable(topic.type));
+  }
+  throw InputError(path,
+                   fmt::format("holds no message of sensor_msgs/Image or CompressedImage, expected "
+                               "images; its topics: {}",
+                               topics.empty() ? "none" : topics));
+}
+
+class BagInput : public Input {
+ public:
+  BagInput(const std::filesystem::path& path, const InputOptions& options)
+      : path_(path), bag_(path), masks_(options.mask), has_jpeg_(options.has_jpeg) {
+    info_.format = "bag";
+    choose(options);
+    list_frames();
+    selection_ = select_frames(path, options, frames_.size());
+    info_.num_frames = selection_.count(frames_.size());
+    info_.calibration = choose_calibration(path, options.calibration, carried_, info_.setup);
+    if (info_.calibration && info_.setup == Setup::kRgbd) {
+      if (!info_.calibration->depth_factor) info_.calibration->depth_factor = kUnitsPerMetre;
+      units_per_m_ = *info_.calibration->depth_factor;
+    }
+    std::vector<std::string> stems;
+    for (std::size_t i = 0; i < frames_.size(); ++i) stems.push_back(mask_name(i));
+    masks_.match(stems);
+    start();
+    describe_all(options);
+  }
+
+  const InputInfo& info() const override { return info_; }
+
+  std::optional<InputFrame> next() override {
+    if (num_read_ == *info_.num_frames) return std::nullopt;
+    InputFrame frame = read(selection_.first + selection_.every * num_read_++);
+    if (is_whole(frame)) has_begun_ = true;
+    if (!has_begun_ && frame.fault == FrameFault::kNone) hold_back(frame, choice_.second->name);
+    return frame;
+  }
+
+ private:
+  void choose(const InputOptions& options) {
+    const std::vector<ImageTopic> images = list_image_topics(bag_);
+    std::vector<TopicChoice> choices;
+    if (options.topics.empty()) {
+      choices = find_topics(images);
+    } else {
+      const TopicChoice named = choose_named_topics(images, options.topics, path_.string());
+      choices.push_back({Setup::kMono, named.first, std::nullopt});
+      if (named.second) choices.push_back(named);
+    }
+    if (choices.empty()) fail_without_choice(path_.string(), images, bag_.content());
+    drop_uncalibrated_stereo(options, choices);
+    std::vector<Setup> offered;
+    for (const TopicChoice& choice : choices) offered.push_back(choice.setup);
+    info_.setup = choose_setup(path_, offered, options.setup);
+    choice_ = *std::ranges::find(choices, info_.setup, &TopicChoice::setup);
+    if (!options.calibration) carried_ = calibration_of(bag_, choice_);
+  }
+
+  /// A pair that was not asked for is no use without a baseline.
+  void drop_uncalibrated_stereo(const InputOptions& options, std::vector<TopicChoice>& choices) {
+    if (options.setup || !options.topics.empty()) return;
+    std::erase_if(choices, [&](const TopicChoice& choice) {
+      if (choice.setup != Setup::kStereo) return false;
+      const bool is_calibrated = options.calibration ? options.calibration->cameras.size() > 1
+                                                     : calibration_of(bag_, choice).has_value();
+      if (is_calibrated) return false;
+      notes_.push_back(
+          fmt::format("{} is not used: nothing says where its camera is; for stereo "
+                      "calibrate both with -c",
+                      printable(choice.second->name)));
+      return true;
+    });
+  }
+
+  /// The messages of a topic, as far as their times increase.
+  std::vector<const BagMessage*> messages_of(const ImageTopic& topic) {
+    std::vector<const BagMessage*> messages;
+    for (const BagMessage& message : bag_.content().messages) {
+      if (message.topic == topic.topic) messages.push_back(&message);
+    }
+    std::vector<std::int64_t> times_ns;
+    for (const BagMessage* message : messages) times_ns.push_back(message->timestamp_ns);
+    std::vector<const BagMessage*> used;
+    const std::string where = fmt::format("{}: {}", path_.string(), printable(topic.name));
+    for (const std::size_t i : increasing_times(times_ns, where, "messages")) {
+      used.push_back(messages[i]);
+    }
+    info_.counts.out_of_order += messages.size() - used.size();
+    return used;
+  }
+
+  void list_frames() {
+    const auto times_of = [](const std::vector<const BagMessage*>& messages) {
+      std::vector<std::int64_t> times_ns;
+      for (const BagMessage* message : messages) times_ns.push_back(message->timestamp_ns);
+      return times_ns;
+    };
+    for (const BagMessage* message : messages_of(choice_.first)) frames_.push_back({message});
+    if (choice_.second) {
+      std::vector<std::int64_t> times_ns;
+      for (const BagFrame& frame : frames_) times_ns.push_back(frame.first->timestamp_ns);
+      const std::vector<const BagMessage*> second = messages_of(*choice_.second);
+      const auto pairs = pair_depth(times_ns, times_of(second), median_step_ns(times_ns) / 2);
+      for (std::size_t i = 0; i < frames_.size(); ++i) {
+        if (pairs[i]) frames_[i].second = second[*pairs[i]];
+      }
+      drop_start_without_partner();
+    }
+    for (const BagFrame& frame : frames_) {
+      info_.times_ns.push_back(frame.first->timestamp_ns);
+      info_.counts.without_partner += choice_.second && !frame.second;
+    }
+  }
+
+  /// Recorders hear of one topic before the other; without the other there is no scale to start by.
+  void drop_start_without_partner() {
+    const auto first =
+        std::ranges::find_if(frames_, [](const auto& frame) { return frame.second; });
+    if (first == frames_.end()) {
+      throw InputError(path_.string(),
+                       fmt::format("no message of {} within half a frame of one of {}, expected "
+                                   "pairs (or --setup mono)",
+                                   printable(choice_.second->name),
+                                   printable(choice_.first.name)));
+    }
+    if (first != frames_.begin()) {
+      notes_.push_back(fmt::format("{} frames at the start are left out, before the first of {}",
+                                   first - frames_.begin(),
+                                   printable(choice_.second->name)));
+    }
+    frames_.erase(frames_.begin(), first);
+  }
+
+  std::string where_of(const ImageTopic& topic, const BagMessage& message) const {
+    return fmt::format("{}: {} at {} s",
+                       path_.string(),
+                       printable(topic.name),
+                       format_seconds(message.timestamp_ns));
+  }
+
+  Image read_image(const ImageTopic& topic, const BagMessage& message) {
+    return read_bag_image(
+        bag_.read(message), bag_.content().topics[topic.topic], where_of(topic, message));
+  }
+
+  bool is_whole(const InputFrame& frame) const {
+    return frame.images.size() == num_cameras(info_.setup) &&
+           (frame.depth || info_.setup != Setup::kRgbd);
+  }
+
+  InputFrame read(std::size_t index) {
+    const BagFrame& listed = frames_[index];
+    InputFrame frame;
+    frame.index = index;
+    frame.timestamp_ns = listed.first->timestamp_ns;
+    try {
+      take_image(choice_.first, *listed.first, frame);
+      if (listed.second && info_.setup == Setup::kStereo) {
+        take_image(*choice_.second, *listed.second, frame);
+      }
+      if (has_jpeg_ && frame.fault == FrameFault::kNone) {
+        frame.jpeg = read_bag_jpeg(bag_.read(*listed.first),
+                                   bag_.content().topics[choice_.first.topic],
+                                   where_of(choice_.first, *listed.first));
+      }
+    } catch (const InputError& error) {
+      frame.fault = FrameFault::kUnreadable;
+      frame.warning = error.what();
+    }
+    if (frame.fault != FrameFault::kNone) {
+      frame.images.clear();
+      return frame;
+    }
+    if (listed.second && info_.setup == Setup::kRgbd) take_depth(*listed.second, frame);
+    masks_.attach(mask_name(index), frame);
+    return frame;
+  }
+
+  void take_image(const ImageTopic& topic, const BagMessage& message, InputFrame& frame) {
+    Image image = read_image(topic, message);
+    const std::size_t camera = frame.images.size();
+    if (camera < sizes_.size() && size_of(image) != sizes_[camera]) {
+      frame.fault = FrameFault::kWrongSize;
+      frame.warning = describe_wrong_size(where_of(topic, message), size_of(image), sizes_[camera]);
+    }
+    frame.images.push_back(std::move(image));
+  }
+
+  /// A bad depth image leaves the frame without depth.
+  void take_depth(const BagMessage& message, InputFrame& frame) {
+    const std::string where = where_of(*choice_.second, message);
+    const ImageSize size = size_of(frame.images.front());
+    try {
+      frame.depth = read_bag_depth(
+          bag_.read(message), bag_.content().topics[message.topic], units_per_m_, where);
+      frame.depth_lag_ns = message.timestamp_ns - frame.timestamp_ns;
+      if (size_of(*frame.depth) == size) return;
+      frame.warning = describe_wrong_size(where, size_of(*frame.depth), size);
+      frame.depth.reset();
+    } catch (const InputError& error) {
+      frame.warning = error.what();
+    }
+  }
+
+  /// Learns the sizes of the first frame that is whole, and checks it against the calibration.
+  void start() {
+    const std::size_t num_tried = std::min(*info_.num_frames, kMaxBadMessagesAtStart);
+    std::string first_problem;
+    for (std::size_t i = 0; i < num_tried; ++i) {
+      const std::size_t index = selection_.first + selection_.every * i;
+      const InputFrame frame = read(index);
+      const bool is_mask = frame.fault != FrameFault::kNone && masks_.has(mask_name(index));
+      if (is_mask) masks_.check_first(mask_name(index), frame);
+      if (is_whole(frame)) return learn_sizes(index, frame);
+      if (first_problem.empty()) first_problem = frame.warning;
+    }
+    throw InputError(first_problem.empty() ? path_.string() + ": has no partner" : first_problem,
+                     fmt::format("none of {} frames from it on can be read", num_tried));
+  }
+
+  void learn_sizes(std::size_t index, const InputFrame& frame) {
+    const BagFrame& listed = frames_[index];
+    for (std::size_t i = 0; i < frame.images.size(); ++i) {
+      const ImageTopic& topic = i == 0 ? choice_.first : *choice_.second;
+      sizes_.push_back(size_of(frame.images[i]));
+      if (!info_.calibration) continue;
+      fit_first_image(*info_.calibration,
+                      i,
+                      sizes_.back(),
+                      where_of(topic, i == 0 ? *listed.first : *listed.second));
+    }
+    info_.width_px = sizes_.front().width_px;
+    info_.height_px = sizes_.front().height_px;
+  }
+
+  void describe_all(const InputOptions& options) {
+    const BagContent& content = bag_.content();
+    std::string used = printable(choice_.first.name);
+    if (choice_.second) used += " and " + printable(choice_.second->name);
+    for (std::size_t i = 0; i < content.topics.size(); ++i) {
+      const BagTopic& topic = content.topics[i];
+      const bool is_used =
+          i == choice_.first.topic || (choice_.second && i == choice_.second->topic);
+      info_.topics.push_back(
+          {printable(topic.name), printable(topic.type), topic.num_messages, is_used});
+      if (topic.type == "sensor_msgs/Imu") {
+        notes_.push_back(fmt::format("{} is not used: IMU", printable(topic.name)));
+      }
+    }
+    std::vector<std::string>& lines = info_.lines;
+    lines.push_back(
+        fmt::format("{}: {} ({})", path_.string(), bag_.title(), to_string(info_.setup)));
+    lines.push_back(describe_rate(info_.times_ns));
+    lines.push_back(
+        fmt::format("images of {}x{} px from {}", info_.width_px, info_.height_px, used));
+    lines.insert(lines.end(), notes_.begin(), notes_.end());
+    for (const std::string& fault : content.faults) lines.push_back("note: " + fault);
+    if (info_.counts.out_of_order > 0)
+      lines.push_back(describe_out_of_order(info_.counts.out_of_order, "messages"));
+    if (info_.counts.without_partner > 0) {
+      lines.push_back(fmt::format("note: {} frames have none of {} and are used without",
+                                  info_.counts.without_partner,
+                                  printable(choice_.second->name)));
+    }
+    lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
+  }
+
+  /// Masks are named by the index of the frame, as those of a video.
+  static std::string mask_name(std::size_t index) { return fmt::format("{:06}", index); }
+
+  std::filesystem::path path_;
+  Bag bag_;
+  MaskSource masks_;
+  bool has_jpeg_;
+  TopicChoice choice_;
+  std::optional<CameraChain> carried_;
+  std::vector<BagFrame> frames_;
+  FrameSelection selection_;
+  double units_per_m_ = kUnitsPerMetre;
+  InputInfo info_;
+  std::vector<std::string> notes_;
+  std::vector<ImageSize> sizes_;
+  std::size_t num_read_ = 0;
+  bool has_begun_ = false;  ///< A frame that was whole was given.
+};
+
+}  // namespace
+
+std::unique_ptr<Input> open_bag(const std::filesystem::path& path, const InputOptions& options) {
+  return std::make_unique<BagInput>(path, options);
+}
+
+}  // namespace waymark
