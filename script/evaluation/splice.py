@@ -109,9 +109,10 @@ class SplicedFrame:
         return self.part.sequence.true_pose(self.index)
 
 
-def splice(parts, folder):
+def splice(parts, folder, write_image=None):
     """Writes the parts one after another, with the layout, calibration and rate of the first one, and
-    returns the frames."""
+    returns the frames. Files are links, but those of images where write_image(source, target, index of
+    the frame, camera) writes them."""
     first = parts[0].sequence
     shutil.rmtree(folder, ignore_errors=True)
     for stream in first.streams:
@@ -123,10 +124,16 @@ def splice(parts, folder):
     for part in parts:
         for index in range(part.first, part.end, part.step):
             stamp, next_stamp = next_stamp, next_stamp + part.step * first.step_ns
-            for stream, file in zip(first.streams, part.sequence.files[index]):
-                hidden = part.is_black and stream != "depth"
-                link = folder / stream / file_name(first, len(frames), stamp)
-                link.symlink_to(black if hidden else file.resolve())
+            for camera, (stream, file) in enumerate(zip(first.streams, part.sequence.files[index])):
+                target = folder / stream / file_name(first, len(frames), stamp)
+                if stream == "depth":
+                    target.symlink_to(file.resolve())
+                elif part.is_black:
+                    target.symlink_to(black)
+                elif write_image:
+                    write_image(file, target, index, camera)
+                else:
+                    target.symlink_to(file.resolve())
             frames.append(SplicedFrame(stamp, part, index))
     write_listings(first, frames, folder)
     return frames
