@@ -78,8 +78,9 @@ class Tracker {
   std::optional<LocatedFrame> locate_near(const Frame& frame,
                                           const Rigid3& rig_from_world,
                                           double radius_px);
-  /// The same, the turn since then being told by the images.
+  /// From where the motion before leads, searched for as far as the tracker ever does.
   std::optional<LocatedFrame> locate_by_motion(const Frame& frame);
+  /// The same, the turn since then being told by the images.
   std::optional<LocatedFrame> locate_by_image(const Frame& frame);
   /// Its pose as the motion predicts it, but turned as its image tells. Nothing where that does not
   /// resemble the last one.
