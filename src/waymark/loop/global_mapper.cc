@@ -117,7 +117,7 @@ void GlobalMapper::consolidate_rest() {
 
 GlobalAdjustment AdjustmentTask::adjust() const {
   GlobalAdjustment adjustment =
-      adjust_globally(*map, submap, calibration ? &*calibration : nullptr);
+      calibration ? adjust_with_calibration(*map, *calibration) : adjust_globally(*map, submap);
   return is_for_calibration && !adjustment.calibration ? GlobalAdjustment{} : adjustment;
 }
 

@@ -173,6 +173,16 @@ BundleWindow whole_submap(const Map& map, SubmapId submap) {
   return window;
 }
 
+BundleWindow whole_map(const Map& map) {
+  BundleWindow window;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    const bool is_root = id == map.submaps().at(keyframe.submap.value).root;
+    (is_root ? window.fixed : window.moving).push_back(id);
+  });
+  map.landmarks().for_each([&](LandmarkId id, const Landmark&) { window.landmarks.push_back(id); });
+  return window;
+}
+
 bool is_supported(const Map& map, const Landmark& landmark) {
   if (num_observers(landmark) >= 2) return true;
   for (const Observation& observation : landmark.observations) {

@@ -28,6 +28,9 @@ BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_ke
 /// A whole sub-map; its root is fixed.
 BundleWindow whole_submap(const Map& map, SubmapId submap);
 
+/// All sub-maps; their roots are fixed.
+BundleWindow whole_map(const Map& map);
+
 /// What adjusting a window finds.
 struct WindowAdjustment {
   MapCorrection correction;           ///< Of all that moves, without scales.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "waymark/map/parts.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/test_calibration.h"
 
@@ -18,7 +19,7 @@ class CalibrateTest : public ::testing::Test {
                           double inverse_range_sigma = 0.0) {
     TestMap scene = look_around(std::move(truth), told, 16, pixel_sigma, inverse_range_sigma);
     const KnownCalibration known = KnownCalibration::as_given(told);
-    return adjust_globally(*scene.map.freeze(), scene.submap, &known);
+    return adjust_with_calibration(*scene.map.freeze(), known);
   }
 
   /// True value of a parameter less its estimate, in standard deviations; 1e9 without one.
@@ -87,6 +88,18 @@ TEST_F(CalibrateTest, LeavesWhatIsExact) {
   EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.k1", -0.2)), 3.0);
   EXPECT_EQ(found.calibration->sigma[0], 0.0);
   EXPECT_EQ(found.calibration->sigma[6], 5e-4) << "nothing is told of p1";
+}
+
+TEST_F(CalibrateTest, LearnsFromAllSubmapsTogether) {
+  const auto truth = make_described(1, make_test_pinhole(420.0));
+  const auto told = make_described(1, make_test_pinhole(432.0));
+  const KnownCalibration known = KnownCalibration::as_given(told);
+  TestMap part = look_around(truth, told, 5, 0.5);
+  EXPECT_FALSE(adjust_with_calibration(*part.map.freeze(), known).calibration.has_value());
+  Map all = unite(part.map, part.map);
+  for (int i = 0; i < 6; ++i) all = unite(all, part.map);
+  const GlobalAdjustment found = adjust_with_calibration(*all.freeze(), known);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam0.fu", -12.0)), 5.0);
 }
 
 TEST_F(CalibrateTest, LeavesWhatIsRight) {

@@ -16,7 +16,7 @@ GlobalAdjustment adjust(double told_offset, double inverse_range_sigma = 2e-3) {
   const auto told = std::make_shared<const Rig>(with_depth_offset(*truth, told_offset));
   TestMap scene = look_around(truth, told, 12, 0.3, inverse_range_sigma);
   const KnownCalibration known = KnownCalibration::as_given(told);
-  return adjust_globally(*scene.map.freeze(), scene.submap, &known);
+  return adjust_with_calibration(*scene.map.freeze(), known);
 }
 
 TEST(DepthOffset, IsFound) {

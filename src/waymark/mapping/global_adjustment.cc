@@ -32,12 +32,9 @@ double scale_around(const Map& map,
   return scale > 0.0 ? scale : 1.0;
 }
 
-}  // namespace
-
-GlobalAdjustment adjust_globally(const Map& frozen,
-                                 SubmapId submap,
-                                 const KnownCalibration* known) {
-  const BundleWindow window = whole_submap(frozen, submap);
+GlobalAdjustment adjust(const Map& frozen,
+                        BundleWindow window,
+                        const KnownCalibration* known = nullptr) {
   GlobalAdjustment adjustment;
   if (window.moving.empty() || window.landmarks.empty()) return adjustment;
   WindowAdjustment found =
@@ -45,12 +42,23 @@ GlobalAdjustment adjust_globally(const Map& frozen,
   adjustment.calibration = std::move(found.calibration);
   adjustment.correction = std::move(found.correction);
   adjustment.outliers = std::move(found.outliers);
-  adjustment.landmarks = window.landmarks;
-  if (frozen.submaps()[submap.value].is_metric) return adjustment;
+  adjustment.landmarks = std::move(window.landmarks);
   for (auto& move : adjustment.correction.keyframes) {
+    const SubmapId submap = frozen.keyframes().at(move.keyframe).submap;
+    if (frozen.submaps()[submap.value].is_metric) continue;
     move.scale = scale_around(frozen, move, adjustment.correction.landmarks);
   }
   return adjustment;
+}
+
+}  // namespace
+
+GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap) {
+  return adjust(frozen, whole_submap(frozen, submap));
+}
+
+GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known) {
+  return adjust(frozen, whole_map(frozen), &known);
 }
 
 void apply_adjustment(Map& map, const GlobalAdjustment& adjustment, DirtyLandmarks& dirty) {

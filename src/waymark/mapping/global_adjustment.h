@@ -8,7 +8,8 @@
 
 namespace waymark {
 
-/// What adjusting a whole sub-map finds, on a frozen map, for a map that has gone on since.
+/// What adjusting a whole sub-map, or all of them, finds, on a frozen map, for a map that has gone
+/// on since.
 struct GlobalAdjustment {
   MapCorrection correction;
   std::vector<Observation> outliers;
@@ -18,10 +19,11 @@ struct GlobalAdjustment {
 
 /// Bundle adjustment over all of a sub-map; its root stays. In mono the scale around each keyframe
 /// is how much further away the landmarks that it sees are than before, in the median. Any thread;
-/// nothing is shared. known: the calibration that is to be adjusted along, or null.
-GlobalAdjustment adjust_globally(const Map& frozen,
-                                 SubmapId submap,
-                                 const KnownCalibration* known = nullptr);
+/// nothing is shared.
+GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
+
+/// The same over all sub-maps, and the calibration along with them: each tells of it what it shows.
+GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known);
 
 /// Takes in what was found but the calibration: moves what was known, lets what is younger follow,
 /// drops outliers.

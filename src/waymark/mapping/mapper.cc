@@ -175,14 +175,14 @@ void Mapper::refresh_appearances() {
 }
 
 void Mapper::refine_globally(bool with_calibration) {
-  const std::vector<SubmapId> submaps = submaps_by_size(map_);
-  for (const SubmapId submap : submaps) {
-    const bool is_calibrating = with_calibration && submap == submaps.front();
-    for (int pass = 0; pass < kMaxRefinements; ++pass) {
-      const std::shared_ptr<const Rig> before = calibration_.rig;
-      apply(adjust_globally(map_, submap, is_calibrating ? &calibration_ : nullptr));
-      if (calibration_.rig == before) break;
-    }
+  if (!with_calibration) {
+    for (const SubmapId submap : submaps_by_size(map_)) apply(adjust_globally(map_, submap));
+    return;
+  }
+  for (int pass = 0; pass < kMaxRefinements; ++pass) {
+    const std::shared_ptr<const Rig> before = calibration_.rig;
+    apply(adjust_with_calibration(map_, calibration_));
+    if (calibration_.rig == before) break;
   }
 }
 

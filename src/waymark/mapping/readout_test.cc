@@ -45,7 +45,7 @@ class ReadoutTest : public ::testing::Test {
       scene.map.set_motion(id, motion);
     }
     const KnownCalibration known = KnownCalibration::as_given(told);
-    return adjust_globally(*scene.map.freeze(), scene.submap, &known);
+    return adjust_with_calibration(*scene.map.freeze(), known);
   }
 };
 
