@@ -172,4 +172,36 @@ std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
   return anew;
 }
 
+namespace {
+
+template <class T>
+void insert_at(std::vector<T>& values, std::size_t at, std::size_t count, const T& value) {
+  values.insert(values.begin() + static_cast<std::ptrdiff_t>(at), count, value);
+}
+
+}  // namespace
+
+Features with_points(const Features& features,
+                     const Rig& rig,
+                     std::span<const Keypoint> keypoints,
+                     std::span<const Descriptor> descriptors) {
+  WAYMARK_CHECK(keypoints.size() == descriptors.size());
+  const std::size_t at = features.num_corners();
+  const std::size_t count = keypoints.size();
+  Features result = features;
+  const auto offset = static_cast<std::ptrdiff_t>(at);
+  result.keypoints.insert(result.keypoints.begin() + offset, keypoints.begin(), keypoints.end());
+  result.descriptors.insert(
+      result.descriptors.begin() + offset, descriptors.begin(), descriptors.end());
+  insert_at(result.partner, at, count, kNoFeature);
+  insert_at(result.range_m, at, count, 0.0f);
+  insert_at(result.inverse_range_sigma, at, count, 0.0f);
+  result.num_primary += count;
+  for (std::uint32_t& partner : result.partner) {
+    if (partner != kNoFeature && partner >= at) partner += static_cast<std::uint32_t>(count);
+  }
+  derive_geometry(rig, result);
+  return result;
+}
+
 }  // namespace waymark

@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <vector>
 
 #include "waymark/camera/rig.h"
@@ -29,6 +30,13 @@ Eigen::Vector3d edge_normal_in_cam(const Features& features, std::size_t feature
 /// Ranges of the primary features that have a partner in camera 1, with their standard deviations:
 /// from the angle between the two in the epipolar plane. rig: two cameras, some distance apart.
 void measure_stereo_ranges(const Rig& rig, Features& features);
+
+/// Features and in addition points of camera 0 that were found otherwise, without range: they
+/// become its last corners. Keypoints and descriptors of these are parallel.
+Features with_points(const Features& features,
+                     const Rig& rig,
+                     std::span<const Keypoint> keypoints,
+                     std::span<const Descriptor> descriptors);
 
 /// The same features as a rig of the same cameras measures them that is calibrated otherwise:
 /// bearings, level_pixel_from_bearing, sizes and ranges anew. Where a pixel has no bearing any more

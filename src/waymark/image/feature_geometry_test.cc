@@ -54,6 +54,34 @@ TEST(FeatureGeometry, IsThatOfFramesFromImages) {
   }
 }
 
+TEST(FeatureGeometry, TakesPointsInAsItsLastCorners) {
+  const PaddedImage texture = testing::make_texture(332, 240, 5);
+  const ImageView left{texture.row(0), 320, 240, texture.stride()};
+  const ImageView right{texture.row(0) + 12, 320, 240, texture.stride()};
+  FrameBuilder builder(make_rig(), {.features = {.count = 300}});
+  const auto built = builder.build({.image0 = left, .image1 = right});
+  ASSERT_GT(built->size(), built->num_primary);
+  const std::vector<Keypoint> keypoints = {{.x_px = 100.0f, .y_px = 50.0f, .level = 4},
+                                           {.x_px = 30.0f, .y_px = 200.0f, .level = 4}};
+  const Features all =
+      with_points(*built, make_rig(), keypoints, std::vector<Descriptor>{{1, 2, 3, 4}, {}});
+  ASSERT_EQ(all.num_corners(), built->num_corners() + 2);
+  ASSERT_EQ(all.size(), built->size() + 2);
+  const std::size_t first = built->num_corners();
+  EXPECT_EQ(all.keypoints[first].x_px, 100.0f);
+  EXPECT_EQ(all.descriptors[first], (Descriptor{1, 2, 3, 4}));
+  EXPECT_EQ(all.partner[first], kNoFeature);
+  EXPECT_EQ(all.inverse_range_sigma[first], 0.0f);
+  for (std::size_t i = 0; i < built->num_primary; ++i) {
+    const std::size_t now = i < first ? i : i + 2;
+    EXPECT_EQ(all.bearings[now], built->bearings[i]);
+    EXPECT_EQ(all.range_m[now], built->range_m[i]);
+    if (built->partner[i] == kNoFeature) continue;
+    EXPECT_EQ(all.partner[all.partner[now]], now);
+    EXPECT_EQ(all.keypoints[all.partner[now]].x_px, built->keypoints[built->partner[i]].x_px);
+  }
+}
+
 TEST(FeatureGeometry, SaysWhichPixelsHaveNoBearing) {
   Features features;
   features.keypoints = {{.x_px = 160.0f, .y_px = 120.0f}, {.x_px = 1e6f, .y_px = 120.0f}};

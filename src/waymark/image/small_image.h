@@ -11,10 +11,14 @@ namespace waymark {
 struct SmallImage {
   Image grey;  ///< Means over these squares; incomplete ones are left out.
   Image mask;  ///< 0 where the frame is not looked at. Empty: it is everywhere.
+  /// Means over smaller squares, from which patches are aligned: at most 320 pixels to a side.
+  Image detail;
 };
 
 /// Its size as part of that of an image.
 double small_image_factor(int width_px, int height_px);
+/// That of `detail`.
+double detail_factor(int width_px, int height_px);
 
 /// mask: empty or of the size of the image.
 SmallImage make_small_image(ImageView image, ImageView mask);

@@ -45,6 +45,7 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       seed_(seed),
       initializer_(rig, has_range, seed),
       turn_aligner_(rig->cameras.at(0).camera),
+      patch_locator_(rig),
       locator_(rig),
       relocalizer_(rig, settings, seed),
       keyframe_assessor_(rig, has_range),
@@ -54,6 +55,7 @@ void Tracker::look_with(std::shared_ptr<const Rig> rig) {
   rig_ = std::move(rig);
   initializer_ = Initializer(rig_, has_range_, seed_);
   turn_aligner_ = TurnAligner(rig_->cameras[0].camera);
+  patch_locator_ = PatchLocator(rig_);
   locator_ = FrameLocator(rig_);
   relocalizer_ = Relocalizer(rig_, settings_, seed_);
   keyframe_assessor_ = KeyframeAssessor(rig_, has_range_);
@@ -101,6 +103,7 @@ TrackOutcome Tracker::track(const Frame& seen, const MapSnapshot& visible, Stage
   if (!first) first = recover(frame, times);
   if (first) frame = straightened(frame, *first);
   std::optional<LocatedFrame> located = locate_in_local_map(frame, std::move(first), times);
+  if (!located) located = locate_by_patches(frame, times);
   if (!located) located = locate_in_local_map(frame, relocalize(frame, times), times);
   if (!located) return lose(frame, relocalizer_.diagnosis(), times);
   return accept(frame, *std::move(located), times);
@@ -143,6 +146,25 @@ std::optional<LocatedFrame> Tracker::locate_near(const Frame& frame,
   LocatedFrame located =
       locator_.locate(*frame.features, *map_, rig_from_world, std::move(matched));
   if (located.num_inliers < settings_.min_inliers / 2) return std::nullopt;
+  return located;
+}
+
+std::optional<LocatedFrame> Tracker::locate_by_patches(Frame& frame, StageTimes& times) {
+  if (mode_ != Mode::kTracking || !last_.has_pose() || !last_.image()) return std::nullopt;
+  StageTimer timer(times, Stage::kRecover);
+  if (local_map_source_ != map_) {
+    gather_local_map(*map_, last_.landmarks(*map_).ids, last_.reference(), local_);
+    local_map_source_ = map_;
+    local_map_age_ = 0;
+  }
+  const LocatedPatches before{*last_.image(), last_.rig_from_world()};
+  const auto found =
+      patch_locator_.align(before, local_.landmarks, frame, last_.predict(frame.timestamp_ns));
+  if (!found) return std::nullopt;
+  LocatedFrame located = patch_locator_.pose_of(before, *found);
+  located.landmarks = locator_.find(
+      *frame.features, local_.landmarks, located.rig_from_world, {.radius_px = kLocatedRadiusPx});
+  patch_locator_.add_features(*found, local_.landmarks, frame, located);
   return located;
 }
 

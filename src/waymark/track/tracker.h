@@ -17,6 +17,7 @@
 #include "waymark/track/last_frame.h"
 #include "waymark/track/local_map.h"
 #include "waymark/track/map_snapshot.h"
+#include "waymark/track/patch_locator.h"
 #include "waymark/track/pose_refiner.h"
 #include "waymark/track/relocalizer.h"
 #include "waymark/track/sent_ids.h"
@@ -82,6 +83,9 @@ class Tracker {
   std::optional<LocatedFrame> locate_by_motion(const Frame& frame);
   /// The same, the turn since then being told by the images.
   std::optional<LocatedFrame> locate_by_image(const Frame& frame);
+  /// From the images around the landmarks, where features do not tell. The frame gets features that
+  /// show those whose surroundings are alike.
+  std::optional<LocatedFrame> locate_by_patches(Frame& frame, StageTimes& times);
   /// Its pose as the motion predicts it, but turned as its image tells. Nothing where that does not
   /// resemble the last one.
   std::optional<Rigid3> predict_by_image(const Frame& frame);
@@ -113,6 +117,7 @@ class Tracker {
   Initializer initializer_;
   AppearanceMatcher appearance_;
   TurnAligner turn_aligner_;
+  PatchLocator patch_locator_;
   FrameLocator locator_;
   Relocalizer relocalizer_;
   KeyframeAssessor keyframe_assessor_;

@@ -1,0 +1,266 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/match/patch_alignment.h"
+
+#include <Eigen/Cholesky>
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "waymark/base/median.h"
+#include "waymark/image/convert.h"
+#include "waymark/image/sample.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::size_t kNumPatchLevels = 3;
+constexpr int kMaxPatchSteps = 10;
+/// A patch has 5 x 5 pixels.
+constexpr int kRadius = 2;
+constexpr std::size_t kPatchPixels = (2 * kRadius + 1) * (2 * kRadius + 1);
+/// In pixels of the level.
+constexpr double kSmallStep = 0.02;
+/// Grey values are off by so much at least, by noise and since patches are no planes.
+constexpr float kMinErrorGrey = 1.0f;
+/// What the pose may be off before, in radians and parts of the distance: all but free.
+constexpr double kPriorSigma = 0.2;
+
+/// Of a point's own patch, and in grey values squared.
+constexpr double kMinCorrelation = 0.7;
+constexpr double kMinVariance = 0.5;
+/// Points are spread, one for each square of this side.
+constexpr int kCellPx = 16;
+
+/// The derivative of exp(xi) * point by xi.
+Eigen::Matrix<double, 3, 6> moved_by(const Eigen::Vector3d& point) {
+  Eigen::Matrix<double, 3, 6> by;
+  by << Eigen::Matrix3d::Identity(), -skew(point);
+  return by;
+}
+
+/// Sums that tell the correlation of pairs.
+struct Pairs {
+  double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
+
+  void add(double in_a, double in_b) {
+    n += 1.0, a += in_a, b += in_b;
+    aa += in_a * in_a, bb += in_b * in_b, ab += in_a * in_b;
+  }
+  /// Whether the patch is more than noise in both.
+  bool has_contrast() const { return aa > kMinVariance * n && bb > kMinVariance * n; }
+  double correlation() const {
+    const double variance_a = aa - a * a / n;
+    const double variance_b = bb - b * b / n;
+    if (!(variance_a > 0.0) || !(variance_b > 0.0)) return 0.0;  // Nothing to see.
+    return (ab - a * b / n) / std::sqrt(variance_a * variance_b);
+  }
+};
+
+}  // namespace
+
+PatchAligner::PatchAligner(std::shared_ptr<const Camera> camera, double factor)
+    : camera_(std::move(camera)), factor_(factor) {}
+
+void PatchAligner::build_levels() {
+  double factor = factor_;
+  for (std::size_t i = 0; i < kNumPatchLevels; ++i, factor *= 0.5) {
+    levels_.push_back(ScaledCamera::resized(camera_, factor));
+  }
+}
+
+void PatchAligner::choose_points(std::size_t index, std::span<const Eigen::Vector3d> points_in_a) {
+  const ScaledCamera& camera = levels_[index];
+  const Image& image = a_[index];
+  const bool wraps = camera.wrap_width_px() > 0.0;
+  const int width = image.width_px;
+  points_ = {};
+  pixels_.resize(points_in_a.size()), is_seen_.resize(points_in_a.size());
+  camera.project(points_in_a, pixels_, is_seen_);
+  std::vector<Eigen::Vector2d> patch;
+  std::vector<double> ranges;
+  for (std::size_t i = 0; i < points_in_a.size(); ++i) {
+    const auto x0 = static_cast<int>(std::lround(pixels_[i].x()));
+    const auto y0 = static_cast<int>(std::lround(pixels_[i].y()));
+    const int margin = kRadius + 1;
+    if (!is_seen_[i] || y0 < margin || y0 + margin >= image.height_px) continue;
+    if (!wraps && (x0 < margin || x0 + margin >= width)) continue;
+    for (int y = y0 - kRadius; y <= y0 + kRadius; ++y) {
+      for (int x = x0 - kRadius; x <= x0 + kRadius; ++x) {
+        patch.emplace_back((x + width) % width, y);
+        ranges.push_back(points_in_a[i].norm());
+      }
+    }
+    points_.indices.push_back(static_cast<std::uint32_t>(i));
+  }
+  const std::size_t count = patch.size();
+  bearings_.resize(count), pixels_.resize(count), is_seen_.resize(count);
+  pixel_from_point_.resize(count);
+  camera.unproject(patch, bearings_, is_seen_);
+  for (std::size_t k = 0; k < count; ++k) points_.points.push_back(ranges[k] * bearings_[k]);
+  camera.project_with_jacobian(points_.points, pixels_, pixel_from_point_, is_seen_);
+  for (std::size_t k = 0; k < count; ++k) {
+    const auto x = static_cast<int>(patch[k].x());
+    const auto y = static_cast<int>(patch[k].y());
+    const std::uint8_t* const row = image.row(y);
+    const Eigen::RowVector2d slope(0.5 * (row[(x + 1) % width] - row[(x + width - 1) % width]),
+                                   0.5 * (image.row(y + 1)[x] - image.row(y - 1)[x]));
+    const bool is_usable = is_seen_[k] && pixel_from_point_[k].allFinite();
+    points_.gradients.push_back(
+        is_usable
+            ? Vector6d((slope * pixel_from_point_[k] * moved_by(points_.points[k])).transpose())
+            : Vector6d::Zero());
+    points_.greys.push_back(row[x]);
+  }
+  for (std::size_t first = 0; first < count; first += kPatchPixels) {
+    Eigen::Map<Eigen::ArrayXf> greys(&points_.greys[first], kPatchPixels);
+    greys -= greys.mean();
+    Vector6d mean = Vector6d::Zero();
+    for (std::size_t k = first; k < first + kPatchPixels; ++k) mean += points_.gradients[k];
+    mean /= static_cast<double>(kPatchPixels);
+    for (std::size_t k = first; k < first + kPatchPixels; ++k) points_.gradients[k] -= mean;
+  }
+  if (!ranges.empty()) range_ = median(ranges);
+  moved_.resize(count), seen_greys_.resize(count);
+}
+
+void PatchAligner::look(std::size_t index, const Rigid3& b_from_a) {
+  const ScaledCamera& camera = levels_[index];
+  for (std::size_t k = 0; k < moved_.size(); ++k) moved_[k] = b_from_a * points_.points[k];
+  camera.project(moved_, pixels_, is_seen_);
+  const bool wraps = camera.wrap_width_px() > 0.0;
+  for (std::size_t k = 0; k < moved_.size(); ++k) {
+    seen_greys_[k] = is_seen_[k] ? sample(b_[index], pixels_[k], wraps) : 0.0f;
+  }
+  centre();
+}
+
+/// What is left of the patches' grey values without each one's mean.
+void PatchAligner::centre() {
+  for (std::size_t first = 0; first < seen_greys_.size(); first += kPatchPixels) {
+    const auto seen = std::span(is_seen_).subspan(first, kPatchPixels);
+    if (std::ranges::count(seen, 0) > 0) std::ranges::fill(seen, std::uint8_t{0});
+    Eigen::Map<Eigen::ArrayXf> greys(&seen_greys_[first], kPatchPixels);
+    greys -= greys.mean();
+  }
+}
+
+double PatchAligner::step(PatchAlignment& alignment) {
+  errors_.clear();
+  const auto gain = static_cast<float>(alignment.gain);
+  const auto error = [&](std::size_t k) { return seen_greys_[k] - gain * points_.greys[k]; };
+  for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
+    if (is_seen_[k]) errors_.push_back(std::abs(error(k)));
+  }
+  if (errors_.empty()) return 0.0;
+  const float sigma = std::max(kMinErrorGrey, 1.4826f * median(errors_));
+  const float limit = 1.345f * sigma;  // Huber 1964.
+  using Vector7d = Eigen::Vector<double, 7>;
+  Vector7d unit = Vector7d::Ones();
+  unit.head<3>().setConstant(range_);  // So that lengths are of the size of angles.
+  Eigen::Matrix<double, 7, 7> hessian = Eigen::Matrix<double, 7, 7>::Zero();
+  hessian.diagonal().head<6>().setConstant(std::pow(sigma / kPriorSigma, 2));
+  hessian(6, 6) = std::pow(sigma / kPriorSigma, 2);
+  Vector7d gradient = Vector7d::Zero();
+  gradient[6] = hessian(6, 6) * (1.0 - alignment.gain);
+  for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
+    if (!is_seen_[k]) continue;
+    Vector7d jacobian;
+    jacobian << alignment.gain * points_.gradients[k], points_.greys[k];
+    jacobian.array() *= unit.array();
+    const float e = error(k);
+    const double weight = std::min(1.0f, limit / std::max(std::abs(e), 1e-6f));
+    hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
+    gradient += weight * e * jacobian;
+  }
+  const Vector7d change =
+      unit.cwiseProduct(hessian.selfadjointView<Eigen::Lower>().ldlt().solve(gradient));
+  if (!change.allFinite()) return 0.0;
+  const Vector6d motion = change.head<6>();
+  alignment.b_from_a = alignment.b_from_a * Rigid3::exp(-motion);
+  alignment.gain += change[6];
+  Eigen::Matrix<double, 7, 7> full = hessian.selfadjointView<Eigen::Lower>();
+  full.array() *= (unit.cwiseInverse() * unit.cwiseInverse().transpose()).array();
+  information_ = full.topLeftCorner<6, 6>() / (sigma * sigma);
+  const double pixels_per_rad = std::max(1.0, pixel_from_point_.front().norm() * range_);
+  return (motion.head<3>().norm() / range_ + motion.tail<3>().norm()) * pixels_per_rad;
+}
+
+void PatchAligner::judge(PatchAlignment& alignment) {
+  Pairs pairs;
+  for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
+    if (is_seen_[k]) pairs.add(points_.greys[k], seen_greys_[k]);
+  }
+  alignment.num_points = static_cast<int>(pairs.n) / static_cast<int>(kPatchPixels);
+  if (alignment.num_points == 0) return;
+  alignment.correlation = pairs.correlation();
+  choose_alike(alignment);
+  const Matrix6d in_a = information_.ldlt().solve(Matrix6d::Identity());
+  double sum = 0.0;
+  for (std::size_t k = 0; k < points_.points.size(); k += kPatchPixels) {
+    const Eigen::Matrix<double, 2, 6> by = pixel_from_point_[k] * moved_by(points_.points[k]);
+    sum += (by * in_a * by.transpose()).trace();
+  }
+  const auto count = static_cast<double>(points_.points.size() / kPatchPixels);
+  alignment.pixel_sigma = std::sqrt(sum / count);
+  const Matrix6d adjoint = alignment.b_from_a.adjoint();
+  alignment.covariance = adjoint * in_a * adjoint.transpose();
+}
+
+/// The most alike of each cell of the image.
+void PatchAligner::choose_alike(PatchAlignment& alignment) const {
+  const int columns = b_[0].width_px / kCellPx + 1;
+  const int rows = b_[0].height_px / kCellPx + 1;
+  struct Best {
+    double correlation = kMinCorrelation;
+    std::optional<std::uint32_t> index;
+  };
+  std::vector<Best> best(static_cast<std::size_t>(columns * rows));
+  for (std::size_t i = 0; i < points_.indices.size(); ++i) {
+    const std::size_t first = i * kPatchPixels;
+    if (!is_seen_[first]) continue;
+    Pairs pairs;
+    for (std::size_t k = first; k < first + kPatchPixels; ++k) {
+      pairs.add(points_.greys[k], seen_greys_[k]);
+    }
+    const Eigen::Vector2d& pixel = pixels_[first + kPatchPixels / 2];
+    const int column = std::clamp(static_cast<int>(pixel.x()) / kCellPx, 0, columns - 1);
+    const int row = std::clamp(static_cast<int>(pixel.y()) / kCellPx, 0, rows - 1);
+    Best& cell = best[static_cast<std::size_t>(row * columns + column)];
+    const double correlation = pairs.has_contrast() ? pairs.correlation() : 0.0;
+    if (correlation > cell.correlation) cell = {correlation, points_.indices[i]};
+  }
+  for (const Best& cell : best) {
+    if (cell.index) alignment.alike.push_back(*cell.index);
+  }
+  std::ranges::sort(alignment.alike);
+}
+
+PatchAlignment PatchAligner::align(const Image& a,
+                                   std::span<const Eigen::Vector3d> points_in_a,
+                                   const Image& b,
+                                   const Rigid3& initial_b_from_a) {
+  PatchAlignment alignment;
+  alignment.b_from_a = initial_b_from_a;
+  if (levels_.empty()) build_levels();
+  a_.assign(1, a);
+  b_.assign(1, b);
+  while (a_.size() < kNumPatchLevels) {
+    a_.push_back(reduce(a_.back().view(), 0.5));
+    b_.push_back(reduce(b_.back().view(), 0.5));
+  }
+  for (std::size_t level = kNumPatchLevels; level-- > 0;) {
+    choose_points(level, points_in_a);
+    if (points_.points.empty()) return alignment;
+    for (int i = 0; i < kMaxPatchSteps; ++i) {
+      look(level, alignment.b_from_a);
+      if (step(alignment) < kSmallStep) break;
+    }
+  }
+  look(0, alignment.b_from_a);
+  judge(alignment);
+  return alignment;
+}
+
+}  // namespace waymark

@@ -1,0 +1,98 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/patch_locator.h"
+
+#include <algorithm>
+#include <cstddef>
+#include <utility>
+
+#include "waymark/image/feature_geometry.h"
+#include "waymark/image/pyramid.h"
+#include "waymark/image/small_image.h"
+
+namespace waymark {
+namespace {
+
+double factor_of(const Rig& rig) {
+  const Camera& camera = *rig.cameras.at(0).camera;
+  return detail_factor(camera.width_px(), camera.height_px());
+}
+
+std::uint8_t level_of(double scale) {
+  std::uint8_t level = 0;
+  while (level + 1 < Pyramid::kNumLevels && Pyramid::scale(level) < scale) ++level;
+  return level;
+}
+
+}  // namespace
+
+PatchLocator::PatchLocator(std::shared_ptr<const Rig> rig)
+    : rig_(std::move(rig)),
+      scale_(1.0 / factor_of(*rig_)),
+      level_(level_of(scale_)),
+      aligner_(rig_->cameras[0].camera, 1.0 / scale_) {}
+
+std::optional<PatchAlignment> PatchLocator::align(const LocatedPatches& before,
+                                                  const LandmarkSet& around,
+                                                  const Frame& frame,
+                                                  const Rigid3& predicted) {
+  if (!frame.image || frame.image->detail.values.empty() || before.image.detail.values.empty()) {
+    return std::nullopt;
+  }
+  const Rigid3& cam_from_rig = rig_->cameras[0].cam_from_rig;
+  const Rigid3 cam_from_world = cam_from_rig * before.rig_from_world;
+  points_in_cam_.clear();
+  for (const Eigen::Vector3d& point : around.positions_in_world) {
+    points_in_cam_.push_back(cam_from_world * point);
+  }
+  PatchAlignment found = aligner_.align(before.image.detail,
+                                        points_in_cam_,
+                                        frame.image->detail,
+                                        cam_from_rig * predicted * cam_from_world.inverse());
+  if (!found.is_certain()) return std::nullopt;
+  return found;
+}
+
+LocatedFrame PatchLocator::pose_of(const LocatedPatches& before,
+                                   const PatchAlignment& found) const {
+  const Rigid3& cam_from_rig = rig_->cameras[0].cam_from_rig;
+  const Rigid3 rig_from_cam = cam_from_rig.inverse();
+  LocatedFrame located;
+  located.rig_from_world = rig_from_cam * found.b_from_a * cam_from_rig * before.rig_from_world;
+  const Matrix6d adjoint = rig_from_cam.adjoint();
+  located.covariance = adjoint * found.covariance * adjoint.transpose();
+  return located;
+}
+
+void PatchLocator::add_features(const PatchAlignment& found,
+                                const LandmarkSet& around,
+                                Frame& frame,
+                                LocatedFrame& located) const {
+  std::vector<LandmarkId> known = primary_landmarks(*frame.features, located.landmarks);
+  std::ranges::sort(known);
+  std::vector<Keypoint> keypoints;
+  std::vector<Descriptor> descriptors;
+  std::vector<LandmarkId> landmarks;
+  for (const std::uint32_t i : found.alike) {
+    if (std::ranges::binary_search(known, around.ids[i])) continue;
+    const Eigen::Vector3d point = found.b_from_a * points_in_cam_[i];
+    Eigen::Vector2d pixel;
+    std::uint8_t is_visible = 0;
+    rig_->cameras[0].camera->project({&point, 1}, {&pixel, 1}, {&is_visible, 1});
+    if (!is_visible) continue;
+    Keypoint keypoint;
+    keypoint.x_px = static_cast<float>(pixel.x());
+    keypoint.y_px = static_cast<float>(pixel.y());
+    keypoint.level = level_;
+    keypoints.push_back(keypoint);
+    descriptors.push_back(around.descriptors[i]);
+    landmarks.push_back(around.ids[i]);
+  }
+  const auto at = static_cast<std::ptrdiff_t>(frame.features->num_corners());
+  located.landmarks.insert(located.landmarks.begin() + at, landmarks.begin(), landmarks.end());
+  frame.features =
+      std::make_shared<const Features>(with_points(*frame.features, *rig_, keypoints, descriptors));
+  located.num_matches = located.num_inliers = num_valid(located.landmarks);
+}
+
+}  // namespace waymark

@@ -1,0 +1,54 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <vector>
+
+#include "waymark/match/landmark_set.h"
+#include "waymark/match/patch_alignment.h"
+#include "waymark/track/frame.h"
+#include "waymark/track/frame_locator.h"
+
+namespace waymark {
+
+/// Where an image was taken before, as its patches are compared with.
+struct LocatedPatches {
+  const SmallImage& image;
+  const Rigid3& rig_from_world;
+};
+
+/// Pose of a frame from the images around landmarks, where corners do not tell: by aligning them
+/// directly with those of the frame before. The landmarks that look alike there become features of
+/// the frame, so that keyframes, new landmarks and adjustments rest on them as on others.
+class PatchLocator {
+ public:
+  explicit PatchLocator(std::shared_ptr<const Rig> rig);
+
+  /// around: landmarks that surround the camera; predicted: the frame's rig_from_world by the
+  /// motion before. Nothing where the images do not tell, or the frame has none.
+  std::optional<PatchAlignment> align(const LocatedPatches& before,
+                                      const LandmarkSet& around,
+                                      const Frame& frame,
+                                      const Rigid3& predicted);
+
+  /// The pose that an alignment of the last call tells.
+  LocatedFrame pose_of(const LocatedPatches& before, const PatchAlignment& found) const;
+
+  /// Adds features that show landmarks around, as aligned in the last call, to a frame and to what
+  /// is known of it; but of those whose landmark it shows already.
+  void add_features(const PatchAlignment& found,
+                    const LandmarkSet& around,
+                    Frame& frame,
+                    LocatedFrame& located) const;
+
+ private:
+  std::shared_ptr<const Rig> rig_;
+  double scale_ = 1.0;      ///< Pixels of the image per pixel of its detail.
+  std::uint8_t level_ = 0;  ///< Of features that are known as well as these pixels tell.
+  PatchAligner aligner_;
+  std::vector<Eigen::Vector3d> points_in_cam_;  ///< When the image before was taken.
+};
+
+}  // namespace waymark
