@@ -13,6 +13,8 @@
 #include "numbers.h"
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"
+#include "waymark/report/advice.h"
+#include "waymark/report/report.h"
 #include "waymark/session/another_pass.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
@@ -34,6 +36,7 @@ struct RunOptions {
   double pace = 0.0;             ///< Times the input's own rate; 0: as fast as possible.
   std::optional<Timing> timing;  ///< Nothing: what suits the input.
   std::string viewer;            ///< [HOST:]PORT; empty: off.
+  bool has_report = false;       ///< Whether a page on it is among the results.
 };
 
 void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
@@ -64,6 +67,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             1e3 * summary.wall_s / num_frames,
                             summary.tracking_ms.mean,
                             options.report.out.string()));
+  report_advice(reporter, summary);
 }
 
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
@@ -167,11 +171,12 @@ void save_results(const RunOptions& options,
                   Autosave& autosave,
                   const std::function<void()>& report,
                   Reporter& reporter) {
-  save_each({[&] { write_results(options.report.out, results); },
+  const std::filesystem::path& out = options.report.out;
+  save_each({[&] { write_results(out, results); },
              [&] {
-               write_calibration(
-                   options.report.out, session, *session.system->rig(), results.summary);
+               if (options.has_report) write_report(out);
              },
+             [&] { write_calibration(out, session, *session.system->rig(), results.summary); },
              [&] {
                if (options.map_out.empty()) return;
                save_final_map(*session.system, options, autosave, reporter);
@@ -206,6 +211,7 @@ std::optional<int> finish(const RunOptions& options,
   }
   const auto again = first || has_ended ? std::nullopt : begin_again(session, options);
   if (first) add_first(first->results.summary, results.summary);
+  results.summary.advice = advise(results.table, results.summary);
   const auto last = [&] {
     if (!again) report(results);
   };
@@ -325,6 +331,9 @@ void add_run_command(CLI::App& program, Command& command) {
                   "Show the session in the browser, at this port of this machine [off]")
       ->type_name("[HOST:]PORT");
   add_map_options(run_command, *options);
+  run_command.add_flag("--report",
+                       options->has_report,
+                       "Write a page on the run, report.html, among the results [off]");
   add_report_options(run_command, options->report, options->session.seed);
   run_command.callback([options, &command] {
     command = [options] {
