@@ -26,11 +26,11 @@ constexpr double kMaxCloudMargin = 1.0;
 constexpr double kStrayPart = 0.02;
 
 // Small, so that text is large where it is shrunk to a phone's width.
-constexpr int kWidth = 480;
-constexpr int kPathHeight = 400;
-constexpr int kCurveHeight = 300;
-constexpr Chart::Frame kViewFrame{62, 12, 404, 330};
-constexpr Chart::Frame kCurveFrame{62, 12, 404, 230};
+constexpr int kWidth = 420;
+constexpr int kPathHeight = 372;
+constexpr int kCurveHeight = 262;
+constexpr Chart::Frame kViewFrame{60, 10, 350, 310};
+constexpr Chart::Frame kCurveFrame{60, 10, 350, 200};
 
 constexpr double kTimelineHeight = 100.0;
 

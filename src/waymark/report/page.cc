@@ -22,7 +22,7 @@ section{background:#fff;border:1px solid var(--line);border-radius:10px;padding:
 p{margin:.4em 0;overflow-wrap:anywhere}
 .note,.lead{color:var(--soft)}
 .note{font-size:.88rem}
-.badge{display:inline-block;border-radius:99px;padding:0 .7em;color:#fff;font-weight:600;font-size:.9em}
+.badge{display:inline-block;border-radius:99px;padding:0 .7em;color:#fff;font-weight:600;font-size:.9em;white-space:nowrap}
 .badge.good{background:var(--good)}.badge.check{background:var(--check)}.badge.bad{background:var(--bad)}
 .tip{border-left:4px solid var(--check);padding:.1em .8em;margin:.8em 0}
 .side-by-side{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,340px),1fr));gap:16px}
@@ -57,7 +57,13 @@ path.grid{stroke:#e8ecef}.axis{stroke:#8a97a3}
 .key{white-space:nowrap;margin-left:.8em}.key i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.35em}
 .axis-x{display:flex;justify-content:space-between;color:var(--soft);font-size:.85rem}
 #cursor{position:absolute;top:0;bottom:0;width:1px;background:var(--ink);pointer-events:none}
-.bars td:last-child{width:50%}.bar{height:.8em;background:#7fb0e8;border-radius:2px;min-width:1px}
+.facts td:first-child{width:10em;color:var(--soft)}
+.bar-box{min-width:8rem}.bar{margin-top:.3em;height:.8em;background:#7fb0e8;border-radius:2px;min-width:1px}
+@media(max-width:600px){
+main{padding:12px 8px 32px}section{padding:12px}
+.stack thead{display:none}.stack tr{display:block;padding:.5em 0;border-bottom:1px solid var(--line)}
+.stack td{display:inline-block;border:0;padding:.1em .6em .1em 0;min-width:0}.stack td:first-child{font-weight:600}
+.stack td:last-child{display:block;color:var(--soft);font-size:.88rem}}
 @media print{body{background:#fff}section{break-inside:avoid}}
 )";
 
@@ -107,8 +113,10 @@ std::string badge(Grade grade) {
 }
 
 std::string table_of(const std::vector<std::string>& head,
-                     const std::vector<std::vector<std::string>>& rows) {
-  std::string html = "<div class=\"scroll\"><table>\n";
+                     const std::vector<std::vector<std::string>>& rows,
+                     std::string_view style) {
+  const std::string_view shown_style = head.empty() ? "facts" : style;
+  std::string html = fmt::format("<div class=\"scroll\"><table class=\"{}\">\n", shown_style);
   if (!head.empty()) {
     html += "<thead><tr>";
     for (const std::string& cell : head) html += "<th scope=\"col\">" + cell + "</th>";

@@ -22,8 +22,10 @@ std::string section(std::string_view heading, std::string_view body);
 /// A grade as it is shown everywhere.
 std::string badge(Grade grade);
 
-/// A table; cells are HTML. head: empty for none.
+/// A table; cells are HTML. head: empty for one of names and what they stand for. style: a class;
+/// "stack" puts the cells of a row below each other where there is little room.
 std::string table_of(const std::vector<std::string>& head,
-                     const std::vector<std::vector<std::string>>& rows);
+                     const std::vector<std::vector<std::string>>& rows,
+                     std::string_view style = "");
 
 }  // namespace waymark

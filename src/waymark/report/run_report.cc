@@ -54,7 +54,7 @@ std::string quality_section(const Verdict& verdict) {
                     escaped(judgement.value),
                     escaped(judgement.why)});
   }
-  return section("Quality", table_of({"What", "Grade", "Value", "Why"}, rows));
+  return section("Quality", table_of({"What", "Grade", "Value", "Why"}, rows, "stack"));
 }
 
 std::string advice_section(const RunFolder& run) {
@@ -269,8 +269,11 @@ std::string time_section(const RunSummary& summary) {
         {escaped(name),
          fmt::format("{:.2f} ms", times.mean),
          fmt::format("{:.2f} ms", times.p95),
-         has_bar ? fmt::format("<div class=\"bar\" style=\"width:{:.0f}%\"></div>", 100.0 * part)
-                 : ""});
+         has_bar
+             ? fmt::format(
+                   "<div class=\"bar-box\"><div class=\"bar\" style=\"width:{:.0f}%\"></div></div>",
+                   100.0 * part)
+             : ""});
   };
   for (const auto& [stage, times] : summary.stages_ms) add(stage, times, true);
   add("tracking, per frame", summary.tracking_ms, false);

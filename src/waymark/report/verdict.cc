@@ -39,7 +39,7 @@ constexpr Limits kAtePercent{1.0, 3.0};
 constexpr Limits kMissing{0.01, 0.2};
 /// By how much of itself a focal length may be changed by the images before the rest of a
 /// calibration is in doubt, too.
-constexpr double kFocalChange = 0.02;
+constexpr double kFocalChange = 0.03;
 
 Grade grade_of(double value, const Limits& limits) {
   const bool is_more_better = limits.good > limits.bad;
