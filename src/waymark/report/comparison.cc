@@ -63,7 +63,7 @@ std::string style_of(std::size_t index) {
 /// A line as in the drawings, and the name.
 std::string key_of(std::size_t index, const RunFolder& run) {
   return fmt::format(
-      "<svg viewBox=\"0 0 24 6\" style=\"width:24px\" aria-hidden=\"true\"><path {} d=\"M0 "
+      "<svg viewBox=\"0 0 24 6\" class=\"key-line\" aria-hidden=\"true\"><path {} d=\"M0 "
       "3H24\"/></svg>{}",
       style_of(index),
       escaped(run.name));
@@ -101,9 +101,9 @@ std::vector<ComparedFigure> figures_of_frames() {
              100.0 * static_cast<double>(summary.num_trajectory_lines) /
                  static_cast<double>(std::max<std::size_t>(summary.counts.frames, 1)));
        }},
-      {"Lost",
+      {"Losses",
        [](const ComparedRun& one) {
-         return fmt::format("{} times", one.run->summary.counts.lost_count);
+         return fmt::format("{}", one.run->summary.counts.lost_count);
        }},
       {"Parts of the map",
        [](const ComparedRun& one) { return fmt::format("{}", one.run->summary.submaps); }},

@@ -19,9 +19,6 @@ constexpr std::size_t kMaxPathPoints = 1500;
 constexpr std::size_t kMaxCloudPoints = 4000;
 constexpr double kGapIntervals = 5.0;
 constexpr double kFrameMargin = 0.06;  ///< Of the extent, around what is drawn.
-/// The map may be so much larger than the path before it is cut off, as a part of the path's
-/// extent on each side.
-constexpr double kMaxCloudMargin = 1.0;
 /// Of the points on either side that are not asked for: some are always far off.
 constexpr double kStrayPart = 0.02;
 
@@ -61,13 +58,12 @@ AxisRange range_along(const std::vector<DrawnPath>& paths, const Eigen::Vector3d
 AxisRange with_cloud(AxisRange range,
                      const std::vector<Eigen::Vector3f>& points,
                      const Eigen::Vector3d& direction,
-                     double path_extent) {
+                     double margin) {
   if (points.empty()) return range;
   std::vector<double> along;
   for (const Eigen::Vector3f& point : points) along.push_back(direction.dot(point.cast<double>()));
   std::ranges::sort(along);
   const auto stray = static_cast<std::size_t>(kStrayPart * static_cast<double>(along.size()));
-  const double margin = kMaxCloudMargin * path_extent;
   range.low = std::min(range.low, std::max(along[stray], range.low - margin));
   range.high = std::max(range.high, std::min(along[along.size() - 1 - stray], range.high + margin));
   return range;
@@ -158,8 +154,9 @@ std::string draw_paths(const PathDrawing& drawing, const ViewAxes& axes) {
   AxisRange y = range_along(drawing.paths, axes.up);
   const double extent = std::max(x.extent(), y.extent());
   if (!(extent >= 0.0) || !std::isfinite(extent)) return "<p>There is no path to draw.</p>\n";
-  x = framed(with_cloud(x, drawing.points, axes.right, extent));
-  y = framed(with_cloud(y, drawing.points, axes.up, extent));
+  const double margin = drawing.cloud_margin * extent;
+  x = framed(with_cloud(x, drawing.points, axes.right, margin));
+  y = framed(with_cloud(y, drawing.points, axes.up, margin));
   Chart::make_isometric(kViewFrame, x, y);
   const Chart chart(kViewFrame, x, y);
   std::string svg = svg_head(kWidth, kPathHeight, drawing.title);
@@ -188,15 +185,18 @@ std::string draw_curve(const DrawnCurve& curve) {
     const auto last =
         curve.y.begin() + static_cast<std::ptrdiff_t>(std::min(begin + step, curve.y.size()));
     const auto largest = std::max_element(first, last);
-    points.push_back(
-        {curve.x[static_cast<std::size_t>(largest - curve.y.begin())], *largest, false});
+    const auto at = static_cast<std::size_t>(largest - curve.y.begin());
+    const auto begins = curve.starts_stroke.begin() + (first - curve.y.begin());
+    const bool is_after_gap =
+        std::find(begins, begins + (last - first), true) != begins + (last - first);
+    points.push_back({curve.x[at], *largest, is_after_gap});
     top = std::max(top, *largest);
   }
   if (points.empty() || !std::isfinite(top)) return "<p>There is nothing to draw.</p>\n";
   const AxisRange x{points.front().x, std::max(points.back().x, points.front().x + 1e-6)};
   const AxisRange y{0.0, std::max(top * (1.0 + kFrameMargin), 1e-6)};
   const Chart chart(kCurveFrame, x, y);
-  return svg_head(kWidth, kCurveHeight, curve.title) + chart.axes(curve.x_label, curve.y_label) +
+  return svg_head(kWidth, kCurveHeight, curve.title) + chart.axes(curve.x_label, "") +
          chart.line(points, "class=\"error\"") + "</svg>\n";
 }
 

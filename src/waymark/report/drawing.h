@@ -47,7 +47,9 @@ struct DrawnMark {
 
 /// What is drawn in one view, later things over earlier ones.
 struct PathDrawing {
-  std::vector<Eigen::Vector3f> points;  ///< Of the map; those far off the paths are left out.
+  std::vector<Eigen::Vector3f> points;  ///< Of the map.
+  /// Points further from the paths are left out, in extents of these.
+  double cloud_margin = 1.0;
   std::vector<DrawnPath> paths;
   std::vector<DrawnMark> marks;
   std::string unit;   ///< Of lengths, for the axes.
@@ -59,10 +61,10 @@ std::string draw_paths(const PathDrawing& drawing, const ViewAxes& axes);
 
 /// Values over an axis.
 struct DrawnCurve {
-  std::vector<double> x;  ///< Ascending.
-  std::vector<double> y;  ///< Not negative.
+  std::vector<double> x;            ///< Ascending.
+  std::vector<double> y;            ///< Not negative.
+  std::vector<bool> starts_stroke;  ///< Per value; true where values before it are missing.
   std::string x_label;
-  std::string y_label;
   std::string title;  ///< For those who cannot see it.
 };
 

@@ -25,10 +25,10 @@ p{margin:.4em 0;overflow-wrap:anywhere}
 .badge{display:inline-block;border-radius:99px;padding:0 .7em;color:#fff;font-weight:600;font-size:.9em;white-space:nowrap}
 .badge.good{background:var(--good)}.badge.check{background:var(--check)}.badge.bad{background:var(--bad)}
 .tip{border-left:4px solid var(--check);padding:.1em .8em;margin:.8em 0}
-.side-by-side{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,340px),1fr));gap:16px}
+.side-by-side{display:grid;grid-template-columns:repeat(auto-fit,minmax(min(100%,300px),1fr));gap:16px}
 .scroll{overflow-x:auto}
 table{border-collapse:collapse;width:100%;font-size:.92rem}
-th,td{text-align:left;padding:.35em .8em .35em 0;border-bottom:1px solid var(--line);vertical-align:top;overflow-wrap:anywhere}
+th,td{text-align:left;padding:.35em .8em .35em 0;border-bottom:1px solid var(--line);vertical-align:top;overflow-wrap:break-word}
 th{color:var(--soft);font-weight:600}
 td:first-child{min-width:6.5em}
 code{font-size:.9em;overflow-wrap:anywhere}
@@ -54,11 +54,12 @@ path.grid{stroke:#e8ecef}.axis{stroke:#8a97a3}
 .s-tracked{fill:#7cc492;background:#7cc492}.s-filled{fill:#b9dfc4;background:#b9dfc4}.s-initializing{fill:#f0c75e;background:#f0c75e}
 .s-lost{fill:#d6404b;background:#d6404b}.s-unreadable{fill:#4b5563;background:#4b5563}.s-dropped{fill:#9ca3af;background:#9ca3af}
 .e-loop{fill:#7e22ce;background:#7e22ce}.e-again{fill:#c2410c;background:#c2410c}
+.key-line{display:inline-block;width:24px;vertical-align:middle}
 .key{white-space:nowrap;margin-left:.8em}.key i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.35em}
 .axis-x{display:flex;justify-content:space-between;color:var(--soft);font-size:.85rem}
 #cursor{position:absolute;top:0;bottom:0;width:1px;background:var(--ink);pointer-events:none}
-.facts td:first-child{width:10em;color:var(--soft)}
-.bar-box{min-width:8rem}.bar{margin-top:.3em;height:.8em;background:#7fb0e8;border-radius:2px;min-width:1px}
+.facts td{overflow-wrap:anywhere}.times td{white-space:nowrap}.facts td:first-child{width:10em;color:var(--soft)}
+.bar-box{min-width:4rem}.bar{margin-top:.3em;height:.8em;background:#7fb0e8;border-radius:2px;min-width:1px}
 @media(max-width:600px){
 main{padding:12px 8px 32px}section{padding:12px}
 .stack thead{display:none}.stack tr{display:block;padding:.5em 0;border-bottom:1px solid var(--line)}
@@ -73,6 +74,11 @@ if (data && area) {
   const frames = JSON.parse(data.textContent), cursor = document.getElementById("cursor");
   const readout = document.getElementById("readout");
   const figures = [[4, "", " inliers"], [5, "", " features"], [6, "brightness ", ""], [7, "contrast ", ""], [8, "blur ", " %"], [9, "", " ms"]];
+  const hint = readout.textContent;
+  area.addEventListener("pointerleave", () => {
+    cursor.hidden = true;
+    readout.textContent = hint;
+  });
   area.addEventListener("pointermove", (event) => {
     const box = area.getBoundingClientRect();
     const part = Math.min(Math.max((event.clientX - box.left) / box.width, 0), 1);

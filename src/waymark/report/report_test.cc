@@ -110,8 +110,8 @@ TEST(Report, ComparesWithTheGroundTruth) {
   EXPECT_NEAR(evaluate_run(run, truth).groundtruth_from_estimate.scale, 1.5, 1e-9)
       << "mono is scaled";
   const std::string page = format_report(run, &truth);
-  EXPECT_THAT(page, HasSubstr("Error over time"));
-  EXPECT_THAT(page, HasSubstr("Error over the path"));
+  EXPECT_THAT(page, HasSubstr("Position error [m] over time"));
+  EXPECT_THAT(page, HasSubstr("Position error [m] over the path"));
   EXPECT_THAT(page, HasSubstr("sim3, scale 1.5, 400 of 400 poses compared"));
   EXPECT_THAT(page, HasSubstr("class=\"truth\""));
   TruePath later = truth;
@@ -138,8 +138,8 @@ TEST(Report, MarksLoopsAndRelocalisations) {
   run.summary.loop_frames = {{3, 390}, {5, 4'000'000}};
   run.table.frames[200].is_relocalized = true;
   const std::string page = format_report(run, nullptr);
-  EXPECT_EQ(count(page, "<circle class=\"loop\""), 2u) << "from above and from the side";
-  EXPECT_EQ(count(page, "<circle class=\"again\""), 2u);
+  EXPECT_EQ(count(page, "<circle class=\"loop\""), 3u) << "in each view";
+  EXPECT_EQ(count(page, "<circle class=\"again\""), 3u);
   EXPECT_THAT(page, HasSubstr("<rect class=\"e-loop\" x=\"390\" width=\"1\""));
   EXPECT_THAT(page, HasSubstr("<rect class=\"e-again\" x=\"200\" width=\"1\""));
 }

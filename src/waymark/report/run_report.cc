@@ -9,6 +9,7 @@
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/evaluate/association.h"
 #include "waymark/report/advice.h"
 #include "waymark/report/drawing.h"
 #include "waymark/report/page.h"
@@ -18,6 +19,11 @@
 
 namespace waymark {
 namespace {
+
+/// The map is drawn as far around the path, in its extents: a path in a room is shorter than it.
+constexpr double kMapMargin = 20.0;
+/// A longer time between compared poses is a gap, in usual times.
+constexpr double kErrorGapIntervals = 5.0;
 
 std::string paragraph(std::string_view style, std::string_view text) {
   return fmt::format("<p class=\"{}\">{}</p>\n", style, escaped(text));
@@ -128,12 +134,18 @@ std::string path_section(const RunFolder& run, const Evaluation* compared, const
   drawing.marks = marks_of(run, shown);
   const auto views = choose_views(upright);
   PathDrawing map = drawing;
-  map.title = "Path and points of the map from above";
-  drawing.title = "Path from the side";
-  std::string body =
-      "<div class=\"side-by-side\">\n<figure><figcaption>From above, with the map</figcaption>\n" +
-      draw_paths(map, views[0]) + "</figure>\n<figure><figcaption>From the side</figcaption>\n" +
-      draw_paths(drawing, views[1]) + "</figure>\n</div>\n";
+  map.cloud_margin = kMapMargin;
+  map.title = "The map from above";
+  PathDrawing side = drawing;
+  side.title = "The path from the side";
+  drawing.title = "The path from above";
+  const auto figure = [](std::string_view caption, const std::string& svg) {
+    return fmt::format("<figure><figcaption>{}</figcaption>\n{}</figure>\n", caption, svg);
+  };
+  std::string body = "<div class=\"side-by-side\">\n" +
+                     figure("From above", draw_paths(drawing, views[0])) +
+                     figure("From the side", draw_paths(side, views[1])) +
+                     figure("The map from above", draw_paths(map, views[0])) + "</div>\n";
   body += paragraph(
       "note",
       fmt::format("Blue: camera 0, from the ring on.{} Violet dots: places seen again. Orange "
@@ -151,8 +163,10 @@ std::string path_section(const RunFolder& run, const Evaluation* compared, const
 }
 
 std::string truth_section(const Evaluation& compared, const TruePath& truth, const RunFolder& run) {
-  DrawnCurve over_time{{}, {}, "time [s]", "position error [m]", "Position error over time"};
-  DrawnCurve over_path{{}, {}, "path [m]", "position error [m]", "Position error over the path"};
+  DrawnCurve over_time{{}, {}, {}, "time [s]", "Position error over time"};
+  DrawnCurve over_path{{}, {}, {}, "path [m]", "Position error over the path"};
+  const double max_gap_ns =
+      kErrorGapIntervals * static_cast<double>(median_interval_ns(run.trajectories.front()));
   const FramePlaces places(run);
   double travelled_m = 0.0;
   const StampedPose* last = nullptr;
@@ -163,6 +177,10 @@ std::string truth_section(const Evaluation& compared, const TruePath& truth, con
           pose->world_from_camera.translation - last->world_from_camera.translation;
       travelled_m += compared.groundtruth_from_estimate.scale * step.norm();
     }
+    const bool is_after_gap =
+        pose && last && static_cast<double>(pose->timestamp_ns - last->timestamp_ns) > max_gap_ns;
+    over_time.starts_stroke.push_back(is_after_gap);
+    over_path.starts_stroke.push_back(is_after_gap);
     if (pose) last = pose;
     over_time.x.push_back(1e-9 * (static_cast<double>(error.timestamp_ns) -
                                   static_cast<double>(compared.errors.front().timestamp_ns)));
@@ -191,10 +209,12 @@ std::string truth_section(const Evaluation& compared, const TruePath& truth, con
                     compared.num_pairs,
                     compared.num_estimate_poses)},
        {"Ground truth", escaped(truth.name)}});
-  body += "<div class=\"side-by-side\">\n<figure><figcaption>Error over time</figcaption>\n" +
-          draw_curve(over_time) +
-          "</figure>\n<figure><figcaption>Error over the path</figcaption>\n" +
-          draw_curve(over_path) + "</figure>\n</div>\n";
+  body +=
+      "<div class=\"side-by-side\">\n<figure><figcaption>Position error [m] over "
+      "time</figcaption>\n" +
+      draw_curve(over_time) +
+      "</figure>\n<figure><figcaption>Position error [m] over the path</figcaption>\n" +
+      draw_curve(over_path) + "</figure>\n</div>\n";
   return section("Ground truth", body);
 }
 
@@ -280,7 +300,7 @@ std::string time_section(const RunSummary& summary) {
   add("mapping, per keyframe", summary.mapping_ms, false);
   return section(
       "Time per stage",
-      table_of({"Stage", "Mean", "95 % below", ""}, rows) +
+      table_of({"Stage", "Mean", "95 % below", ""}, rows, "times") +
           paragraph(
               "note",
               fmt::format("{:.1f} s by the clock, {:.1f} s of all cores, {:.0f} MB of memory at "

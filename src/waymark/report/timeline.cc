@@ -131,7 +131,7 @@ std::string track(const std::string& name,
   if (!has_any(lines.front().values)) return "";
   const double shown = std::max(top, 1e-3);
   return fmt::format(
-      "<figure class=\"line\"><figcaption>{}<span>0 to {:.3g}{}</span></figcaption>\n{}</figure>\n",
+      "<figure class=\"line\"><figcaption>{}<span>0 to {:.4g}{}</span></figcaption>\n{}</figure>\n",
       name,
       shown,
       unit,

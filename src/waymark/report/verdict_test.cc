@@ -82,12 +82,15 @@ TEST(Verdict, OfResiduals) {
 TEST(Verdict, OfTheErrorAgainstTheTruth) {
   const FrameTable table = good_table();
   Evaluation truth;
+  truth.ate_m.rmse = 0.1;
   truth.ate_percent = 0.5;
   EXPECT_EQ(judge(table, good_summary(table), &truth).grade, Grade::kGood);
   truth.ate_percent = 2.0;
   EXPECT_EQ(judge(table, good_summary(table), &truth).grade, Grade::kCheck);
   truth.ate_percent = 5.0;
   EXPECT_EQ(judge(table, good_summary(table), &truth).grade, Grade::kBad);
+  truth.ate_m.rmse = 0.01;
+  EXPECT_EQ(judge(table, good_summary(table), &truth).grade, Grade::kGood) << "of a short path";
 }
 
 TEST(Verdict, OfNothing) { EXPECT_EQ(judge({}, {}, nullptr).grade, Grade::kBad); }
