@@ -145,9 +145,9 @@ TEST(Settings, ChangedOnesAreListed) {
   TestSettings settings;
   EXPECT_TRUE(changed_settings(settings).empty());
   settings.seed = 7;
-  settings.tracking.inner.ratio = 0.25;
+  settings.tracking.inner.ratio = 0.75;
   EXPECT_THAT(changed_settings(settings),
-              ::testing::ElementsAre("seed: 7", "tracking.inner.ratio: 0.25"));
+              ::testing::ElementsAre("seed: 7", "tracking.inner.ratio: 0.75"));
 }
 
 TEST(Settings, PrintedYamlReadsBack) {

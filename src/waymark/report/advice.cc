@@ -29,6 +29,8 @@ constexpr double kBlurredPercent = 50.0;
 constexpr double kMoreBlurPercent = 12.0;  ///< Than where all goes well,
 constexpr double kSomeBlurPercent = 40.0;  ///< and so much at least.
 
+constexpr double kMinBlurContrast = 8.0;  ///< Below nothing can be said of it.
+
 constexpr double kFewFeatures = 250.0;  ///< Of the 1000 that are asked for.
 constexpr double kJump = 2.0;           ///< In median times between frames.
 
@@ -73,7 +75,7 @@ std::string recognise_flat(const TroubleFigures& seen) {
 }
 
 std::string recognise_blur(const TroubleFigures& seen) {
-  if (!is_weak(seen) || is_flat(seen) || !is_blurred(seen)) return "";
+  if (!is_weak(seen) || seen.contrast < kMinBlurContrast || !is_blurred(seen)) return "";
   std::string text =
       fmt::format("the images are blurred: by {:.0f} % where frames have no pose or a weak one",
                   seen.blur_percent);

@@ -40,7 +40,7 @@ svg text{font:13px system-ui,sans-serif;fill:#5b6875}
 .middle{text-anchor:middle}.end{text-anchor:end}
 path{fill:none;stroke-linejoin:round}
 path.grid{stroke:#e8ecef}.axis{stroke:#8a97a3}
-.cloud{stroke:#9fb0bf;stroke-width:1.6;stroke-linecap:round}
+.cloud{stroke:#8aa0b4;stroke-width:2;stroke-linecap:round}
 .path0{stroke:#0b62c4;stroke-width:2}.path1{stroke:#c2410c;stroke-width:2}.path2{stroke:#15803d;stroke-width:2}
 .path3{stroke:#7e22ce;stroke-width:2}.path4{stroke:#0e7490;stroke-width:2}.path5{stroke:#a16207;stroke-width:2}
 .truth{stroke:#8f8f8f;stroke-width:4;opacity:.6}
@@ -58,7 +58,7 @@ path.grid{stroke:#e8ecef}.axis{stroke:#8a97a3}
 .key{white-space:nowrap;margin-left:.8em}.key i{display:inline-block;width:.8em;height:.8em;border-radius:2px;margin-right:.35em}
 .axis-x{display:flex;justify-content:space-between;color:var(--soft);font-size:.85rem}
 #cursor{position:absolute;top:0;bottom:0;width:1px;background:var(--ink);pointer-events:none}
-.facts td{overflow-wrap:anywhere}.times td{white-space:nowrap}.facts td:first-child{width:10em;color:var(--soft)}
+.facts td{overflow-wrap:anywhere}.times td+td{white-space:nowrap}.facts td:first-child{width:10em;color:var(--soft)}
 .bar-box{min-width:4rem}.bar{margin-top:.3em;height:.8em;background:#7fb0e8;border-radius:2px;min-width:1px}
 @media(max-width:600px){
 main{padding:12px 8px 32px}section{padding:12px}

@@ -158,6 +158,17 @@ std::string name_of(const std::filesystem::path& folder) {
   return printable(name.empty() ? folder.string() : name);
 }
 
+/// How many points the head of a PLY file announces.
+std::optional<std::size_t> stated_points(std::string_view head) {
+  constexpr std::string_view kElement = "\nelement vertex ";
+  const std::size_t at = head.find(kElement);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view rest = head.substr(at + kElement.size());
+  const auto number = parse_number(rest.substr(0, rest.find('\n')));
+  if (!number || !(*number >= 0.0 && *number <= 1e9)) return std::nullopt;
+  return static_cast<std::size_t>(*number);
+}
+
 }  // namespace
 
 FrameTable parse_frames_csv(std::string_view text, const std::string& name) {
@@ -178,13 +189,20 @@ std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::
   if (!text.starts_with("ply\nformat ascii 1.0\n") || end == std::string_view::npos) {
     throw InputError(name, "has no head of a PLY file in ASCII, expected points of a run");
   }
+  const std::size_t num_points = stated_points(text.substr(0, end)).value_or(0);
+  std::size_t num_rows = 0;
   std::vector<Eigen::Vector3f> points;
   RowReader rows(text.substr(end + kHeadEnd.size()), name, ' ');
   while (rows.next()) {
+    ++num_rows;
     rows.expect_exactly(3, "x y z");
     const Eigen::Vector3d point(rows.number(0), rows.number(1), rows.number(2));
     // Points that are far away are seen by nobody.
     if (point.cwiseAbs().maxCoeff() <= kMaxPosition) points.push_back(point.cast<float>());
+  }
+  if (num_rows != num_points) {
+    throw InputError(name,
+                     fmt::format("has {} points, expected {} as it says", num_rows, num_points));
   }
   return points;
 }

@@ -130,6 +130,9 @@ TEST(RunFolder, PointsReadBackAsWritten) {
   EXPECT_THAT(
       fault_of([&] { parse_points_ply(format_points_ply(points) + "1 2\n", "points.ply"); }),
       HasSubstr("expected"));
+  EXPECT_THAT(
+      fault_of([&] { parse_points_ply(format_points_ply(points) + "1 2 3\n", "points.ply"); }),
+      HasSubstr("has 3 points, expected 2"));
 }
 
 class WrittenRun : public ::testing::Test {

@@ -235,7 +235,7 @@ std::string coverage_section(const RunFolder& run) {
   };
   for (const auto& [state, count] : states) add("state", to_string(state), count);
   for (const auto& [reason, count] : reasons) add("no pose because", to_string(reason), count);
-  std::string body = table_of({"", "", "Frames", "Part"}, rows);
+  std::string body = table_of({"", "", "Frames", "Part"}, rows, "times");
   const RunSummary& summary = run.summary;
   if (summary.out_of_order + summary.without_partner > 0) {
     body += paragraph("note",
