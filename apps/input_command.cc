@@ -225,7 +225,7 @@ void report_reasons(Reporter& reporter, const FrameTable& table) {
 
 void report_advice(Reporter& reporter, const RunSummary& summary) {
   for (const RunAdvice& advice : summary.advice) {
-    reporter.info(fmt::format("{}; try {} ({})", advice.seen, advice.remedy, advice.see));
+    reporter.info(fmt::format("{}; try: {} ({})", advice.seen, advice.remedy, advice.see));
   }
 }
 

@@ -76,7 +76,7 @@ class Runs(ReportTest):
         done = self.run_reported(source)
         self.assertEqual(self.grade(), "good")
         self.assertEqual(self.advised(), [])
-        self.assertNotIn("; try ", done.stderr)
+        self.assertNotIn("; try: ", done.stderr)
         self.assertNotIn("What to try", self.page())
         again = waymark("report", self.out, "--ground-truth", source / "groundtruth.txt")
         self.assertEqual(again.returncode, 0, again.stderr)
@@ -111,7 +111,7 @@ class Runs(ReportTest):
         done = self.run_reported(source, status=3)
         self.assertEqual(self.grade(), "bad")
         self.assertEqual(self.advised()[0], "dark")
-        self.assertIn("; try more light", done.stderr)
+        self.assertIn("; try: more light", done.stderr)
         self.assertIn("(docs/troubleshooting.md#the-images-are-dark)", done.stderr)
         self.assertIn("the images are dark", self.page())
 
