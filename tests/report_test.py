@@ -166,6 +166,28 @@ class Runs(ReportTest):
         self.assertEqual(waymark("report", self.out).returncode, 0)
 
 
+class Overlay(ReportTest):
+    def test_features_are_drawn_into_the_video(self):
+        video = self.folder / "seen.mp4"
+        self.assertEqual(self.run_on(self.sequence("stereo"), "--overlay", video).returncode, 0)
+        frames = cv2.VideoCapture(str(video))
+        self.assertAlmostEqual(frames.get(cv2.CAP_PROP_FPS), 20.0, delta=0.1)
+        self.assertEqual(int(frames.get(cv2.CAP_PROP_FRAME_COUNT)), len(self.frames()))
+        readable, image = frames.read()
+        self.assertTrue(readable)
+        self.assertEqual(image.shape, (240, 376, 3))
+        blue, green, _ = (image[30:, :, i].astype(int) for i in range(3))
+        self.assertGreater((green - blue > 60).sum(), 500)  # Images are grey.
+        self.assertEqual([path.name for path in self.folder.glob(".seen*")], [])
+
+    def test_names_that_are_none(self):
+        for name, word in (("seen.txt", ".mp4"), ("no/such/seen.mp4", "seen.part.mp4")):
+            done = self.run_on(self.sequence("mono") if name == "seen.txt" else self.folder / "input_mono",
+                               "--overlay", self.folder / name)
+            self.assertEqual(done.returncode, 1, done.stderr)
+            self.assertIn(word, done.stderr)
+
+
 class Folders(ReportTest):
     def setUp(self):
         super().setUp()
