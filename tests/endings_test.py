@@ -14,7 +14,7 @@ from cli_support import NUM_FRAMES, PROGRAM, CliTest, shared_sequence, waymark
 
 FULL = "/dev/full"
 NUM_MOMENTS = 3
-RESULTS = ["frames.csv", "keyframes.txt", "summary.json", "trajectory.txt"]
+RESULTS = ["frames.csv", "keyframes.txt", "points.ply", "summary.json", "trajectory.txt"]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 

@@ -105,16 +105,20 @@ std::vector<LoopFrames> list_loops(const System& system, const FedFrames& frames
   return loops;
 }
 
+/// Takes no more memory than what comes out.
 std::vector<Eigen::Vector3f> choose_points(const Map& map, SubmapId submap) {
+  std::size_t num_all = 0;
+  map.landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { num_all += landmark.submap == submap; });
+  const std::size_t step =
+      std::max<std::size_t>((num_all + kMaxShownPoints - 1) / kMaxShownPoints, 1);
   std::vector<Eigen::Vector3f> points;
+  points.reserve(num_all / step + 1);
+  std::size_t at = 0;
   map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
-    if (landmark.submap == submap) points.push_back(landmark.position_in_world.cast<float>());
+    if (landmark.submap != submap || at++ % step != 0) return;
+    points.push_back(landmark.position_in_world.cast<float>());
   });
-  const std::size_t step = (points.size() + kMaxShownPoints - 1) / kMaxShownPoints;
-  if (step < 2) return points;
-  const std::size_t num_chosen = (points.size() + step - 1) / step;
-  for (std::size_t i = 0; i < num_chosen; ++i) points[i] = points[i * step];
-  points.resize(num_chosen);
   return points;
 }
 
