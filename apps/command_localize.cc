@@ -11,6 +11,7 @@
 #include "input_command.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/report/advice.h"
 #include "waymark/session/session.h"
 
 namespace waymark {
@@ -37,6 +38,7 @@ void report_results(Reporter& reporter,
                             format_duration(summary.wall_s),
                             summary.tracking_ms.mean,
                             options.report.out.string()));
+  report_advice(reporter, summary);
 }
 
 /// Finds all images. Once the calibration turns out to be another, those of a file are found from
@@ -92,6 +94,7 @@ int localize(LocalizeOptions options, Reporter& reporter) {
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
   results.summary.version = WAYMARK_VERSION;
   add_input(prepared, results.summary);
+  results.summary.advice = advise(results.table, results.summary);
   save_each(
       {[&] { write_results(options.report.out, results); },
        [&] { write_calibration(options.report.out, prepared, prepared.rig, results.summary); },

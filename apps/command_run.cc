@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <atomic>
+#include <exception>
 #include <memory>
 #include <optional>
 #include <string>
@@ -13,11 +14,15 @@
 #include "numbers.h"
 #include "reporter.h"
 #include "waymark/base/atomic_file.h"
+#include "waymark/base/check.h"
+#include "waymark/report/advice.h"
+#include "waymark/report/report.h"
 #include "waymark/session/another_pass.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
 #include "waymark/session/image_keeper.h"
 #include "waymark/session/live_input.h"
+#include "waymark/session/overlay_video.h"
 #include "waymark/session/quality.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
@@ -31,9 +36,11 @@ struct RunOptions {
   ReportOptions report;
   std::filesystem::path map_out;  ///< Empty: the map is not saved.
   double autosave_s = 60.0;
-  double pace = 0.0;             ///< Times the input's own rate; 0: as fast as possible.
-  std::optional<Timing> timing;  ///< Nothing: what suits the input.
-  std::string viewer;            ///< [HOST:]PORT; empty: off.
+  double pace = 0.0;              ///< Times the input's own rate; 0: as fast as possible.
+  std::optional<Timing> timing;   ///< Nothing: what suits the input.
+  std::string viewer;             ///< [HOST:]PORT; empty: off.
+  std::filesystem::path overlay;  ///< Video to make; empty: none.
+  bool has_report = false;        ///< Whether a page on it is among the results.
 };
 
 void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
@@ -64,6 +71,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                             1e3 * summary.wall_s / num_frames,
                             summary.tracking_ms.mean,
                             options.report.out.string()));
+  report_advice(reporter, summary);
 }
 
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
@@ -78,8 +86,18 @@ FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, R
   };
 }
 
-SessionResults map_input(
-    Session& session, Input& input, Autosave& autosave, LiveControl* live, Reporter& reporter) {
+/// Features drawn into the images, where that is asked for.
+std::optional<OverlayVideo> start_overlay(const std::filesystem::path& path) {
+  if (path.empty()) return std::nullopt;
+  return std::optional<OverlayVideo>(std::in_place, path);
+}
+
+SessionResults map_input(Session& session,
+                         Input& input,
+                         Autosave& autosave,
+                         LiveControl* live,
+                         OverlayVideo* overlay,
+                         Reporter& reporter) {
   CalibrationWatch watch(session,
                          [&reporter](const std::string& mistake) { reporter.warning(mistake); });
   SessionHooks hooks;
@@ -88,12 +106,18 @@ SessionResults map_input(
   hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
-    hooks.on_result = [live](const FrameImages& frame, const TrackingResult& result) {
-      live->show(frame, result);
-    };
     hooks.on_input_end = [live] { live->finishing(); };
   }
+  hooks.on_result = [&, live, overlay](const FrameImages& frame, const TrackingResult& result) {
+    if (live) live->show(frame, result);
+    if (overlay) overlay->add(frame, result, session.system->details());
+  };
   SessionResults results = run_session(input, *session.system, hooks);
+  try {
+    if (overlay) overlay->finish();
+  } catch (const OutputError&) {  // Told once the rest is saved.
+    if (!results.failure) results.failure = std::current_exception();
+  }
   if (const FocalCheck* check = session.system->focal_check()) reporter.detail(describe(*check));
   return results;
 }
@@ -167,11 +191,12 @@ void save_results(const RunOptions& options,
                   Autosave& autosave,
                   const std::function<void()>& report,
                   Reporter& reporter) {
-  save_each({[&] { write_results(options.report.out, results); },
+  const std::filesystem::path& out = options.report.out;
+  save_each({[&] { write_results(out, results); },
              [&] {
-               write_calibration(
-                   options.report.out, session, *session.system->rig(), results.summary);
+               if (options.has_report) write_report(out);
              },
+             [&] { write_calibration(out, session, *session.system->rig(), results.summary); },
              [&] {
                if (options.map_out.empty()) return;
                save_final_map(*session.system, options, autosave, reporter);
@@ -206,6 +231,7 @@ std::optional<int> finish(const RunOptions& options,
   }
   const auto again = first || has_ended ? std::nullopt : begin_again(session, options);
   if (first) add_first(first->results.summary, results.summary);
+  results.summary.advice = advise(results.table, results.summary);
   const auto last = [&] {
     if (!again) report(results);
   };
@@ -248,7 +274,9 @@ std::optional<int> map_once(const RunOptions& options,
     start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
   }
   LiveControl* const shown = live ? &*live : nullptr;
-  SessionResults results = map_input(session, images, autosave, shown, reporter);
+  std::optional<OverlayVideo> overlay = start_overlay(options.overlay);
+  OverlayVideo* const drawn = overlay ? &*overlay : nullptr;
+  SessionResults results = map_input(session, images, autosave, shown, drawn, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(options.session.timing);
@@ -325,6 +353,12 @@ void add_run_command(CLI::App& program, Command& command) {
                   "Show the session in the browser, at this port of this machine [off]")
       ->type_name("[HOST:]PORT");
   add_map_options(run_command, *options);
+  run_command.add_option("--overlay",
+                         options->overlay,
+                         "Video (.mp4) of the images with their features drawn in [none]");
+  run_command.add_flag("--report",
+                       options->has_report,
+                       "Write a page on the run, report.html, among the results [off]");
   add_report_options(run_command, options->report, options->session.seed);
   run_command.callback([options, &command] {
     command = [options] {

@@ -23,6 +23,7 @@ void add_localize_command(CLI::App& program, Command& command);
 void add_map_command(CLI::App& program, Command& command);
 void add_calibrate_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);
+void add_report_command(CLI::App& program, Command& command);
 void add_simulate_command(CLI::App& program, Command& command);
 void add_config_command(CLI::App& program, Command& command);
 void add_export_command(CLI::App& program, Command& command);

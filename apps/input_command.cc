@@ -110,6 +110,8 @@ void warn_unless_sure(Reporter& reporter, const PreparedInput& prepared, std::st
 void add_input(const PreparedInput& prepared, RunSummary& summary) {
   const InputInfo& info = prepared.input->info();
   summary.setup = to_string(info.setup);
+  summary.input = prepared.description;
+  summary.settings = changed_settings(prepared.settings);
   summary.out_of_order = info.counts.out_of_order;
   summary.without_partner = info.counts.without_partner;
   if (!prepared.estimated) return;
@@ -219,6 +221,12 @@ void report_reasons(Reporter& reporter, const FrameTable& table) {
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", count, to_string(reason));
   }
   reporter.info("without a pose: " + text);
+}
+
+void report_advice(Reporter& reporter, const RunSummary& summary) {
+  for (const RunAdvice& advice : summary.advice) {
+    reporter.info(fmt::format("{}; try: {} ({})", advice.seen, advice.remedy, advice.see));
+  }
 }
 
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work) {

@@ -67,6 +67,9 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
 /// nothing if there are none.
 void report_reasons(Reporter& reporter, const FrameTable& table);
 
+/// What to try, a line each; nothing where all went well.
+void report_advice(Reporter& reporter, const RunSummary& summary);
+
 /// Calls work with a reporter and from then on catches interrupts; what it throws also goes to the
 /// log.
 int run_and_log(const ReportOptions& options, const std::function<int(Reporter&)>& work);

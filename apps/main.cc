@@ -57,6 +57,7 @@ int run_program(const std::vector<std::string>& arguments) {
   add_map_command(program, command);
   add_view_command(program, command);
   add_eval_command(program, command);
+  add_report_command(program, command);
   add_simulate_command(program, command);
   add_export_command(program, command);
   add_import_command(program, command);

@@ -113,5 +113,19 @@ class Results(CliTest):
         self.assertEqual(tables["| reason | meaning |"], self.names_of("FrameReason") - {"none"})
 
 
+class Advice(unittest.TestCase):
+    """The table of advice and docs/troubleshooting.md."""
+
+    def test_each_cause_has_its_section(self):
+        source = (ROOT / "src/waymark/report/advice.cc").read_text()
+        table = source[source.index("kCauses = {"):]
+        sections = re.findall(r"AdviceCause\{.*?\"([a-z-]+)\"\}", table, re.DOTALL)
+        self.assertEqual(len(sections), table.count("AdviceCause{"))
+        self.assertGreater(len(sections), 10)
+        anchors = Page(ROOT / "docs/troubleshooting.md").anchors()
+        for section in sections:
+            self.assertIn(section, anchors)
+
+
 if __name__ == "__main__":
     unittest.main()

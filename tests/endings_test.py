@@ -14,7 +14,7 @@ from cli_support import NUM_FRAMES, PROGRAM, CliTest, shared_sequence, waymark
 
 FULL = "/dev/full"
 NUM_MOMENTS = 3
-RESULTS = ["frames.csv", "keyframes.txt", "summary.json", "trajectory.txt"]
+RESULTS = ["frames.csv", "keyframes.txt", "points.ply", "summary.json", "trajectory.txt"]
 SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGHUP)
 
 
@@ -89,7 +89,7 @@ class Disks(Endings):
                               timeout=240, preexec_fn=limit)
 
     def test_without_room_for_the_map_the_results_are_there(self):
-        done = self.limited(20000, "--autosave", 0.1, "--pace", 4)
+        done = self.limited(100000, "--autosave", 0.1, "--pace", 4)
         self.assert_fails_with_files(done, RESULTS, self.map)
         self.assertFalse(self.map.exists())
         self.assertIn("warning: autosave: ", done.stderr)

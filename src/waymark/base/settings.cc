@@ -164,6 +164,17 @@ std::string settings_as_yaml(const std::vector<SettingField>& fields,
   return yaml;
 }
 
+std::vector<std::string> changed_settings(const std::vector<SettingField>& fields,
+                                          const std::vector<SettingField>& defaults) {
+  WAYMARK_CHECK(fields.size() == defaults.size());
+  std::vector<std::string> changed;
+  for (std::size_t i = 0; i < fields.size(); ++i) {
+    const std::string value = printed_value(fields[i]);
+    if (value != printed_value(defaults[i])) changed.push_back(fields[i].key + ": " + value);
+  }
+  return changed;
+}
+
 std::string settings_as_markdown(const std::vector<SettingField>& fields) {
   constexpr const char* kHead =
       "| key | default | range | unit | meaning |\n|---|---|---|---|---|\n";

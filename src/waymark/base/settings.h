@@ -92,6 +92,17 @@ std::string settings_as_yaml(Settings settings) {
   return settings_as_yaml(list_settings(settings), list_settings(defaults));
 }
 
+/// Fields that are not as by default, "KEY: VALUE" each, with dotted keys.
+std::vector<std::string> changed_settings(const std::vector<SettingField>& fields,
+                                          const std::vector<SettingField>& defaults);
+
+/// The same for a whole settings struct.
+template <class Settings>
+std::vector<std::string> changed_settings(Settings settings) {
+  Settings defaults;
+  return changed_settings(list_settings(settings), list_settings(defaults));
+}
+
 /// The settings as Markdown: a table of key, default, range, unit, meaning, for each section one
 /// under its heading.
 std::string settings_as_markdown(const std::vector<SettingField>& fields);

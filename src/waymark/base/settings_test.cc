@@ -141,6 +141,15 @@ TEST(Settings, TheCalibrationIsPassedOver) {
   EXPECT_THAT(error_of("depth: 5000"), HasSubstr("expected a section"));
 }
 
+TEST(Settings, ChangedOnesAreListed) {
+  TestSettings settings;
+  EXPECT_TRUE(changed_settings(settings).empty());
+  settings.seed = 7;
+  settings.tracking.inner.ratio = 0.75;
+  EXPECT_THAT(changed_settings(settings),
+              ::testing::ElementsAre("seed: 7", "tracking.inner.ratio: 0.75"));
+}
+
 TEST(Settings, PrintedYamlReadsBack) {
   TestSettings settings;
   settings.seed = 7;

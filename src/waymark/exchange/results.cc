@@ -58,6 +58,34 @@ Json to_json(const std::vector<CalibrationEstimate>& calibration) {
   return list;
 }
 
+Json to_json(const std::vector<LoopFrames>& loops) {
+  const auto index = [](const std::optional<std::uint32_t>& frame) {
+    return frame ? Json(*frame) : Json(nullptr);
+  };
+  Json list = Json::array();
+  for (const LoopFrames& loop : loops) list.push_back({index(loop.from), index(loop.to)});
+  return list;
+}
+
+Json to_json(const std::vector<RunAdvice>& advice) {
+  Json list = Json::array();
+  for (const RunAdvice& one : advice) {
+    list.push_back(
+        {{"cause", one.cause}, {"seen", one.seen}, {"remedy", one.remedy}, {"see", one.see}});
+  }
+  return list;
+}
+
+/// What is known of the image of a frame; empty fields where nothing is.
+std::string picture_fields(const FrameRecord& frame) {
+  std::string text = ",";
+  if (frame.num_features) text += fmt::format("{}", *frame.num_features);
+  const PictureFigures& picture = frame.picture;
+  if (!picture.is_known) return text + ",,,";
+  return text +
+         fmt::format(",{},{},{}", picture.brightness, picture.contrast, picture.blur_percent);
+}
+
 void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
   json["frames"] = counts.frames;
   json["tracked"] = counts.tracked;
@@ -129,7 +157,7 @@ std::vector<std::pair<std::string, TimeStatistics>> summarize_stages(const Frame
 std::string format_frames_csv(const FrameTable& table) {
   std::string text = "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap";
   for (const std::string& stage : table.stages) text += fmt::format(",{}_ms", stage);
-  text += '\n';
+  text += ",features,brightness,contrast,blur,is_relocalized\n";
   for (const FrameRecord& frame : table.frames) {
     auto out = std::back_inserter(text);
     fmt::format_to(out,
@@ -146,7 +174,7 @@ std::string format_frames_csv(const FrameTable& table) {
       fmt::format_to(
           out, ",{:.4f}", frame.num_stages == 0 ? 0.0 : static_cast<double>(frame.stage_ms[i]));
     }
-    text += '\n';
+    text += picture_fields(frame) + (frame.is_relocalized ? ",1\n" : ",0\n");
   }
   return text;
 }
@@ -162,6 +190,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["submaps"] = summary.submaps;
   json["loops"] = summary.loops;
   json["relocalizations"] = summary.relocalizations;
+  json["loop_frames"] = to_json(summary.loop_frames);
   if (summary.quality) json["quality"] = to_json(*summary.quality);
   if (summary.moves_along) json["moves_along"] = *summary.moves_along;
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
@@ -181,7 +210,22 @@ std::string format_summary_json(const RunSummary& summary) {
   json["timing"] = summary.timing;
   json["seed"] = summary.seed;
   json["version"] = summary.version;
+  json["input"] = summary.input;
+  json["settings"] = summary.settings;
+  json["advice"] = to_json(summary.advice);
   return json.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+std::string format_points_ply(std::span<const Eigen::Vector3f> points) {
+  std::string text = fmt::format(
+      "ply\nformat ascii 1.0\nelement vertex {}\nproperty float x\nproperty float y\n"
+      "property float z\nend_header\n",
+      points.size());
+  auto out = std::back_inserter(text);
+  for (const Eigen::Vector3f& point : points) {
+    fmt::format_to(out, "{:.5g} {:.5g} {:.5g}\n", point.x(), point.y(), point.z());
+  }
+  return text;
 }
 
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table) {

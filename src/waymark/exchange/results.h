@@ -18,6 +18,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/exchange/trajectory.h"
+#include "waymark/image/picture_figures.h"
 
 namespace waymark {
 
@@ -31,6 +32,10 @@ struct FrameRecord : FrameStatus {
   std::uint8_t num_stages = 0;  ///< 0 for a frame that was not processed.
   bool is_keyframe = false;     ///< Whether it was sent to the map.
   bool has_warning = false;     ///< Something is wrong with a file of it.
+  bool is_relocalized = false;  ///< Whether the camera was found again after a loss.
+  /// Of camera 0; nothing for a frame that was not processed.
+  std::optional<std::uint16_t> num_features;
+  PictureFigures picture;  ///< Of the image of camera 0.
 
   /// Takes the times of all stages over.
   void set_stages(std::span<const double> times_ms);
@@ -86,6 +91,20 @@ struct EstimatedCalibrationSummary {
   bool is_sure = false;         ///< Whether the motion told it.
 };
 
+/// Something to try, from what was seen in a run that did not go well.
+struct RunAdvice {
+  std::string cause;   ///< A short name that stays the same, for programs.
+  std::string seen;    ///< What it is concluded from, with figures.
+  std::string remedy;  ///< What to try.
+  std::string see;     ///< Page and section of the documentation.
+};
+
+/// A place seen again: frames by their index in the input; nothing for one of an earlier session.
+struct LoopFrames {
+  std::optional<std::uint32_t> from;  ///< That was in the map before.
+  std::optional<std::uint32_t> to;    ///< That showed its place again.
+};
+
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -114,6 +133,11 @@ struct RunSummary {
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
   std::vector<CalibrationEstimate> refined_calibration;  ///< Empty where it stayed as it was.
+  std::vector<LoopFrames> loop_frames;                   ///< Where the map was closed or joined.
+  std::vector<std::string> input;                        ///< What was understood of it, in words.
+  /// Settings that are not as by default, "KEY: VALUE" as in a file.
+  std::vector<std::string> settings;
+  std::vector<RunAdvice> advice;  ///< Empty where all went well.
 };
 
 /// Statistics per stage over all rows, in the order of the table.
@@ -128,6 +152,9 @@ std::string format_summary_json(const RunSummary& summary);
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table);
 /// Writes summary.json into the folder; throws OutputError.
 void write_summary_json(const std::filesystem::path& folder, const RunSummary& summary);
+
+/// The text of points.ply: points as the Stanford polygon format (Turk 1994) has them, in ASCII.
+std::string format_points_ply(std::span<const Eigen::Vector3f> points);
 
 /// Writes trajectory.txt (TUM) for the first trajectory, trajectory_1.txt ... for the others, and
 /// removes those of an earlier run that are left over. The caller orders them by size.

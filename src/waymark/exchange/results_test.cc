@@ -73,13 +73,19 @@ TEST(Results, StatisticsOfTimes) {
 
 TEST(Results, FramesCsvHasARowPerFrame) {
   FrameTable table = make_table();
+  table.frames[2].num_features = 800;
+  table.frames[2].picture = {120, 46, 31, true};
+  table.frames[2].is_relocalized = true;
   const std::string text = format_frames_csv(table);
   EXPECT_THAT(
       text,
       ::testing::StartsWith(
-          "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap,features_ms,wait_ms\n"
-          "10,10000,initializing,too_little_parallax,0,0,0,,0.0000,0.0000\n"));
-  EXPECT_THAT(text, ::testing::HasSubstr("\n12,12000,tracked,none,120,90,1,3,4.5000,0.2500\n"));
+          "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap,features_ms,wait_ms,"
+          "features,brightness,contrast,blur,is_relocalized\n"
+          "10,10000,initializing,too_little_parallax,0,0,0,,0.0000,0.0000,,,,,0\n"));
+  EXPECT_THAT(
+      text,
+      ::testing::HasSubstr("\n12,12000,tracked,none,120,90,1,3,4.5000,0.2500,800,120,46,31,1\n"));
   EXPECT_THAT(text, ::testing::HasSubstr("\n14,14000,unreadable,unreadable_image,"));
   EXPECT_THAT(text, ::testing::HasSubstr("\n18,18000,dropped,late,"));
   EXPECT_EQ(std::count(text.begin(), text.end(), '\n'), 10);
@@ -118,6 +124,27 @@ TEST(Results, SummaryHasTheDocumentedKeys) {
   EXPECT_TRUE(empty["initialized_at"].is_null());
   EXPECT_EQ(empty["coverage"], 0.0);
   EXPECT_EQ(empty["localized"], 5);
+}
+
+TEST(Results, SummaryTellsLoopsSettingsAndAdvice) {
+  RunSummary summary;
+  summary.loop_frames = {{3, 90}, {std::nullopt, 7}};
+  summary.settings = {"features.count: 1500"};
+  summary.input = {"a video"};
+  summary.advice = {{"dark", "brightness 20 of 255", "more light", "troubleshooting.md#x"}};
+  const nlohmann::json json = nlohmann::json::parse(format_summary_json(summary));
+  EXPECT_EQ(json["loop_frames"], nlohmann::json::parse("[[3, 90], [null, 7]]"));
+  EXPECT_EQ(json["settings"][0], "features.count: 1500");
+  EXPECT_EQ(json["input"][0], "a video");
+  EXPECT_EQ(json["advice"][0]["cause"], "dark");
+  EXPECT_EQ(json["advice"][0]["remedy"], "more light");
+}
+
+TEST(Results, PointsAreAPlyFile) {
+  const std::vector<Eigen::Vector3f> points = {{1.0f, -2.5f, 0.125f}, {0.0f, 0.0f, 1e6f}};
+  EXPECT_EQ(format_points_ply(points),
+            "ply\nformat ascii 1.0\nelement vertex 2\nproperty float x\nproperty float y\n"
+            "property float z\nend_header\n1 -2.5 0.125\n0 0 1e+06\n");
 }
 
 TEST(Results, TrajectoriesOfAnEarlierRunGo) {

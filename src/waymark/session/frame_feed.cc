@@ -49,6 +49,10 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   record.has_warning = !frame.warning.empty();
   static_cast<FrameStatus&>(record) = result;
   record.is_keyframe = result.is_keyframe;
+  record.is_relocalized = result.is_relocalized;
+  record.num_features =
+      static_cast<std::uint16_t>(std::min<std::uint32_t>(result.num_features, UINT16_MAX));
+  record.picture = measure_picture(frame.images.at(0).view());
   record.set_stages(result.stages.ms);
   return record;
 }

@@ -87,6 +87,41 @@ std::vector<std::pair<SubmapId, StampedPose>> list_poses(const System& system, F
   return poses;
 }
 
+/// Where places were seen again. Frames of the map count on from those of an earlier session.
+std::vector<LoopFrames> list_loops(const System& system, const FedFrames& frames) {
+  std::vector<LoopFrames> loops;
+  if (frames.fed.empty()) return loops;
+  const Map& map = *system.map();
+  const std::size_t end = std::size_t{system.details().frame.value} + 1;
+  const auto index_of = [&](KeyframeId id) -> std::optional<std::uint32_t> {
+    const std::size_t frame = map.keyframes().at(id).frame.value;
+    const std::size_t before = end - std::min(end, frames.fed.size());
+    if (frame < before || frame >= end) return std::nullopt;
+    return frames.table.frames[frames.fed[frame - before]].index;
+  };
+  for (const LoopEdge& edge : map.measured_loop_edges()) {
+    loops.push_back({index_of(edge.from), index_of(edge.to)});
+  }
+  return loops;
+}
+
+/// Takes no more memory than what comes out.
+std::vector<Eigen::Vector3f> choose_points(const Map& map, SubmapId submap) {
+  std::size_t num_all = 0;
+  map.landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { num_all += landmark.submap == submap; });
+  const std::size_t step =
+      std::max<std::size_t>((num_all + kMaxShownPoints - 1) / kMaxShownPoints, 1);
+  std::vector<Eigen::Vector3f> points;
+  points.reserve(num_all / step + 1);
+  std::size_t at = 0;
+  map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
+    if (landmark.submap != submap || at++ % step != 0) return;
+    points.push_back(landmark.position_in_world.cast<float>());
+  });
+  return points;
+}
+
 double ego_share(const Image& mask) {
   if (mask.values.empty()) return 0.0;
   return static_cast<double>(std::ranges::count(mask.values, 0)) /
@@ -128,6 +163,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   SessionResults results;
   results.summary = summarize(system, frames);
   add_trajectories(*system.map(), list_poses(system, frames), results);
+  results.summary.loop_frames = list_loops(system, frames);
   results.table = std::move(frames.table);
   results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
   results.ego_mask = system.ego_mask();
@@ -142,7 +178,10 @@ void add_trajectories(const Map& map,
                       const std::vector<std::pair<SubmapId, StampedPose>>& poses,
                       SessionResults& results) {
   for (auto& [submap, trajectory] : split_by_submap(poses)) {
-    if (results.trajectories.empty()) results.keyframes = keyframe_trajectory(map, submap);
+    if (results.trajectories.empty()) {
+      results.keyframes = keyframe_trajectory(map, submap);
+      results.points = choose_points(map, submap);
+    }
     results.trajectories.push_back(std::move(trajectory));
   }
   if (!results.trajectories.empty()) {
@@ -152,21 +191,23 @@ void add_trajectories(const Map& map,
 
 void prepare_results(const std::filesystem::path& folder) {
   make_output_folder(folder);
-  for (const char* name : {"trajectory.txt", "keyframes.txt", "summary.json", "frames.csv"}) {
+  for (const char* name :
+       {"trajectory.txt", "keyframes.txt", "points.ply", "summary.json", "frames.csv"}) {
     AtomicFile{folder / name};
     remove_abandoned_parts(folder / name);
   }
 }
 
 void write_results(const std::filesystem::path& folder, const SessionResults& results) {
-  save_each({[&] { write_trajectories(folder, results.trajectories); },
-             [&] {
-               write_trajectory(
-                   folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
-             },
-             [&] { write_summary_json(folder, results.summary); },
-             [&] { write_ego_mask(folder / "view_mask.png", results.ego_mask); },
-             [&] { write_frames_csv(folder, results.table); }});
+  save_each(
+      {[&] { write_trajectories(folder, results.trajectories); },
+       [&] {
+         write_trajectory(folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
+       },
+       [&] { write_file_atomically(folder / "points.ply", format_points_ply(results.points)); },
+       [&] { write_summary_json(folder, results.summary); },
+       [&] { write_ego_mask(folder / "view_mask.png", results.ego_mask); },
+       [&] { write_frames_csv(folder, results.table); }});
 }
 
 std::string_view to_string(Timing timing) {

@@ -21,12 +21,18 @@
 
 namespace waymark {
 
+/// Points are for a look at the map: so many are plenty. Of more, every second, third, ... is
+/// taken.
+inline constexpr std::size_t kMaxShownPoints = 10'000;
+
 /// Everything a session leaves behind.
 struct SessionResults {
   FrameTable table;  ///< A row per input frame, in order.
   /// One trajectory per sub-map, that with most frames first; world_from_camera0.
   std::vector<std::vector<StampedPose>> trajectories;
   std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
+  /// Some landmarks of the same, in its frame: see kMaxShownPoints.
+  std::vector<Eigen::Vector3f> points;
   RunSummary summary;
   Image ego_mask;  ///< What was found to move along with camera 0, see System::ego_mask().
   /// What ended the session before its input did; the rest is what there was until then.
@@ -58,8 +64,9 @@ void add_trajectories(const Map& map,
 /// that they cannot be written. Throws OutputError.
 void prepare_results(const std::filesystem::path& folder);
 
-/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, frames.csv, summary.json and, where
-/// something moves along, view_mask.png, each whatever becomes of the others; throws OutputError.
+/// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, points.ply, frames.csv, summary.json
+/// and, where something moves along, view_mask.png, each whatever becomes of the others; throws
+/// OutputError.
 void write_results(const std::filesystem::path& folder, const SessionResults& results);
 
 /// "inline", "lockstep", "realtime".

@@ -94,6 +94,12 @@ TEST(RunSession, GoesFromInputToResults) {
   EXPECT_GE(results.keyframes.size(), 3u);
   EXPECT_EQ(results.keyframes.size(), system.map()->keyframes().size());
   EXPECT_FALSE(results.table.frames[10].submap.is_valid());
+  EXPECT_FALSE(results.table.frames[10].num_features);
+  EXPECT_FALSE(results.table.frames[10].picture.is_known);
+  EXPECT_GT(results.table.frames[11].num_features, 100);
+  EXPECT_GT(results.table.frames[11].picture.contrast, 10);
+  EXPECT_EQ(results.points.size(), system.map()->landmarks().size());
+  EXPECT_THAT(results.summary.loop_frames, IsEmpty());
   EXPECT_GT(results.summary.wall_s, 0.0);
 
   const testing::TemporaryFolder folder;

@@ -139,6 +139,7 @@ Frame Localizer::Impl::build(const FrameImages& images,
   FrameImages used = images;
   if (!uses_range_) used.image1 = {}, used.depth = {};
   auto features = find_features(used, motion);
+  result.num_features = static_cast<std::uint32_t>(features->num_primary);
   Frame frame{
       FrameId{num_frames_}, images.timestamp_ns, std::move(features), builder_.small_image()};
   ++num_frames_;

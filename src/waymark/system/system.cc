@@ -164,6 +164,7 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   look_with_calibration();
   const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
   auto features = builder_.build(images, motion);
+  result.num_features = static_cast<std::uint32_t>(features->num_primary);
   const Frame frame{id, images.timestamp_ns, std::move(features), builder_.small_image()};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
@@ -178,6 +179,7 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   result.frame = FrameId{id.value - memory_.first().value};
   static_cast<FrameVerdict&>(result) = outcome;
   result.is_keyframe = outcome.message.has_value();
+  result.is_relocalized = outcome.is_relocalized;
   if (outcome.message) {
     // The mapper works in send() in kInline, and what kRealtime has to wait for is a sub-map.
     const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);

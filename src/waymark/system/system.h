@@ -21,9 +21,11 @@ namespace waymark {
 
 /// What is known of a frame right after it was fed.
 struct TrackingResult : FrameVerdict {
-  FrameId frame;             ///< Of this session, from 0 on.
-  bool is_keyframe = false;  ///< Whether it was sent to the map.
-  StageTimes stages;         ///< What it took.
+  FrameId frame;                   ///< Of this session, from 0 on.
+  bool is_keyframe = false;        ///< Whether it was sent to the map.
+  bool is_relocalized = false;     ///< Whether the camera was found again after a loss.
+  std::uint32_t num_features = 0;  ///< Of camera 0.
+  StageTimes stages;               ///< What it took.
 };
 
 /// A frame in the final trajectory.

@@ -1,0 +1,230 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/report/run_folder.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include "waymark/base/check.h"
+#include "waymark/base/text.h"
+
+namespace waymark {
+namespace {
+
+/// More parts of a map than anybody looks at.
+constexpr std::size_t kMaxParts = 1000;
+/// No camera goes further; squares of it are still numbers.
+constexpr double kMaxPosition = 1e9;
+
+constexpr std::string_view kFrameColumns = "the columns of a run's frames.csv";
+
+/// Where the columns of a table are.
+class FrameColumns {
+ public:
+  FrameColumns(const RowReader& head, FrameTable& table) {
+    const auto& names = head.fields();
+    for (std::size_t i = 0; i < names.size(); ++i) {
+      const std::string_view name = names[i];
+      names_.emplace_back(name);
+      if (!name.ends_with("_ms")) continue;
+      if (stages_.size() == FrameRecord::kMaxStages) {
+        throw InputError(head.where(),
+                         fmt::format("has too many columns of times, expected {}", kFrameColumns));
+      }
+      stages_.push_back(i);
+      table.stages.emplace_back(name.substr(0, name.size() - 3));
+    }
+    for (const char* needed : {"index", "timestamp_ns", "state", "reason", "matches", "inliers"}) {
+      if (!find(needed)) {
+        throw InputError(head.where(),
+                         fmt::format("has no column '{}', expected {}", needed, kFrameColumns));
+      }
+    }
+  }
+
+  std::size_t size() const { return names_.size(); }
+  const std::vector<std::size_t>& stages() const { return stages_; }
+  std::optional<std::size_t> find(std::string_view name) const {
+    const auto found = std::ranges::find(names_, name);
+    if (found == names_.end()) return std::nullopt;
+    return static_cast<std::size_t>(found - names_.begin());
+  }
+
+ private:
+  std::vector<std::string> names_;
+  std::vector<std::size_t> stages_;
+};
+
+/// A whole number from 0 to max of the current row; nothing where the field is empty or missing.
+std::optional<std::uint32_t> whole(const RowReader& row,
+                                   const FrameColumns& columns,
+                                   std::string_view name,
+                                   double max) {
+  const auto at = columns.find(name);
+  if (!at || row.fields()[*at].empty()) return std::nullopt;
+  const auto value = parse_number(row.fields()[*at]);
+  if (!value || *value < 0.0 || *value > max || *value != std::floor(*value)) {
+    throw InputError(row.where(),
+                     fmt::format("'{}' is {}, expected a whole number from 0 to {:.0f}",
+                                 name,
+                                 quote_for_message(row.fields()[*at]),
+                                 max));
+  }
+  return static_cast<std::uint32_t>(*value);
+}
+
+/// The value of an enum whose name, as written to result files, is in a field.
+template <class Enum>
+Enum named(const RowReader& row, std::size_t at, Enum last) {
+  const std::string_view text = row.fields()[at];
+  for (int i = 0; i <= static_cast<int>(last); ++i) {
+    if (to_string(static_cast<Enum>(i)) == text) return static_cast<Enum>(i);
+  }
+  throw InputError(row.where(),
+                   fmt::format("{} is no state or reason, expected one of docs/results.md",
+                               quote_for_message(text)));
+}
+
+PictureFigures parse_picture(const RowReader& row, const FrameColumns& columns) {
+  PictureFigures picture;
+  const auto brightness = whole(row, columns, "brightness", 255.0);
+  const auto contrast = whole(row, columns, "contrast", 255.0);
+  const auto blur = whole(row, columns, "blur", 100.0);
+  if (!brightness || !contrast || !blur) return picture;
+  return {static_cast<std::uint8_t>(*brightness),
+          static_cast<std::uint8_t>(*contrast),
+          static_cast<std::uint8_t>(*blur),
+          true};
+}
+
+FrameRecord parse_record(const RowReader& row, const FrameColumns& columns) {
+  constexpr double kMax = std::numeric_limits<std::int32_t>::max();
+  FrameRecord frame;
+  frame.index = whole(row, columns, "index", std::numeric_limits<std::uint32_t>::max()).value_or(0);
+  frame.timestamp_ns = row.nanoseconds(*columns.find("timestamp_ns"));
+  frame.state = named(row, *columns.find("state"), FrameState::kDropped);
+  frame.reason = named(row, *columns.find("reason"), FrameReason::kLate);
+  frame.num_matches = static_cast<int>(whole(row, columns, "matches", kMax).value_or(0));
+  frame.num_inliers = static_cast<int>(whole(row, columns, "inliers", kMax).value_or(0));
+  frame.is_keyframe = whole(row, columns, "is_keyframe", 1.0).value_or(0) == 1;
+  frame.is_relocalized = whole(row, columns, "is_relocalized", 1.0).value_or(0) == 1;
+  if (const auto submap = whole(row, columns, "submap", kMax)) frame.submap = SubmapId{*submap};
+  if (const auto features = whole(row, columns, "features", 65535.0)) {
+    frame.num_features = static_cast<std::uint16_t>(*features);
+  }
+  frame.picture = parse_picture(row, columns);
+  std::vector<double> times_ms;
+  for (const std::size_t at : columns.stages()) {
+    times_ms.push_back(std::clamp(row.number(at), 0.0, 6e4));  // What fits into half precision.
+  }
+  frame.set_stages(times_ms);
+  return frame;
+}
+
+/// A trajectory that may be empty, by time.
+std::vector<StampedPose> read_part(const std::filesystem::path& path) {
+  const std::string name = path.string();
+  std::vector<StampedPose> poses = parse_tum_trajectory(read_text_file(path, "a trajectory"), name);
+  for (const StampedPose& pose : poses) {
+    if (!(pose.world_from_camera.translation.cwiseAbs().maxCoeff() <= kMaxPosition)) {
+      throw InputError(
+          name, fmt::format("has a position beyond {:g}, expected a trajectory", kMaxPosition));
+    }
+  }
+  std::ranges::stable_sort(poses, {}, &StampedPose::timestamp_ns);
+  return poses;
+}
+
+std::vector<std::vector<StampedPose>> read_parts(const std::filesystem::path& folder) {
+  std::vector<std::vector<StampedPose>> parts = {read_part(folder / "trajectory.txt")};
+  for (std::size_t i = 1; i < kMaxParts; ++i) {
+    const auto path = folder / fmt::format("trajectory_{}.txt", i);
+    if (!std::filesystem::exists(path)) break;
+    parts.push_back(read_part(path));
+  }
+  return parts;
+}
+
+/// "walk" of "results/walk/" as well; of "." that of the folder itself.
+std::string name_of(const std::filesystem::path& folder) {
+  std::error_code error;
+  const std::filesystem::path whole_path = std::filesystem::weakly_canonical(folder, error);
+  const std::string name = (error ? folder : whole_path).filename().string();
+  return printable(name.empty() ? folder.string() : name);
+}
+
+/// How many points the head of a PLY file announces.
+std::optional<std::size_t> stated_points(std::string_view head) {
+  constexpr std::string_view kElement = "\nelement vertex ";
+  const std::size_t at = head.find(kElement);
+  if (at == std::string_view::npos) return std::nullopt;
+  const std::string_view rest = head.substr(at + kElement.size());
+  const auto number = parse_number(rest.substr(0, rest.find('\n')));
+  if (!number || !(*number >= 0.0 && *number <= 1e9)) return std::nullopt;
+  return static_cast<std::size_t>(*number);
+}
+
+}  // namespace
+
+FrameTable parse_frames_csv(std::string_view text, const std::string& name) {
+  FrameTable table;
+  RowReader rows(text, name, ',');
+  if (!rows.next()) throw InputError(name, fmt::format("is empty, expected {}", kFrameColumns));
+  const FrameColumns columns(rows, table);
+  while (rows.next()) {
+    rows.expect_exactly(columns.size(), "a field per column");
+    table.frames.push_back(parse_record(rows, columns));
+  }
+  return table;
+}
+
+std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::string& name) {
+  constexpr std::string_view kHeadEnd = "end_header\n";
+  const std::size_t end = text.find(kHeadEnd);
+  if (!text.starts_with("ply\nformat ascii 1.0\n") || end == std::string_view::npos) {
+    throw InputError(name, "has no head of a PLY file in ASCII, expected points of a run");
+  }
+  const std::size_t num_points = stated_points(text.substr(0, end)).value_or(0);
+  std::size_t num_rows = 0;
+  std::vector<Eigen::Vector3f> points;
+  RowReader rows(text.substr(end + kHeadEnd.size()), name, ' ');
+  while (rows.next()) {
+    ++num_rows;
+    rows.expect_exactly(3, "x y z");
+    const Eigen::Vector3d point(rows.number(0), rows.number(1), rows.number(2));
+    // Points that are far away are seen by nobody.
+    if (point.cwiseAbs().maxCoeff() <= kMaxPosition) points.push_back(point.cast<float>());
+  }
+  if (num_rows != num_points) {
+    throw InputError(name,
+                     fmt::format("has {} points, expected {} as it says", num_rows, num_points));
+  }
+  return points;
+}
+
+RunFolder read_run_folder(const std::filesystem::path& folder) {
+  constexpr std::string_view kExpected = "a folder that waymark run wrote";
+  if (!std::filesystem::is_directory(folder)) {
+    throw InputError(folder.string(), fmt::format("is no folder, expected {}", kExpected));
+  }
+  RunFolder run;
+  run.name = name_of(folder);
+  const auto read = [&](const char* name) { return read_text_file(folder / name, kExpected); };
+  const auto path = [&](const char* name) { return (folder / name).string(); };
+  run.summary = parse_summary_json(read("summary.json"), path("summary.json"));
+  run.table = parse_frames_csv(read("frames.csv"), path("frames.csv"));
+  run.trajectories = read_parts(folder);
+  if (std::filesystem::exists(folder / "points.ply")) {
+    run.points = parse_points_ply(read("points.ply"), path("points.ply"));
+  }
+  run.summary.counts = count_frames(run.table.frames);
+  run.summary.num_trajectory_lines = run.trajectories.front().size();
+  return run;
+}
+
+}  // namespace waymark
