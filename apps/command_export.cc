@@ -3,133 +3,111 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <optional>
 #include <string>
-#include <utility>
 #include <vector>
 
 #include "commands.h"
+#include "numbers.h"
 #include "terminal.h"
-#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/exchange/export_folder.h"
-#include "waymark/exchange/export_scene.h"
+#include "waymark/base/text.h"
+#include "waymark/exchange/export_map.h"
 #include "waymark/exchange/export_split.h"
-#include "waymark/exchange/exports.h"
-#include "waymark/map/parts.h"
+#include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {
 
-enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti };
-
 struct ExportOptions {
   std::filesystem::path map;
-  std::filesystem::path out;
-  ExportFormat format = ExportFormat::kPly;
-  bool is_text = false;
-  int split_views = 0;  ///< 0: as they are.
+  MapExport what;
+  std::vector<std::string> frames = {"keyframes"};
+  std::vector<std::filesystem::path> input;
+  std::filesystem::path trajectory;
 };
 
-bool makes_folder(ExportFormat format) {
-  return format == ExportFormat::kColmap || format == ExportFormat::kNerfstudio;
+[[noreturn]] void fail_frames(const std::vector<std::string>& words) {
+  std::string text;
+  for (const std::string& word : words) text += (text.empty() ? "" : " ") + word;
+  throw InputError("--frames",
+                   "is " + quote_for_message(text) +
+                       ", expected keyframes, all, every N or sharpest N with N from 1 on");
 }
 
-/// "points.ply", "points_1.ply" and so on.
-std::filesystem::path numbered(std::filesystem::path path, std::size_t number) {
-  if (number == 0) return path;
-  return path.replace_filename(
-      fmt::format("{}_{}{}", path.stem().string(), number, path.extension().string()));
+ExportedFrames parse_frames(const std::vector<std::string>& words) {
+  constexpr double kMaxNumber = 1e9;
+  static const std::map<std::string, FrameChoice> kChoices = {
+      {"keyframes", FrameChoice::kKeyframes},
+      {"all", FrameChoice::kAll},
+      {"every", FrameChoice::kEvery},
+      {"sharpest", FrameChoice::kSharpest}};
+  const auto found = kChoices.find(words.front());
+  if (found == kChoices.end()) fail_frames(words);
+  ExportedFrames frames{found->second, 1};
+  const bool has_number =
+      frames.choice == FrameChoice::kEvery || frames.choice == FrameChoice::kSharpest;
+  if (words.size() != (has_number ? 2u : 1u)) fail_frames(words);
+  if (!has_number) return frames;
+  const std::optional<double> number = parse_number(words.back());
+  if (!number || *number < 1.0 || *number > kMaxNumber) fail_frames(words);
+  frames.number = static_cast<std::size_t>(*number);
+  if (static_cast<double>(frames.number) != *number) fail_frames(words);
+  return frames;
 }
 
-void write_nerfstudio(const std::filesystem::path& folder,
-                      const ExportScene& scene,
-                      std::size_t number) {
-  NerfstudioPaths paths;
-  paths.point_file = numbered(paths.point_file, number).string();
-  const std::string json = format_nerfstudio(scene, paths);  // Before anything is written.
-  make_output_folder(folder);
-  write_ply(folder / paths.point_file, scene);
-  write_file_atomically(folder / numbered("transforms.json", number), json);
-}
-
-/// A model for COLMAP or nerfstudio, with images.
-void export_model(const ExportOptions& options,
-                  const StoredMap& stored,
-                  ExportScene scene,
-                  std::size_t number) {
-  SplitScene split;
-  if (options.split_views > 0) {
-    split = split_scene(scene, options.split_views, CameraRegistry::with_builtin_models());
-  } else {
-    split.parts.resize(scene.views.size());
-    split.scene = std::move(scene);
+int run_export(ExportOptions options) {
+  silence_image_library();
+  MapExport& what = options.what;
+  what.frames = parse_frames(options.frames);
+  if (!options.input.empty()) what.input = options.input.front();
+  if (options.input.size() > 1) what.reading.right = options.input.back();
+  if (!options.trajectory.empty()) {
+    what.trajectory = read_trajectory(options.trajectory);
+    what.trajectory_name = options.trajectory.string();
   }
-  if (options.format == ExportFormat::kColmap) {
-    write_colmap(options.out / "sparse" / fmt::to_string(number),
-                 split.scene,
-                 options.is_text ? ColmapForm::kText : ColmapForm::kBinary);
-  } else {
-    write_nerfstudio(options.out, split.scene, number);
-  }
-  if (stored.images.empty()) return;
-  write_split_images(options.out / "images", options.out / "masks", split, stored.images);
-}
-
-/// The number-th largest sub-map.
-void export_submap(const ExportOptions& options,
-                   const StoredMap& stored,
-                   SubmapId submap,
-                   std::size_t number) {
-  const std::filesystem::path file = numbered(options.out, number);
-  switch (options.format) {
-    case ExportFormat::kTum:
-      return write_trajectory(
-          file, keyframe_trajectory(*stored.map, submap), TrajectoryFormat::kTum);
-    case ExportFormat::kKitti:
-      return write_trajectory(
-          file, keyframe_trajectory(*stored.map, submap), TrajectoryFormat::kKitti);
-    case ExportFormat::kPly:
-      return write_ply(file, make_export_scene(*stored.map, submap, stored.images));
-    case ExportFormat::kColmap:
-    case ExportFormat::kNerfstudio:
-      return export_model(
-          options, stored, make_export_scene(*stored.map, submap, stored.images), number);
-  }
-}
-
-void export_submaps(const ExportOptions& options,
-                    const StoredMap& stored,
-                    const std::vector<SubmapId>& submaps) {
-  for (std::size_t i = 0; i < submaps.size(); ++i) export_submap(options, stored, submaps[i], i);
-}
-
-int export_map(const ExportOptions& options) {
   const StoredMap stored = load_map(options.map);
-  const std::vector<SubmapId> submaps = submaps_by_size(*stored.map);
-  if (submaps.empty()) {
-    throw InputError(options.map.string(), "has no keyframes, expected some to export");
-  }
-  if (makes_folder(options.format)) {
-    ExportFolder folder(options.out);
-    ExportOptions unfinished = options;
-    unfinished.out = folder.unfinished();
-    export_submaps(unfinished, stored, submaps);
-    folder.finish();
-  } else {
-    export_submaps(options, stored, submaps);
-  }
-  print_result("{} sub-map{} of {} to {}\n",
-               submaps.size(),
-               submaps.size() == 1 ? "" : "s",
+  const MapExportCounts counts = export_map(stored, options.map.string(), what);
+  const std::string models =
+      counts.num_views == 0
+          ? ""
+          : fmt::format(": {} views, {} images", counts.num_views, counts.num_images);
+  print_result("{} sub-map{} of {} to {}{}\n",
+               counts.num_submaps,
+               counts.num_submaps == 1 ? "" : "s",
                options.map.string(),
-               options.out.string());
-  if (stored.images.empty() && options.format != ExportFormat::kTum &&
-      options.format != ExportFormat::kKitti) {
+               what.out.string(),
+               models);
+  const bool has_colors = what.format != ExportFormat::kTum && what.format != ExportFormat::kKitti;
+  if (stored.images.empty() && what.input.empty() && has_colors) {
     print_message("note: the map holds no images (run --keep-images); points are grey\n");
   }
   return kDone;
+}
+
+void add_frame_options(CLI::App& exporting, ExportOptions& options) {
+  exporting
+      .add_option(
+          "--frames",
+          options.frames,
+          "Frames that become views of a model: keyframes, all, every N, or sharpest N, the "
+          "sharpest of each of N parts of the way [keyframes]")
+      ->expected(1, 2)
+      ->type_name("WHICH [N]");
+  exporting
+      .add_option("--input",
+                  options.input,
+                  "The recording that the map was made of, for images the map does not hold: of "
+                  "other frames than keyframes, and of camera 1 [none]")
+      ->expected(1, 2)
+      ->type_name("INPUT [RIGHT]");
+  exporting.add_option("--trajectory",
+                       options.trajectory,
+                       "Poses of camera 0 in the run that made the map, for --frames (its "
+                       "trajectory.txt) [none]");
 }
 
 }  // namespace
@@ -140,26 +118,28 @@ void add_export_command(CLI::App& program, Command& command) {
   exporting.add_option("MAP", options->map, "Map file (.wmap)")->required();
   exporting
       .add_option("-o,--out",
-                  options->out,
+                  options->what.out,
                   "File for ply, tum, kitti (of keyframes); folder for colmap, nerfstudio")
       ->required();
   add_choice<ExportFormat>(exporting,
                            "--format",
-                           options->format,
+                           options->what.format,
                            {{"ply", ExportFormat::kPly},
                             {"colmap", ExportFormat::kColmap},
                             {"nerfstudio", ExportFormat::kNerfstudio},
                             {"tum", ExportFormat::kTum},
                             {"kitti", ExportFormat::kKitti}},
                            "ply, colmap, nerfstudio, tum or kitti [ply]");
-  exporting.add_flag("--text", options->is_text, "COLMAP's text form instead of its binary one");
+  exporting.add_flag(
+      "--text", options->what.is_text, "COLMAP's text form instead of its binary one");
   exporting
       .add_option("--split-views",
-                  options->split_views,
+                  options->what.split_views,
                   "Split 360 degree and fisheye keyframes into so many perspective views of 90 "
                   "degrees; 6 of 360 degrees are a cube")
       ->check(CLI::Range(kMinSplitViews, kMaxSplitViews));
-  exporting.callback([options, &command] { command = [options] { return export_map(*options); }; });
+  add_frame_options(exporting, *options);
+  exporting.callback([options, &command] { command = [options] { return run_export(*options); }; });
 }
 
 }  // namespace waymark

@@ -102,7 +102,7 @@ class ColmapModel:
                 "track": [(int(a), int(b)) for a, b in zip(row[8::2], row[9::2])]}
 
     def _read_binary(self, folder):
-        models = {1: ("PINHOLE", 4), 4: ("OPENCV", 8), 6: ("FULL_OPENCV", 12)}
+        models = {1: ("PINHOLE", 4), 4: ("OPENCV", 8), 5: ("OPENCV_FISHEYE", 8), 6: ("FULL_OPENCV", 12)}
         take = Taker((folder / "cameras.bin").read_bytes())
         for _ in range(take("<Q")):
             number, model = take("<I"), take("<i")
@@ -165,13 +165,13 @@ class Taker:
 
 
 def read_ply(path):
-    """Points and colours of a binary file with these alone."""
+    """Points, normals and colours of a binary file with these alone."""
     header, body = path.read_bytes().split(b"end_header\n", 1)
     lines = header.decode().split("\n")
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"], lines[:2]
     count = int(next(line for line in lines if line.startswith("element vertex")).split()[2])
     names = [line.split()[1:] for line in lines if line.startswith("property")]
-    assert names == [["float", "x"], ["float", "y"], ["float", "z"], ["uchar", "red"],
-                     ["uchar", "green"], ["uchar", "blue"]], names
-    assert len(body) == 15 * count
-    return [struct.unpack_from("<3f3B", body, 15 * i) for i in range(count)]
+    assert names == [["float", "x"], ["float", "y"], ["float", "z"], ["float", "nx"], ["float", "ny"],
+                     ["float", "nz"], ["uchar", "red"], ["uchar", "green"], ["uchar", "blue"]], names
+    assert len(body) == 27 * count
+    return [struct.unpack_from("<6f3B", body, 27 * i) for i in range(count)]

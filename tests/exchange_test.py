@@ -12,8 +12,8 @@ import pathlib
 import struct
 import unittest
 
-from cli_support import CliTest, waymark
-from exchange_formats import ColmapModel, pack, read_ply, small_msg
+from cli_support import CliTest, waymark, write_png
+from exchange_formats import ColmapModel, pack, read_ply, rotate, small_msg
 
 SETTINGS = """Camera:
   name: "cam"
@@ -36,7 +36,15 @@ def rms(errors):
     return math.sqrt(sum(error * error for error in errors) / len(errors))
 
 
-class Exchange(CliTest):
+class ExchangeTest(CliTest):
+    def assert_refused(self, done, *words):
+        """Status 2 and one line with these words."""
+        self.assertEqual((done.returncode, len(done.stderr.strip().split("\n"))), (2, 1), done.stderr)
+        for word in words:
+            self.assertIn(word, done.stderr)
+
+
+class Exchange(ExchangeTest):
     def setUp(self):
         super().setUp()
         self.out.mkdir()
@@ -106,10 +114,14 @@ class Export(Exchange):
         document["cameras"]["cam"].update(model_type="Fisheye", k4=0.0)
         self.import_map(document)
         folder = self.export("colmap", "again", "--text", "--split-views", 5)
-        (folder / "sparse" / "0" / "mine.txt").write_text("mine")
         self.export("colmap", "again")
         self.assertEqual({path.name for path in (folder / "sparse" / "0").iterdir()},
-                         {"cameras.bin", "images.bin", "points3D.bin", "mine.txt"})
+                         {"cameras.bin", "images.bin", "points3D.bin"})
+        (folder / "sparse" / "0" / "mine.txt").write_text("mine")
+        done = waymark("export", self.map, "--format", "nerfstudio", "-o", folder)
+        self.assert_refused(done, "again", "mine.txt", "expected a new or empty folder")
+        self.assertTrue((folder / "sparse" / "0" / "images.bin").exists())
+        self.assertEqual([path for path in self.folder.iterdir() if path.name.startswith(".")], [])
 
     def test_split_views(self):
         document = small_msg()
@@ -143,6 +155,69 @@ class Export(Exchange):
         for model in self.colmap_models():
             self.assertGreater(len(model.points), 3000)
             self.assertLess(rms(model.errors()), 1.5)
+
+
+class Recorded(ExchangeTest):
+    """Exports with the images of the recording: of both cameras, and of other frames than keyframes."""
+
+    def setUp(self):
+        super().setUp()
+        self.recording = self.sequence("stereo")
+        self.assertEqual(self.run_on(self.recording, "--map-out", self.folder / "map.wmap").returncode, 0)
+        self.trajectory = self.out / "trajectory.txt"
+
+    def export(self, kind, *arguments):
+        return waymark("export", self.folder / "map.wmap", "--format", kind, "-o", self.folder / "export", *arguments)
+
+    def frames(self, kind, *which):
+        done = self.export(kind, "--input", self.recording, "--trajectory", self.trajectory, "--frames", *which)
+        self.assertEqual(done.returncode, 0, done.stderr)
+
+    def test_both_cameras(self):
+        self.assertEqual(self.export("colmap", "--input", self.recording).returncode, 0)
+        model = ColmapModel(self.folder / "export/sparse/0", ".bin")
+        for image in model.images.values():
+            self.assertTrue((self.folder / "export/images" / image["name"]).exists())
+        cameras = {image["name"][:5]: image["camera"] for image in model.images.values()}
+        self.assertEqual(set(cameras), {"cam0/", "cam1/"})
+        self.assertNotEqual(cameras["cam0/"], cameras["cam1/"])
+        self.assertLess(rms(model.errors()), 1.0)
+        seen = [{model.images[image]["name"][:5] for image, _ in point["track"]} for point in model.points.values()]
+        self.assertGreater(sum(len(names) == 2 for names in seen), len(seen) / 2)
+        self.assertTrue(any(point["rgb"] != [128, 128, 128] for point in model.points.values()))
+        rig, = json.loads((self.folder / "export/rig.json").read_text())
+        self.assertEqual(rig["cameras"][1]["rel_tvec"], [-0.2, 0.003, 0.0])
+
+    def test_frames_lie_on_the_trajectory(self):
+        self.frames("colmap", "all")
+        poses = [list(map(float, row.split())) for row in self.trajectory.read_text().split("\n")[:-1]]
+        images = ColmapModel(self.folder / "export/sparse/0", ".bin").images.values()
+        self.assertEqual(len(images), 2 * len(poses))
+        left = sorted((image for image in images if image["name"].startswith("cam0")), key=lambda image: image["name"])
+        for pose, image in zip(poses, left):
+            turned_back = [image["q"][0]] + [-part for part in image["q"][1:]]
+            centre = rotate(turned_back, [-part for part in image["t"]])
+            self.assertLess(math.dist(centre, pose[1:4]), 1e-6)
+        self.frames("nerfstudio", "every", 10)
+        views = json.loads((self.folder / "export/transforms.json").read_text())["frames"]
+        self.assertEqual(len(views), 2 * math.ceil(len(poses) / 10))
+
+    def test_what_cannot_be(self):
+        self.assert_refused(self.export("colmap", "--frames", "all"), "--input")
+        self.assert_refused(self.export("colmap", "--frames", "all", "--input", self.recording), "--trajectory")
+        self.assert_refused(self.export("ply", "--input", self.recording), "colmap or nerfstudio")
+        for which in (["some"], ["every"], ["every", 0], ["all", 3], ["sharpest", "x"]):
+            self.assert_refused(self.export("colmap", "--frames", *which), "--frames", "expected keyframes, all")
+        other = self.folder / "other.txt"
+        other.write_text("".join(f"{1000 + i}.0 0 0 0 0 0 0 1\n" for i in range(5)))
+        done = self.export("colmap", "--frames", "all", "--input", self.recording, "--trajectory", other)
+        self.assert_refused(done, "has no frame of the map")
+        small = self.folder / "small"
+        small.mkdir()
+        for i in range(3):
+            write_png(small / f"{i}.png", 64, 48)
+        self.assert_refused(self.export("colmap", "--input", small), "64x48", "376x240")
+        self.assertFalse((self.folder / "export").exists())
 
 
 class Import(Exchange):

@@ -133,9 +133,11 @@ void bind_camera(py::module_& module);
 void bind_images(py::module_& module);
 void bind_features(py::module_& module);
 void bind_map(py::module_& module);
+void bind_map_tasks(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module);
 void bind_map_tables(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module);
 void bind_results(py::module_& module);
 void bind_system(py::module_& module);
 void bind_localizer(py::module_& module);
+void bind_viewer(py::module_& module);
 
 }  // namespace waymark::python

@@ -188,8 +188,16 @@ void bind_parts(py::module_& module) {
       .get("root",
            "int or None: its first keyframe; None once joined.",
            [](auto& self) { return optional_id(self.submap.root); })
-      .get("joined_into", "int or None: the sub-map that it is a part of now.", [](auto& self) {
-        return optional_id(self.submap.joined_into);
+      .get("joined_into",
+           "int or None: the sub-map that it is a part of now.",
+           [](auto& self) { return optional_id(self.submap.joined_into); })
+      .def("__repr__", [](const PythonSubmap& self) {
+        const SubmapId target = self.submap.joined_into;
+        return "<Submap " + std::to_string(self.id) +
+               (target.is_valid()
+                    ? ", joined into " + std::to_string(target.value)
+                    : std::string(self.submap.is_metric ? ", in metres" : ", scale free")) +
+               ">";
       });
   Class<LoopEdge>(module, "LoopEdge", "Two keyframes that were found to show the same place.")
       .get("from_keyframe", "int.", [](auto& self) { return self.from.value; })
@@ -201,7 +209,11 @@ void bind_parts(py::module_& module) {
            })
       .get("scale",
            "float: lengths around to_keyframe by those around from_keyframe; 1 in metres.",
-           [](auto& self) { return self.to_from_from.scale; });
+           [](auto& self) { return self.to_from_from.scale; })
+      .def("__repr__", [](const LoopEdge& self) {
+        return "<LoopEdge from keyframe " + std::to_string(self.from.value) + " to " +
+               std::to_string(self.to.value) + ">";
+      });
 }
 
 using MapClass = Class<PythonMap, std::shared_ptr<PythonMap>>;
@@ -276,6 +288,7 @@ Free to be read by any number of threads. Its frame is that of the first keyfram
   bind_whole(map);
   bind_access(map);
   bind_map_tables(map, module);
+  bind_map_tasks(map, module);
 }
 
 }  // namespace waymark::python

@@ -73,5 +73,6 @@ PYBIND11_MODULE(_waymark, module) {
   python::bind_results(module);
   python::bind_system(module);
   python::bind_localizer(module);
+  python::bind_viewer(module);
   python::rename_module(module);
 }

@@ -2,15 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // What System and Localizer return.
+#include <fmt/format.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <set>
 #include <string>
 #include <vector>
 
 #include "arguments.h"
 #include "arrays.h"
 #include "bindings.h"
+#include "pictures.h"
 #include "texts.h"
 #include "waymark/base/text.h"
 #include "waymark/exchange/trajectory.h"
@@ -115,6 +118,37 @@ void write(const Trajectory& trajectory, const py::object& path, const std::stri
                         ", expected tum, kitti or euroc");
 }
 
+/// "40 frames in 1 sub-map, 3.21 long": how far the camera went, in metres or map units.
+std::string extent_of(const Trajectory& trajectory) {
+  double length = 0.0;
+  std::set<SubmapId> submaps;
+  for (std::size_t i = 0; i < trajectory.frames.size(); ++i) {
+    const TrajectoryFrame& frame = trajectory.frames[i];
+    submaps.insert(frame.submap);
+    if (i == 0 || frame.submap != trajectory.frames[i - 1].submap) continue;
+    length +=
+        (frame.world_from_rig.translation - trajectory.frames[i - 1].world_from_rig.translation)
+            .norm();
+  }
+  return fmt::format("{} frame{} in {} sub-map{}, {:.3g} long",
+                     trajectory.frames.size(),
+                     trajectory.frames.size() == 1 ? "" : "s",
+                     submaps.size(),
+                     submaps.size() == 1 ? "" : "s",
+                     length);
+}
+
+/// Of the largest sub-map: each has a world of its own.
+std::string picture_of(const Trajectory& trajectory) {
+  MapPicture picture;
+  const Trajectory largest = trajectory.largest();
+  if (!largest.frames.empty()) picture.ways.emplace_back();
+  for (const TrajectoryFrame& frame : largest.frames) {
+    picture.ways.back().push_back(frame.world_from_rig);
+  }
+  return draw_html(picture, extent_of(trajectory));
+}
+
 void bind_trajectory(py::module_& module) {
   Class<Trajectory>(
       module,
@@ -147,7 +181,10 @@ The frames of the sub-map that has most of them: what the program writes to traj
 --
 
 Writes a file: 'tum' (t tx ty tz qx qy qz qw), 'kitti' or 'euroc'. OutputError when that fails.)")
-      .def("__len__", [](const Trajectory& self) { return self.frames.size(); });
+      .def("__len__", [](const Trajectory& self) { return self.frames.size(); })
+      .def("__repr__",
+           [](const Trajectory& self) { return "<Trajectory of " + extent_of(self) + ">"; })
+      .def("_repr_html_", &picture_of);
 }
 
 void bind_statistics(py::module_& module) {
@@ -159,15 +196,27 @@ void bind_statistics(py::module_& module) {
       .get("num_relocalizations",
            "int: times the lost camera was found again.",
            &SystemStatistics::num_relocalizations)
-      .get("mapping_ms", "float64 array: milliseconds of the mapper per keyframe.", [](auto& self) {
-        return array_of(self.mapping_ms);
+      .get("mapping_ms",
+           "float64 array: milliseconds of the mapper per keyframe.",
+           [](auto& self) { return array_of(self.mapping_ms); })
+      .def("__repr__", [](const SystemStatistics& self) {
+        return fmt::format(
+            "<Statistics: {} keyframes, {} landmarks, {} sub-maps, {} loops, {} relocalizations>",
+            self.num_keyframes,
+            self.num_landmarks,
+            self.num_submaps,
+            self.num_loops,
+            self.num_relocalizations);
       });
   Class<FocalCheck>(
       module, "FocalCheck", "What the residuals say of the calibration's focal length.")
       .get(
           "factor", "float: the true focal length by that of the calibration.", &FocalCheck::factor)
       .get("sigma", "float: standard deviation of the factor.", &FocalCheck::sigma)
-      .get("is_off", "bool: off by more than 2 %, beyond doubt.", &FocalCheck::is_off);
+      .get("is_off", "bool: off by more than 2 %, beyond doubt.", &FocalCheck::is_off)
+      .def("__repr__", [](const FocalCheck& self) {
+        return fmt::format("<FocalCheck: factor {:.4f} +- {:.4f}>", self.factor, self.sigma);
+      });
   Class<CalibrationEstimate>(module,
                              "CalibrationEstimate",
                              "What the images told of one number of the calibration; px, rad or 1.")
@@ -180,7 +229,14 @@ void bind_statistics(py::module_& module) {
       .get("sigma", "float: standard deviation of the value in use.", &CalibrationEstimate::sigma)
       .get("is_changed",
            "bool: whether the images contradict what was given.",
-           &CalibrationEstimate::is_changed);
+           &CalibrationEstimate::is_changed)
+      .def("__repr__", [](const CalibrationEstimate& self) {
+        return fmt::format("<CalibrationEstimate {}: {:.6g} -> {:.6g} +- {:.2g}>",
+                           self.name,
+                           self.given,
+                           self.given + self.change,
+                           self.sigma);
+      });
 }
 
 }  // namespace

@@ -14,7 +14,9 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "texts.h"
+#include "viewer.h"
 #include "waymark/base/text.h"
+#include "waymark/session/session.h"
 
 namespace waymark::python {
 namespace {
@@ -46,6 +48,7 @@ class PythonSystem {
       const ReleasedGil released;
       result = system_.feed(input);
     }
+    if (viewer_) viewer_->tell(system_, input, result);
     // The first frame decides.
     if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
     return result;
@@ -53,23 +56,38 @@ class PythonSystem {
 
   void finish() {
     const Turn turn = take();
-    const ReleasedGil released;
-    system_.finish();
+    {
+      const ReleasedGil released;
+      system_.finish();
+    }
     is_finished_ = true;
+    if (viewer_) viewer_->finish(system_);
   }
 
   void reset() {
     const Turn turn = take();
     expect_unfinished("reset");
-    const ReleasedGil released;
-    system_.reset();
+    {
+      const ReleasedGil released;
+      system_.reset();
+    }
     images_.clear();
+    if (viewer_) viewer_->reset();
   }
 
   void set_mapping(bool is_on) {
     const Turn turn = take();
     expect_unfinished("set_mapping");
     system_.set_mapping(is_on);
+    if (viewer_) viewer_->set_mapping(is_on);
+  }
+
+  std::shared_ptr<PythonViewer> view(const ViewerOptions& address) {
+    const Turn turn = take();
+    expect_unfinished("view");
+    const std::string setup = config_.setup ? std::string(to_string(*config_.setup)) : "mono";
+    viewer_ = std::make_shared<PythonViewer>(address, setup, std::string(to_string(timing_)));
+    return viewer_;
   }
 
   std::shared_ptr<PythonMap> map() {
@@ -141,16 +159,19 @@ class PythonSystem {
   Turn take() { return Turn(is_taken_, "System"); }
 
   SessionConfig config_;
+  const Timing timing_;
   const std::string settings_yaml_;
   System system_;
   KeyframeImages images_;  // Of the map to go on in.
   std::shared_ptr<PythonMap> last_map_;
+  std::shared_ptr<PythonViewer> viewer_;
   bool is_finished_ = false;
   bool is_taken_ = false;
 };
 
 PythonSystem::PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map)
     : config_(std::move(config)),
+      timing_(timing),
       settings_yaml_(settings_as_yaml(config_.settings)),
       system_(config_.rig, config_.settings, timing, map ? map->stored.map : nullptr) {
   if (map) images_ = map->stored.images;
@@ -231,6 +252,17 @@ Off: the camera is followed in the map, which stays as it is. On at first.)")
 --
 
 Writes the newest map to a file (.wmap), whole or not at all. OutputError when that fails.)")
+      .def(
+          "view",
+          [](PythonSystem& self, const py::object& address) {
+            return self.view(address_argument(address));
+          },
+          py::arg("address") = "8080",
+          R"(view(self, address='8080')
+--
+
+Shows the frames fed from now on, and the map, in the browser: a Viewer at a port of this machine
+(0: a free one) or 'HOST:PORT', until its close() or as long as the System is there.)")
       .get("is_finished", "bool: finish() was called.", &PythonSystem::is_finished)
       .def("__enter__", [](const py::object& self) { return self; })
       .def("__exit__", [](PythonSystem& self, const py::args& args) {

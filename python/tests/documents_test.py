@@ -15,7 +15,7 @@ from support import DATA, Test
 from waymark import _waymark
 
 STUBS = ast.parse((pathlib.Path(waymark.__file__).parent / "_waymark.pyi").read_text())
-SPECIAL = {"__init__", "__iter__", "__next__", "__len__", "__enter__", "__exit__"}
+SPECIAL = {"__init__", "__iter__", "__next__", "__len__", "__enter__", "__exit__", "_repr_html_"}
 
 
 def parameters_of_stub(function):

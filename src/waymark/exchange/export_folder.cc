@@ -2,79 +2,101 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/exchange/export_folder.h"
 
-#include <algorithm>
+#include <fcntl.h>
+#include <fmt/format.h>
+
+#include <cstdio>
 #include <fstream>
-#include <iterator>
 #include <set>
 #include <string>
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
 
 namespace fs = std::filesystem;
 
-constexpr const char* kUnfinishedName = ".waymark_export.partial";
-
-bool is_missing(const fs::path& path) {
-  std::error_code error;
-  return fs::status(path, error).type() == fs::file_type::not_found;
-}
-
 /// Of files, relative to the folder of the export.
 using ExportedNames = std::set<fs::path>;
 
-/// A list may have come from anywhere: only what is below the folder counts.
-bool is_below(const fs::path& name) {
-  return !name.empty() && name.is_relative() &&
-         std::none_of(name.begin(), name.end(), [](const fs::path& part) { return part == ".."; });
-}
-
 ExportedNames read_export_list(const fs::path& path) {
-  ExportedNames names;
+  ExportedNames names = {ExportFolder::kListName};
   std::ifstream stream(path);
-  for (std::string line; std::getline(stream, line);) {
-    if (is_below(line)) names.insert(line);
-  }
+  for (std::string line; std::getline(stream, line);) names.insert(line);
   return names;
-}
-
-void write_export_list(const fs::path& path, const ExportedNames& names) {
-  std::string text;
-  for (const fs::path& name : names) text += name.generic_string() + "\n";
-  write_file_atomically(path, text);
 }
 
 ExportedNames files_below(const fs::path& folder) {
   ExportedNames names;
   for (const fs::directory_entry& entry : fs::recursive_directory_iterator(folder)) {
-    if (!entry.is_directory()) names.insert(entry.path().lexically_relative(folder));
+    const bool is_folder = entry.is_directory() && !entry.is_symlink();
+    if (!is_folder) names.insert(entry.path().lexically_relative(folder));
   }
   return names;
 }
 
-void move_export(const fs::path& from, const fs::path& to) {
-  make_output_folder(to.parent_path());
+/// What a name leads to: a link stays, and where it leads is replaced.
+fs::path resolve(const fs::path& folder) {
   std::error_code error;
-  fs::rename(from, to, error);
-  if (!error) return;
-  throw OutputError(to.string(),
-                    "cannot be written: " + error.message() + ", expected a file or a new name");
+  fs::path resolved = fs::weakly_canonical(folder, error);
+  if (error) resolved = fs::absolute(folder);
+  return resolved.has_filename() ? resolved : resolved.parent_path();
 }
 
-/// Removes a file and the folders that are empty then, up to that of the export.
-void remove_exported(const fs::path& folder, fs::path name) {
+/// Beside the folder, hidden.
+fs::path beside(const fs::path& folder, const char* what) {
+  return folder.parent_path() / fmt::format(".{}.waymark_{}", folder.filename().string(), what);
+}
+
+/// Throws unless the folder is missing, empty, or just what an export left.
+void expect_replaceable(const fs::path& folder) {
   std::error_code error;
-  if (fs::is_directory(folder / name, error)) return;
-  while (!name.empty() && fs::remove(folder / name, error)) name = name.parent_path();
+  const fs::file_status status = fs::status(folder, error);
+  if (status.type() == fs::file_type::not_found) return;
+  if (!fs::is_directory(status)) {
+    throw OutputError(folder.string(), "is a file, expected a folder or a new name");
+  }
+  try {
+    const ExportedNames listed = read_export_list(folder / ExportFolder::kListName);
+    for (const fs::path& name : files_below(folder)) {
+      if (listed.contains(name)) continue;
+      throw InputError(folder.string(),
+                       fmt::format("holds {}, which no earlier export left there, expected a new "
+                                   "or empty folder, or an export",
+                                   quote_for_message(name.string())));
+    }
+  } catch (const fs::filesystem_error& failure) {
+    throw OutputError(folder.string(), "cannot be read: " + failure.code().message());
+  }
+}
+
+[[noreturn]] void fail_rename(const fs::path& folder, const std::error_code& error) {
+  throw OutputError(folder.string(),
+                    "cannot be written: " + error.message() + ", expected a new name");
+}
+
+/// Puts a folder where another is, which then has its name: at no moment is there none. Where the
+/// file system cannot do that, the other goes out of the way first.
+void exchange(const fs::path& made, const fs::path& folder) {
+  if (::renameat2(AT_FDCWD, made.c_str(), AT_FDCWD, folder.c_str(), RENAME_EXCHANGE) == 0) return;
+  const fs::path earlier = beside(folder, "earlier");
+  std::error_code error, ignored;
+  fs::remove_all(earlier, ignored);
+  fs::rename(folder, earlier, error);
+  if (error) fail_rename(folder, error);
+  fs::rename(made, folder, error);
+  fs::rename(earlier, error ? folder : made, ignored);
+  if (error) fail_rename(folder, error);
 }
 
 }  // namespace
 
 ExportFolder::ExportFolder(const fs::path& folder)
-    : folder_(folder), unfinished_(folder / kUnfinishedName), is_new_(is_missing(folder)) {
+    : folder_(resolve(folder)), unfinished_(beside(folder_, "partial")) {
+  expect_replaceable(folder_);
   std::error_code ignored;
   fs::remove_all(unfinished_, ignored);  // Of a program that was killed.
   make_output_folder(unfinished_);
@@ -83,20 +105,17 @@ ExportFolder::ExportFolder(const fs::path& folder)
 ExportFolder::~ExportFolder() {
   std::error_code ignored;
   fs::remove_all(unfinished_, ignored);
-  if (is_new_) fs::remove(folder_, ignored);  // Unless there is something in it.
 }
 
 void ExportFolder::finish() {
-  const ExportedNames names = files_below(unfinished_);
-  ExportedNames all = read_export_list(folder_ / kListName);
-  ExportedNames gone;
-  std::ranges::set_difference(all, names, std::inserter(gone, gone.end()));
-  all.insert(names.begin(), names.end());
-  // At any moment all that is an export's is in the list.
-  write_export_list(folder_ / kListName, all);
-  for (const fs::path& name : names) move_export(unfinished_ / name, folder_ / name);
-  for (const fs::path& name : gone) remove_exported(folder_, name);
-  write_export_list(folder_ / kListName, names);
+  std::string list;
+  for (const fs::path& name : files_below(unfinished_)) list += name.generic_string() + "\n";
+  write_file_atomically(unfinished_ / kListName, list);
+  expect_replaceable(folder_);
+  std::error_code error;
+  if (fs::exists(folder_, error)) return exchange(unfinished_, folder_);
+  fs::rename(unfinished_, folder_, error);
+  if (error) fail_rename(folder_, error);
 }
 
 }  // namespace waymark

@@ -6,15 +6,17 @@
 
 namespace waymark {
 
-/// The folder of an export, which may hold an earlier one. Files are made in a folder of their own
-/// inside it and moved to their places by finish(), which removes what the earlier export left and
-/// this one does not have. A list in the folder (kListName) says what is an export's; other files
-/// stay, unless they have the name of a new one. Without finish() all stays as it was.
+/// The folder of an export, which is there as a whole or not at all: files are made in a folder
+/// beside it, which takes its name at the end. An earlier export under that name is replaced; a
+/// list in the folder (kListName) says what is an export's. A folder with other files is refused,
+/// so that nothing of anybody's is lost and nothing old is taken for a part of the new. Without
+/// finish() all stays as it was.
 class ExportFolder {
  public:
   static constexpr const char* kListName = "waymark_export.txt";
 
-  /// Makes the folder where it is missing; throws OutputError when that fails.
+  /// Throws InputError for a folder with files that are no export's, OutputError where no folder
+  /// can be made.
   explicit ExportFolder(const std::filesystem::path& folder);
   ~ExportFolder();
   ExportFolder(const ExportFolder&) = delete;
@@ -22,13 +24,13 @@ class ExportFolder {
 
   /// Where the files are to be made.
   const std::filesystem::path& unfinished() const { return unfinished_; }
-  /// Once, after the last file is made. Throws OutputError.
+  /// Once, after the last file is made. Throws like the constructor: what was there may have
+  /// changed meanwhile.
   void finish();
 
  private:
   const std::filesystem::path folder_;
   const std::filesystem::path unfinished_;
-  const bool is_new_;
 };
 
 }  // namespace waymark

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
 
@@ -17,6 +18,8 @@ namespace waymark {
 namespace {
 
 using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::input_error_of;
 using testing::TemporaryFolder;
 
 /// An export of files that hold the content each.
@@ -40,55 +43,64 @@ std::vector<std::string> all_below(const std::filesystem::path& folder) {
   return names;
 }
 
-TEST(ExportFolder, ReplacesAnEarlierExportAndNothingElse) {
+TEST(ExportFolder, ReplacesAnEarlierExportAsAWhole) {
   const TemporaryFolder folder;
   const auto out = folder / "out";
   export_files(out, {"images/1.jpg", "images/2.jpg", "masks/2.png", "sparse/1/cameras.bin"}, "a");
-  folder.write("out/images/mine.jpg", "mine");
-  folder.write("out/notes.txt", "mine");
+  std::filesystem::create_directories(out / "mine");  // An empty folder holds nothing to lose.
   export_files(out, {"images/1.jpg", "images/3.jpg"}, "b");
-  EXPECT_THAT(all_below(out),
-              ElementsAre("images",
-                          "images/1.jpg",
-                          "images/3.jpg",
-                          "images/mine.jpg",
-                          "notes.txt",
-                          ExportFolder::kListName));
+  EXPECT_THAT(all_below(folder.path()),
+              ElementsAre("out",
+                          "out/images",
+                          "out/images/1.jpg",
+                          "out/images/3.jpg",
+                          std::string("out/") + ExportFolder::kListName));
   EXPECT_EQ(read_text_file(out / "images/1.jpg", "a file"), "b");
-  EXPECT_EQ(read_text_file(out / "images/mine.jpg", "a file"), "mine");
+}
+
+TEST(ExportFolder, RefusesAFolderWithOtherFiles) {
+  const TemporaryFolder folder;
+  export_files(folder / "out", {"images/1.jpg"}, "a");
+  folder.write("out/images/mine.jpg", "mine");
+  EXPECT_THAT(input_error_of([&] { ExportFolder(folder / "out"); }), HasSubstr("images/mine.jpg"));
+  folder.write("other/notes.txt", "mine");
+  EXPECT_THAT(input_error_of([&] { ExportFolder(folder / "other"); }), HasSubstr("notes.txt"));
+  EXPECT_EQ(read_text_file(folder / "out/images/1.jpg", "a file"), "a");
+  // What was put there while the export was being made.
+  export_files(folder / "late", {"1.jpg"}, "a");
+  ExportFolder late(folder / "late");
+  folder.write("late/mine.txt", "mine");
+  EXPECT_THROW(late.finish(), InputError);
+  EXPECT_EQ(read_text_file(folder / "late/1.jpg", "a file"), "a");
 }
 
 TEST(ExportFolder, LeavesAllAsItWasWithoutAnEnd) {
   const TemporaryFolder folder;
   {
     const ExportFolder unfinished(folder / "new");
-    folder.write("new/.waymark_export.partial/images/1.jpg", "b");
+    std::ofstream(unfinished.unfinished() / "1.jpg") << "b";
   }
   EXPECT_FALSE(std::filesystem::exists(folder / "new"));
   export_files(folder / "out", {"1.jpg"}, "a");
-  folder.write("out/.waymark_export.partial/2.jpg", "of a program that was killed");
-  { const ExportFolder unfinished(folder / "out"); }
-  EXPECT_THAT(all_below(folder / "out"), ElementsAre("1.jpg", ExportFolder::kListName));
+  { const ExportFolder unfinished(folder / "out/"); }
+  EXPECT_THAT(all_below(folder.path()),
+              ElementsAre("out", "out/1.jpg", std::string("out/") + ExportFolder::kListName));
 }
 
-TEST(ExportFolder, RemovesNothingOutsideWhateverTheListSays) {
+TEST(ExportFolder, GoesWhereALinkLeads) {
   const TemporaryFolder folder;
-  folder.write("mine.txt", "mine");
-  folder.write("out/below/kept.txt", "mine");
-  folder.write(std::string("out/") + ExportFolder::kListName,
-               "../mine.txt\nx/../../mine.txt\n" + (folder / "mine.txt").string() +
-                   "\n\nbelow\nnone/there\n");
-  export_files(folder / "out", {"1.jpg"}, "a");
-  EXPECT_TRUE(std::filesystem::exists(folder / "mine.txt"));
-  EXPECT_TRUE(std::filesystem::exists(folder / "out/below/kept.txt"));
+  std::filesystem::create_directories(folder / "disk");
+  std::filesystem::create_directory_symlink(folder / "disk", folder / "link");
+  export_files(folder / "link", {"1.jpg"}, "a");
+  EXPECT_TRUE(std::filesystem::is_symlink(folder / "link"));
+  EXPECT_TRUE(std::filesystem::exists(folder / "disk/1.jpg"));
 }
 
 TEST(ExportFolder, SaysWhatIsInTheWay) {
   const TemporaryFolder folder;
   folder.write("file", "");
   EXPECT_THROW(ExportFolder(folder / "file"), OutputError);
-  folder.write("out/1.jpg/a", "");
-  EXPECT_THROW(export_files(folder / "out", {"1.jpg"}, "a"), OutputError);
+  EXPECT_THROW(ExportFolder(folder / "file/out"), OutputError);
 }
 
 }  // namespace

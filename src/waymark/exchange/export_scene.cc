@@ -17,17 +17,22 @@
 namespace waymark {
 namespace {
 
-/// Index of a camera in the scene, which gets it if it has it not yet.
-std::size_t index_of(const RigCamera& camera, std::vector<CameraDescription>& cameras) {
+/// Index of a camera of a rig in the scene, which gets it if it has it not yet.
+std::size_t index_of(const RigCamera& camera, ExportScene& scene) {
   if (!camera.description) {
     throw InputError("export", "a camera of the map was made without a description, expected one");
   }
-  const auto found = std::find_if(cameras.begin(), cameras.end(), [&](const auto& other) {
-    return other.is_same(*camera.description);
-  });
-  if (found != cameras.end()) return static_cast<std::size_t>(found - cameras.begin());
-  cameras.push_back(*camera.description);
-  return cameras.size() - 1;
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    const Rigid3& place = scene.cam_from_rig[i];
+    if (place.translation == camera.cam_from_rig.translation &&
+        place.rotation.coeffs() == camera.cam_from_rig.rotation.coeffs() &&
+        scene.cameras[i].is_same(*camera.description)) {
+      return i;
+    }
+  }
+  scene.cameras.push_back(*camera.description);
+  scene.cam_from_rig.push_back(camera.cam_from_rig);
+  return scene.cameras.size() - 1;
 }
 
 /// Distance in pixels between where a landmark should be seen and where it was; nothing where it
@@ -45,12 +50,13 @@ std::optional<double> reprojection_error(const Camera& camera,
   return error.norm();
 }
 
-/// The same of a feature of camera 0; where the camera's model is unknown by what the feature
+/// The same of a feature of a keyframe; where the camera's model is unknown by what the feature
 /// holds.
 std::optional<double> sighting_error(const Keyframe& keyframe,
+                                     std::size_t rig_camera,
                                      std::uint32_t feature,
                                      const Eigen::Vector3d& position_in_world) {
-  const RigCamera& camera = keyframe.rig->cameras[0];
+  const RigCamera& camera = keyframe.rig->cameras[rig_camera];
   const Keypoint& keypoint = keyframe.features->keypoints[feature];
   if (camera.camera->can_project()) {
     const Rigid3 cam_from_world = camera.cam_from_rig * keyframe.rig_from_world;
@@ -64,11 +70,12 @@ std::optional<double> sighting_error(const Keyframe& keyframe,
 
 class SceneBuilder {
  public:
-  SceneBuilder(const Map& map, SubmapId submap) : map_(map), submap_(submap) {}
+  SceneBuilder(const Map& map, SubmapId submap, ExportCameras cameras)
+      : map_(map), submap_(submap), cameras_(cameras) {}
 
   ExportScene build() {
     map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-      if (keyframe.submap == submap_) add_view(id, keyframe);
+      if (keyframe.submap == submap_) add_views(id, keyframe);
     });
     map_.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
       if (landmark.submap == submap_) add_point(id, landmark);
@@ -77,50 +84,85 @@ class SceneBuilder {
   }
 
  private:
-  void add_view(KeyframeId id, const Keyframe& keyframe) {
+  void add_views(KeyframeId id, const Keyframe& keyframe) {
+    first_view_[id] = static_cast<std::uint32_t>(scene_.views.size());
+    const std::size_t num_cameras =
+        cameras_ == ExportCameras::kAll ? keyframe.rig->cameras.size() : 1;
+    for (std::size_t camera = 0; camera < num_cameras; ++camera) add_view(id, keyframe, camera);
+  }
+
+  void add_view(KeyframeId id, const Keyframe& keyframe, std::size_t rig_camera) {
+    const RigCamera& camera = keyframe.rig->cameras[rig_camera];
     ExportView view;
     view.name = fmt::format("{:06}_{}.jpg", id.value, keyframe.timestamp_ns);
+    if (cameras_ == ExportCameras::kAll && keyframe.rig->cameras.size() > 1) {
+      view.name = fmt::format("cam{}/{}", rig_camera, view.name);
+    }
     view.keyframe = id;
-    view.camera = index_of(keyframe.rig->cameras[0], scene_.cameras);
-    view.cam_from_world = keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+    view.timestamp_ns = keyframe.timestamp_ns;
+    view.rig_camera = rig_camera;
+    view.camera = index_of(camera, scene_);
+    view.cam_from_world = camera.cam_from_rig * keyframe.rig_from_world;
     const Features& features = *keyframe.features;
-    for (std::size_t i = 0; i < features.num_primary; ++i) {
+    const std::size_t begin = rig_camera == 0 ? 0 : features.num_primary;
+    const std::size_t end = rig_camera == 0 ? features.num_primary : features.size();
+    for (std::size_t i = begin; i < end; ++i) {
       view.pixels.emplace_back(features.keypoints[i].x_px, features.keypoints[i].y_px);
     }
-    view.points.assign(features.num_primary, kNoPoint);
-    view_of_[id] = static_cast<std::uint32_t>(scene_.views.size());
+    view.points.assign(view.pixels.size(), kNoPoint);
     scene_.views.push_back(std::move(view));
+  }
+
+  /// A sighting, if the view is there, has none yet and shows the point where it should be.
+  void add_sighting(const Keyframe& keyframe,
+                    std::uint32_t first_view,
+                    std::uint32_t feature,
+                    ExportPoint& point) const {
+    const std::size_t num_primary = keyframe.features->num_primary;
+    const std::size_t rig_camera = feature < num_primary ? 0 : 1;
+    if (rig_camera > 0 && cameras_ == ExportCameras::kFirst) return;
+    const auto view = first_view + static_cast<std::uint32_t>(rig_camera);
+    for (const ExportSighting& other : point.sightings) {
+      if (other.view == view) return;
+    }
+    const std::optional<double> error =
+        sighting_error(keyframe, rig_camera, feature, point.position_in_world);
+    if (!error || *error > kMaxExportErrorPx) return;
+    const std::size_t first_feature = rig_camera == 0 ? 0 : num_primary;
+    point.sightings.push_back({view, feature - static_cast<std::uint32_t>(first_feature)});
+    point.error_px += *error;
   }
 
   void add_point(LandmarkId id, const Landmark& landmark) {
     ExportPoint point;
     point.landmark = id;
     point.position_in_world = landmark.position_in_world;
-    KeyframeId last;
     for (const Observation& observation : landmark.observations) {
-      const std::uint32_t view_index = view_of_.at(observation.keyframe);
-      const ExportView& view = scene_.views[view_index];
-      if (observation.feature >= view.pixels.size() || observation.keyframe == last) continue;
-      const std::optional<double> error = sighting_error(
-          map_.keyframes().at(observation.keyframe), observation.feature, point.position_in_world);
-      if (!error || *error > kMaxExportErrorPx) continue;
-      point.sightings.push_back({view_index, observation.feature});
-      point.error_px += *error;
-      last = observation.keyframe;
+      const Keyframe& keyframe = map_.keyframes().at(observation.keyframe);
+      const std::uint32_t first_view = first_view_.at(observation.keyframe);
+      add_sighting(keyframe, first_view, observation.feature, point);
+      const std::vector<std::uint32_t>& partner = keyframe.features->partner;
+      if (observation.feature < partner.size() && partner[observation.feature] != kNoFeature) {
+        add_sighting(keyframe, first_view, partner[observation.feature], point);
+      }
     }
     if (point.sightings.size() < 2) return;
     point.error_px /= static_cast<double>(point.sightings.size());
     for (const ExportSighting& sighting : point.sightings) {
-      scene_.views[sighting.view].points[sighting.feature] =
-          static_cast<std::uint32_t>(scene_.points.size());
+      ExportView& view = scene_.views[sighting.view];
+      view.points[sighting.feature] = static_cast<std::uint32_t>(scene_.points.size());
+      const Eigen::Vector3d position_in_view = view.cam_from_world * point.position_in_world;
+      point.normal -= view.cam_from_world.rotation.conjugate() * position_in_view.normalized();
     }
+    point.normal = point.normal.stableNormalized();
     scene_.points.push_back(std::move(point));
   }
 
   const Map& map_;
   SubmapId submap_;
+  ExportCameras cameras_;
   ExportScene scene_;
-  std::map<KeyframeId, std::uint32_t> view_of_;
+  std::map<KeyframeId, std::uint32_t> first_view_;
 };
 
 /// The mean of what the images show of each point.
@@ -128,7 +170,7 @@ void color_points(const KeyframeImages& images, ExportScene& scene) {
   std::vector<Eigen::Vector4i> sums(scene.points.size(), Eigen::Vector4i::Zero());
   for (const ExportView& view : scene.views) {
     const auto found = images.find(view.keyframe);
-    if (found == images.end()) continue;
+    if (found == images.end() || view.rig_camera > 0) continue;
     const CameraDescription& camera = scene.cameras[view.camera];
     const std::optional<ColorImage> image = decode_color_image(*found->second);
     if (!image || image->width_px != camera.width_px || image->height_px != camera.height_px) {
@@ -167,8 +209,11 @@ std::vector<StampedPose> keyframe_trajectory(const Map& map, SubmapId submap) {
   return poses;
 }
 
-ExportScene make_export_scene(const Map& map, SubmapId submap, const KeyframeImages& images) {
-  ExportScene scene = SceneBuilder(map, submap).build();
+ExportScene make_export_scene(const Map& map,
+                              SubmapId submap,
+                              const KeyframeImages& images,
+                              ExportCameras cameras) {
+  ExportScene scene = SceneBuilder(map, submap, cameras).build();
   color_points(images, scene);
   return scene;
 }

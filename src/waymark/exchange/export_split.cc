@@ -63,13 +63,7 @@ CameraDescription describe(const SplitPart& part) {
   return description;
 }
 
-/// Where the pixels of a part lie in the wide image.
-struct Lookup {
-  std::vector<Eigen::Vector2d> pixels;
-  std::vector<std::uint8_t> is_visible;
-};
-
-Lookup make_lookup(const SplitPart& part) {
+SplitLookup make_lookup(const SplitPart& part) {
   const PerspectiveModel model = perspective_of(part);
   const Eigen::Quaterniond camera_from_part = part.part_from_camera.conjugate();
   std::vector<Eigen::Vector3d> bearings;
@@ -78,8 +72,8 @@ Lookup make_lookup(const SplitPart& part) {
       bearings.push_back(camera_from_part * *model.unproject(Eigen::Vector2d(x, y)));
     }
   }
-  Lookup lookup{std::vector<Eigen::Vector2d>(bearings.size()),
-                std::vector<std::uint8_t>(bearings.size())};
+  SplitLookup lookup{std::vector<Eigen::Vector2d>(bearings.size()),
+                     std::vector<std::uint8_t>(bearings.size())};
   part.camera->project(bearings, lookup.pixels, lookup.is_visible);
   return lookup;
 }
@@ -112,6 +106,7 @@ class Splitter {
       if (!is_perspective(camera)) parts = parts_of(registry.make_camera(camera), num_views);
       first_camera_.push_back(result_.scene.cameras.size());
       result_.scene.cameras.push_back(parts.empty() ? camera : describe(parts.front()));
+      result_.scene.cam_from_rig.push_back(scene.cam_from_rig[parts_.size()]);
       parts_.push_back(std::move(parts));
     }
   }
@@ -149,6 +144,8 @@ class Splitter {
     added.name = fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
     if (!split.sees_all) added.mask_name = added.name + ".png";
     added.keyframe = view.keyframe;
+    added.timestamp_ns = view.timestamp_ns;
+    added.rig_camera = view.rig_camera;
     added.camera = first_camera_[view.camera];
     added.cam_from_world =
         Rigid3(split.part_from_camera, Eigen::Vector3d::Zero()) * view.cam_from_world;
@@ -178,7 +175,8 @@ class Splitter {
     }
     std::vector<std::uint32_t> new_index(points.size(), kNoPoint);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      if (points[i].sightings.size() < 2) continue;
+      const bool is_lost = points[i].sightings.size() < 2 && scene_.points[i].sightings.size() >= 2;
+      if (is_lost) continue;
       new_index[i] = static_cast<std::uint32_t>(scene.points.size());
       scene.points.push_back(std::move(points[i]));
     }
@@ -216,7 +214,7 @@ Rgb sample(const ColorImage& image, const Eigen::Vector2d& pixel, bool wraps) {
   return result;
 }
 
-ColorImage render(const SplitPart& part, const Lookup& lookup, const ColorImage& image) {
+ColorImage render(const SplitPart& part, const SplitLookup& lookup, const ColorImage& image) {
   ColorImage rendered(part.size_px, part.size_px);
   const bool wraps = part.camera->wrap_width_px() > 0.0;
   for (std::size_t i = 0; i < lookup.pixels.size(); ++i) {
@@ -225,7 +223,7 @@ ColorImage render(const SplitPart& part, const Lookup& lookup, const ColorImage&
   return rendered;
 }
 
-Image mask_of(const SplitPart& part, const Lookup& lookup) {
+Image mask_of(const SplitPart& part, const SplitLookup& lookup) {
   Image mask(part.size_px, part.size_px);
   for (std::size_t i = 0; i < lookup.is_visible.size(); ++i) {
     mask.values[i] = lookup.is_visible[i] ? 255 : 0;
@@ -237,41 +235,6 @@ bool is_same_part(const SplitPart& a, const SplitPart& b) {
   return a.camera == b.camera && a.part_from_camera.coeffs() == b.part_from_camera.coeffs();
 }
 
-/// Writes the views that are one part of one camera.
-class PartWriter {
- public:
-  PartWriter(const std::filesystem::path& images_folder,
-             const std::filesystem::path& masks_folder,
-             const SplitPart& part)
-      : images_folder_(images_folder),
-        masks_folder_(masks_folder),
-        part_(part),
-        lookup_(make_lookup(part)) {
-    if (part.sees_all) return;
-    mask_ = encode_png(mask_of(part, lookup_));
-    make_output_folder(masks_folder_);
-  }
-
-  const SplitPart& part() const { return part_; }
-
-  void write(const ExportView& view, const std::string& jpeg) const {
-    const std::optional<ColorImage> image = decode_color_image(jpeg);
-    if (!image || image->width_px != part_.camera->width_px() ||
-        image->height_px != part_.camera->height_px()) {
-      return;
-    }
-    write_file_atomically(images_folder_ / view.name, encode_jpeg(render(part_, lookup_, *image)));
-    if (!mask_.empty()) write_file_atomically(masks_folder_ / view.mask_name, mask_);
-  }
-
- private:
-  const std::filesystem::path& images_folder_;
-  const std::filesystem::path& masks_folder_;
-  SplitPart part_;
-  Lookup lookup_;
-  std::string mask_;
-};
-
 }  // namespace
 
 SplitScene split_scene(const ExportScene& scene, int num_views, const CameraRegistry& registry) {
@@ -281,29 +244,76 @@ SplitScene split_scene(const ExportScene& scene, int num_views, const CameraRegi
 
 Image split_mask(const SplitPart& part) { return mask_of(part, make_lookup(part)); }
 
-void write_split_images(const std::filesystem::path& images_folder,
-                        const std::filesystem::path& masks_folder,
-                        const SplitScene& split,
-                        const KeyframeImages& images) {
-  make_output_folder(images_folder);
-  std::vector<PartWriter> writers;
+/// Writes the views that are one part of one camera.
+class SplitImageWriter::PartWriter {
+ public:
+  explicit PartWriter(const SplitPart& part) : part_(part), lookup_(make_lookup(part)) {
+    if (!part.sees_all) mask_ = encode_png(mask_of(part, lookup_));
+  }
+
+  const SplitPart& part() const { return part_; }
+  /// As a PNG file; empty if all is seen.
+  const std::string& mask() const { return mask_; }
+
+  /// The part of a wide image as a JPEG file; empty if that is no image of the camera.
+  std::string cut(const std::string& jpeg) const {
+    const std::optional<ColorImage> image = decode_color_image(jpeg);
+    if (!image || image->width_px != part_.camera->width_px() ||
+        image->height_px != part_.camera->height_px()) {
+      return "";
+    }
+    return encode_jpeg(render(part_, lookup_, *image));
+  }
+
+ private:
+  SplitPart part_;
+  SplitLookup lookup_;
+  std::string mask_;
+};
+
+SplitImageWriter::SplitImageWriter(std::filesystem::path images_folder,
+                                   std::filesystem::path masks_folder)
+    : images_folder_(std::move(images_folder)), masks_folder_(std::move(masks_folder)) {
+  make_output_folder(images_folder_);
+}
+
+SplitImageWriter::~SplitImageWriter() = default;
+
+void SplitImageWriter::write(const SplitScene& split, std::size_t view, const std::string& jpeg) {
+  const ExportView& named = split.scene.views[view];
+  const auto write_below = [](const std::filesystem::path& path, const std::string& bytes) {
+    make_output_folder(path.parent_path());
+    write_file_atomically(path, bytes);
+  };
+  if (!split.parts[view]) return write_below(images_folder_ / named.name, jpeg);
+  auto writer = std::ranges::find_if(
+      writers_, [&](const auto& other) { return is_same_part(other->part(), *split.parts[view]); });
+  if (writer == writers_.end()) {
+    writers_.push_back(std::make_unique<PartWriter>(*split.parts[view]));
+    writer = writers_.end() - 1;
+  }
+  const std::string cut = (*writer)->cut(jpeg);
+  if (cut.empty()) return;
+  write_below(images_folder_ / named.name, cut);
+  if (!(*writer)->mask().empty()) {
+    write_below(masks_folder_ / named.mask_name, (*writer)->mask());
+  }
+}
+
+std::size_t write_split_images(const std::filesystem::path& images_folder,
+                               const std::filesystem::path& masks_folder,
+                               const SplitScene& split,
+                               const KeyframeImages& images) {
+  std::size_t num_written = 0;
+  SplitImageWriter writer(images_folder, masks_folder);
   for (std::size_t v = 0; v < split.scene.views.size(); ++v) {
     const ExportView& view = split.scene.views[v];
     const auto found = images.find(view.keyframe);
-    if (found == images.end()) continue;
-    if (!split.parts[v]) {
-      write_file_atomically(images_folder / view.name, *found->second);
-      continue;
-    }
-    auto writer = std::find_if(writers.begin(), writers.end(), [&](const PartWriter& other) {
-      return is_same_part(other.part(), *split.parts[v]);
-    });
-    if (writer == writers.end()) {
-      writers.emplace_back(images_folder, masks_folder, *split.parts[v]);
-      writer = writers.end() - 1;
-    }
-    writer->write(view, *found->second);
+    if (found == images.end() || view.rig_camera > 0) continue;
+    writer.write(split, v, *found->second);
+    ++num_written;
   }
+  return num_written;
 }
 
 }  // namespace waymark

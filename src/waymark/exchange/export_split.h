@@ -39,14 +39,39 @@ inline constexpr int kMaxSplitViews = 32;
 /// they appear in each part, and masks are named like images with ".png" added, as COLMAP wants it.
 SplitScene split_scene(const ExportScene& scene, int num_views, const CameraRegistry& registry);
 
+/// Where the pixels of a part, row by row, lie in the wide image.
+struct SplitLookup {
+  std::vector<Eigen::Vector2d> pixels;   ///< Of the wide image.
+  std::vector<std::uint8_t> is_visible;  ///< 0: outside of it or its circle.
+};
+
 /// Where a part shows something: 255, else 0 (outside of the image or its circle).
 Image split_mask(const SplitPart& part);
 
-/// Writes the images of the views as their parts show them, and the masks that belong to them.
-/// Throws OutputError.
-void write_split_images(const std::filesystem::path& images_folder,
-                        const std::filesystem::path& masks_folder,
-                        const SplitScene& split,
-                        const KeyframeImages& images);
+/// Writes images of views as their parts show them, and the masks that belong to them, below two
+/// folders by the names of the views. Throws OutputError.
+class SplitImageWriter {
+ public:
+  SplitImageWriter(std::filesystem::path images_folder, std::filesystem::path masks_folder);
+  ~SplitImageWriter();
+  SplitImageWriter(const SplitImageWriter&) = delete;
+  SplitImageWriter& operator=(const SplitImageWriter&) = delete;
+
+  /// The image that a view, or the wide one that it is a part of, was taken with.
+  void write(const SplitScene& split, std::size_t view, const std::string& jpeg);
+
+ private:
+  class PartWriter;
+
+  const std::filesystem::path images_folder_;
+  const std::filesystem::path masks_folder_;
+  std::vector<std::unique_ptr<PartWriter>> writers_;  // Per part of a camera.
+};
+
+/// Writes the images of all views of camera 0 that are there, and tells how many.
+std::size_t write_split_images(const std::filesystem::path& images_folder,
+                               const std::filesystem::path& masks_folder,
+                               const SplitScene& split,
+                               const KeyframeImages& images);
 
 }  // namespace waymark

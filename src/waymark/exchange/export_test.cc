@@ -97,6 +97,12 @@ TEST(ExportPly, HoldsThePointsWithTheirColours) {
                                      "y",
                                      "float",
                                      "z",
+                                     "float",
+                                     "nx",
+                                     "float",
+                                     "ny",
+                                     "float",
+                                     "nz",
                                      "uchar",
                                      "red",
                                      "uchar",
@@ -104,13 +110,17 @@ TEST(ExportPly, HoldsThePointsWithTheirColours) {
                                      "uchar",
                                      "blue"));
   ASSERT_EQ(count, 30u);
-  ASSERT_EQ(file.size(), body + 15 * count);
+  ASSERT_EQ(file.size(), body + 27 * count);
   const std::string data = file.substr(body);
   testing::Bytes bytes(data);
   for (const ExportPoint& point : scene.points) {
     for (int i = 0; i < 3; ++i) {
       EXPECT_EQ(bytes.take<float>(), static_cast<float>(point.position_in_world[i]));
     }
+    Eigen::Vector3f normal;
+    for (float& coordinate : normal) coordinate = bytes.take<float>();
+    EXPECT_NEAR(normal.norm(), 1.0f, 1e-6f);
+    EXPECT_LT(normal.z(), -0.8f) << "towards the cameras, which look along z";
     for (int i = 0; i < 3; ++i) EXPECT_EQ(bytes.take<std::uint8_t>(), 128);
   }
 }

@@ -33,12 +33,142 @@ void append_little_endian(std::string& bytes, T value) {
   }
 }
 
-/// A camera in COLMAP's words: the models of its documentation and their numbers.
-struct ColmapCamera {
-  std::int32_t model_id = 0;
-  const char* model = "";
-  std::vector<double> params;
-};
+std::string format_cameras_text(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string text =
+      "# Camera list with one line of data per camera:\n"
+      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    const ColmapCamera camera = colmap_camera(scene.cameras[i]);
+    text += fmt::format("{} {} {} {} {}\n",
+                        numbers.first_camera + i,
+                        camera.model,
+                        scene.cameras[i].width_px,
+                        scene.cameras[i].height_px,
+                        fmt::join(camera.params, " "));
+  }
+  return text;
+}
+
+std::string format_cameras_binary(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string bytes;
+  append_little_endian(bytes, std::uint64_t{scene.cameras.size()});
+  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
+    const ColmapCamera camera = colmap_camera(scene.cameras[i]);
+    append_little_endian(bytes, numbers.first_camera + static_cast<std::uint32_t>(i));
+    append_little_endian(bytes, camera.model_id);
+    append_little_endian(bytes, static_cast<std::uint64_t>(scene.cameras[i].width_px));
+    append_little_endian(bytes, static_cast<std::uint64_t>(scene.cameras[i].height_px));
+    for (const double param : camera.params) append_little_endian(bytes, param);
+  }
+  return bytes;
+}
+
+/// Number of a point in the files; -1 for none.
+std::int64_t point_number(const ExportScene& scene, std::uint32_t point) {
+  return point == kNoPoint ? -1 : std::int64_t{scene.points[point].landmark.value} + 1;
+}
+
+std::string format_images_text(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string text =
+      "# Image list with two lines of data per image:\n"
+      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
+      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n";
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const ExportView& view = scene.views[i];
+    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
+    const Eigen::Vector3d& t = view.cam_from_world.translation;
+    fmt::format_to(std::back_inserter(text),
+                   "{} {} {} {} {} {} {} {} {} {}\n",
+                   numbers.first_image + i,
+                   unsigned_zero(q.w()),
+                   unsigned_zero(q.x()),
+                   unsigned_zero(q.y()),
+                   unsigned_zero(q.z()),
+                   unsigned_zero(t.x()),
+                   unsigned_zero(t.y()),
+                   unsigned_zero(t.z()),
+                   numbers.first_camera + view.camera,
+                   view.name);
+    for (std::size_t k = 0; k < view.pixels.size(); ++k) {
+      fmt::format_to(std::back_inserter(text),
+                     "{}{} {} {}",
+                     k > 0 ? " " : "",
+                     view.pixels[k].x() + 0.5,
+                     view.pixels[k].y() + 0.5,
+                     point_number(scene, view.points[k]));
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string format_images_binary(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string bytes;
+  append_little_endian(bytes, std::uint64_t{scene.views.size()});
+  for (std::size_t i = 0; i < scene.views.size(); ++i) {
+    const ExportView& view = scene.views[i];
+    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
+    append_little_endian(bytes, numbers.first_image + static_cast<std::uint32_t>(i));
+    for (const double value : {q.w(), q.x(), q.y(), q.z()}) append_little_endian(bytes, value);
+    for (const double value : view.cam_from_world.translation) append_little_endian(bytes, value);
+    append_little_endian(bytes, numbers.first_camera + static_cast<std::uint32_t>(view.camera));
+    bytes += view.name;
+    bytes += '\0';
+    append_little_endian(bytes, std::uint64_t{view.pixels.size()});
+    for (std::size_t k = 0; k < view.pixels.size(); ++k) {
+      append_little_endian(bytes, view.pixels[k].x() + 0.5);
+      append_little_endian(bytes, view.pixels[k].y() + 0.5);
+      append_little_endian(bytes, point_number(scene, view.points[k]));
+    }
+  }
+  return bytes;
+}
+
+std::string format_points_text(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string text =
+      "# 3D point list with one line of data per point:\n"
+      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
+  for (const ExportPoint& point : scene.points) {
+    const Eigen::Vector3d& x = point.position_in_world;
+    fmt::format_to(std::back_inserter(text),
+                   "{} {} {} {} {} {} {} {}",
+                   std::int64_t{point.landmark.value} + 1,
+                   unsigned_zero(x.x()),
+                   unsigned_zero(x.y()),
+                   unsigned_zero(x.z()),
+                   point.color[0],
+                   point.color[1],
+                   point.color[2],
+                   point.error_px);
+    for (const ExportSighting& sighting : point.sightings) {
+      fmt::format_to(std::back_inserter(text),
+                     " {} {}",
+                     numbers.first_image + sighting.view,
+                     sighting.feature);
+    }
+    text += '\n';
+  }
+  return text;
+}
+
+std::string format_points_binary(const ExportScene& scene, ColmapNumbers numbers) {
+  std::string bytes;
+  append_little_endian(bytes, std::uint64_t{scene.points.size()});
+  for (const ExportPoint& point : scene.points) {
+    append_little_endian(bytes, std::uint64_t{point.landmark.value} + 1);
+    for (const double value : point.position_in_world) append_little_endian(bytes, value);
+    for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);
+    append_little_endian(bytes, point.error_px);
+    append_little_endian(bytes, std::uint64_t{point.sightings.size()});
+    for (const ExportSighting& sighting : point.sightings) {
+      append_little_endian(bytes, numbers.first_image + sighting.view);
+      append_little_endian(bytes, sighting.feature);
+    }
+  }
+  return bytes;
+}
+
+}  // namespace
 
 ColmapCamera colmap_camera(const CameraDescription& camera) {
   const std::vector<double>& k = camera.distortion_coeffs;
@@ -70,149 +200,22 @@ ColmapCamera colmap_camera(const CameraDescription& camera) {
   return result;
 }
 
-std::string format_cameras_text(const ExportScene& scene) {
-  std::string text =
-      "# Camera list with one line of data per camera:\n"
-      "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
-  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
-    const ColmapCamera camera = colmap_camera(scene.cameras[i]);
-    text += fmt::format("{} {} {} {} {}\n",
-                        i + 1,
-                        camera.model,
-                        scene.cameras[i].width_px,
-                        scene.cameras[i].height_px,
-                        fmt::join(camera.params, " "));
-  }
-  return text;
-}
-
-std::string format_cameras_binary(const ExportScene& scene) {
-  std::string bytes;
-  append_little_endian(bytes, std::uint64_t{scene.cameras.size()});
-  for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
-    const ColmapCamera camera = colmap_camera(scene.cameras[i]);
-    append_little_endian(bytes, static_cast<std::uint32_t>(i + 1));
-    append_little_endian(bytes, camera.model_id);
-    append_little_endian(bytes, static_cast<std::uint64_t>(scene.cameras[i].width_px));
-    append_little_endian(bytes, static_cast<std::uint64_t>(scene.cameras[i].height_px));
-    for (const double param : camera.params) append_little_endian(bytes, param);
-  }
-  return bytes;
-}
-
-/// Number of a point in the files; -1 for none.
-std::int64_t point_number(const ExportScene& scene, std::uint32_t point) {
-  return point == kNoPoint ? -1 : std::int64_t{scene.points[point].landmark.value} + 1;
-}
-
-std::string format_images_text(const ExportScene& scene) {
-  std::string text =
-      "# Image list with two lines of data per image:\n"
-      "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
-      "#   POINTS2D[] as (X, Y, POINT3D_ID)\n";
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const ExportView& view = scene.views[i];
-    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
-    const Eigen::Vector3d& t = view.cam_from_world.translation;
-    fmt::format_to(std::back_inserter(text),
-                   "{} {} {} {} {} {} {} {} {} {}\n",
-                   i + 1,
-                   unsigned_zero(q.w()),
-                   unsigned_zero(q.x()),
-                   unsigned_zero(q.y()),
-                   unsigned_zero(q.z()),
-                   unsigned_zero(t.x()),
-                   unsigned_zero(t.y()),
-                   unsigned_zero(t.z()),
-                   view.camera + 1,
-                   view.name);
-    for (std::size_t k = 0; k < view.pixels.size(); ++k) {
-      fmt::format_to(std::back_inserter(text),
-                     "{}{} {} {}",
-                     k > 0 ? " " : "",
-                     view.pixels[k].x() + 0.5,
-                     view.pixels[k].y() + 0.5,
-                     point_number(scene, view.points[k]));
-    }
-    text += '\n';
-  }
-  return text;
-}
-
-std::string format_images_binary(const ExportScene& scene) {
-  std::string bytes;
-  append_little_endian(bytes, std::uint64_t{scene.views.size()});
-  for (std::size_t i = 0; i < scene.views.size(); ++i) {
-    const ExportView& view = scene.views[i];
-    const Eigen::Quaterniond& q = view.cam_from_world.rotation;
-    append_little_endian(bytes, static_cast<std::uint32_t>(i + 1));
-    for (const double value : {q.w(), q.x(), q.y(), q.z()}) append_little_endian(bytes, value);
-    for (const double value : view.cam_from_world.translation) append_little_endian(bytes, value);
-    append_little_endian(bytes, static_cast<std::uint32_t>(view.camera + 1));
-    bytes += view.name;
-    bytes += '\0';
-    append_little_endian(bytes, std::uint64_t{view.pixels.size()});
-    for (std::size_t k = 0; k < view.pixels.size(); ++k) {
-      append_little_endian(bytes, view.pixels[k].x() + 0.5);
-      append_little_endian(bytes, view.pixels[k].y() + 0.5);
-      append_little_endian(bytes, point_number(scene, view.points[k]));
-    }
-  }
-  return bytes;
-}
-
-std::string format_points_text(const ExportScene& scene) {
-  std::string text =
-      "# 3D point list with one line of data per point:\n"
-      "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
-  for (const ExportPoint& point : scene.points) {
-    const Eigen::Vector3d& x = point.position_in_world;
-    fmt::format_to(std::back_inserter(text),
-                   "{} {} {} {} {} {} {} {}",
-                   std::int64_t{point.landmark.value} + 1,
-                   unsigned_zero(x.x()),
-                   unsigned_zero(x.y()),
-                   unsigned_zero(x.z()),
-                   point.color[0],
-                   point.color[1],
-                   point.color[2],
-                   point.error_px);
-    for (const ExportSighting& sighting : point.sightings) {
-      fmt::format_to(std::back_inserter(text), " {} {}", sighting.view + 1, sighting.feature);
-    }
-    text += '\n';
-  }
-  return text;
-}
-
-std::string format_points_binary(const ExportScene& scene) {
-  std::string bytes;
-  append_little_endian(bytes, std::uint64_t{scene.points.size()});
-  for (const ExportPoint& point : scene.points) {
-    append_little_endian(bytes, std::uint64_t{point.landmark.value} + 1);
-    for (const double value : point.position_in_world) append_little_endian(bytes, value);
-    for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);
-    append_little_endian(bytes, point.error_px);
-    append_little_endian(bytes, std::uint64_t{point.sightings.size()});
-    for (const ExportSighting& sighting : point.sightings) {
-      append_little_endian(bytes, sighting.view + 1);
-      append_little_endian(bytes, sighting.feature);
-    }
-  }
-  return bytes;
-}
-
-}  // namespace
-
-ColmapModel format_colmap(const ExportScene& scene, ColmapForm form) {
+ColmapModel format_colmap(const ExportScene& scene, ColmapForm form, ColmapNumbers numbers) {
   if (form == ColmapForm::kText) {
-    return {format_cameras_text(scene), format_images_text(scene), format_points_text(scene)};
+    return {format_cameras_text(scene, numbers),
+            format_images_text(scene, numbers),
+            format_points_text(scene, numbers)};
   }
-  return {format_cameras_binary(scene), format_images_binary(scene), format_points_binary(scene)};
+  return {format_cameras_binary(scene, numbers),
+          format_images_binary(scene, numbers),
+          format_points_binary(scene, numbers)};
 }
 
-void write_colmap(const std::filesystem::path& folder, const ExportScene& scene, ColmapForm form) {
-  const ColmapModel model = format_colmap(scene, form);
+void write_colmap(const std::filesystem::path& folder,
+                  const ExportScene& scene,
+                  ColmapForm form,
+                  ColmapNumbers numbers) {
+  const ColmapModel model = format_colmap(scene, form, numbers);
   const std::string suffix = form == ColmapForm::kText ? ".txt" : ".bin";
   make_output_folder(folder);
   write_file_atomically(folder / ("cameras" + suffix), model.cameras);
@@ -225,10 +228,14 @@ std::string format_ply(const ExportScene& scene) {
       "ply\nformat binary_little_endian 1.0\ncomment landmarks of a Waymark map\n"
       "element vertex {}\n"
       "property float x\nproperty float y\nproperty float z\n"
+      "property float nx\nproperty float ny\nproperty float nz\n"
       "property uchar red\nproperty uchar green\nproperty uchar blue\nend_header\n",
       scene.points.size());
   for (const ExportPoint& point : scene.points) {
     for (const double coordinate : point.position_in_world) {
+      append_little_endian(bytes, static_cast<float>(coordinate));
+    }
+    for (const double coordinate : point.normal) {
       append_little_endian(bytes, static_cast<float>(coordinate));
     }
     for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);

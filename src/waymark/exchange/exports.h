@@ -12,21 +12,46 @@ namespace waymark {
 /// Both forms that COLMAP reads: .txt and .bin files.
 enum class ColmapForm { kText, kBinary };
 
-/// The three files of a COLMAP model, as its documentation describes them. Numbers of images,
-/// cameras and points are our indices and ids plus one; pixels are counted from the corner of the
-/// image, as COLMAP does.
+/// What the first image and camera of a scene are called: several scenes that share a database
+/// have numbers of their own.
+struct ColmapNumbers {
+  std::uint32_t first_image = 1;   ///< Of the first view.
+  std::uint32_t first_camera = 1;  ///< Of the first camera.
+};
+
+/// The three files of a COLMAP model, as its documentation describes them. Images and cameras are
+/// numbered on from the first, points by the ids of landmarks plus one; pixels are counted from the
+/// corner of the image, as COLMAP does.
 struct ColmapModel {
   std::string cameras;  ///< Contents of cameras.txt or cameras.bin.
   std::string images;   ///< Contents of images.txt or images.bin: poses and pixels.
   std::string points;   ///< Contents of points3D.txt or points3D.bin.
 };
 
+/// A camera in COLMAP's words: the models of its documentation and their numbers.
+struct ColmapCamera {
+  std::int32_t model_id = 0;   ///< As in its binary files.
+  const char* model = "";      ///< As in its text files.
+  std::vector<double> params;  ///< Focal lengths, centre from the corner of the image, distortion.
+};
+
 /// InputError for a camera model that COLMAP does not have.
-ColmapModel format_colmap(const ExportScene& scene, ColmapForm form);
+ColmapCamera colmap_camera(const CameraDescription& camera);
+
+/// InputError like colmap_camera().
+ColmapModel format_colmap(const ExportScene& scene, ColmapForm form, ColmapNumbers numbers = {});
 
 /// Writes cameras, images and points3D (.txt or .bin) into the folder. Throws OutputError, and
 /// InputError like format_colmap().
-void write_colmap(const std::filesystem::path& folder, const ExportScene& scene, ColmapForm form);
+void write_colmap(const std::filesystem::path& folder,
+                  const ExportScene& scene,
+                  ColmapForm form,
+                  ColmapNumbers numbers = {});
+
+/// The cameras of a stereo rig for rig_bundle_adjuster, as the documentation of COLMAP 3.8 has it:
+/// camera i took the images whose names begin with "camI/". Empty unless the views are those of one
+/// rig of two cameras.
+std::string format_colmap_rig(const ExportScene& scene, ColmapNumbers numbers = {});
 
 /// What belongs to a transforms.json, as it names it: relative to itself.
 struct NerfstudioPaths {
@@ -41,7 +66,7 @@ struct NerfstudioPaths {
 std::string format_nerfstudio(const ExportScene& scene, const NerfstudioPaths& paths);
 
 /// The points of a scene in the Stanford polygon format (Turk 1994), binary, little-endian: x, y, z
-/// as float, red, green, blue.
+/// and the normal (nx, ny, nz) as float, red, green, blue.
 std::string format_ply(const ExportScene& scene);
 
 /// Writes the file atomically; throws OutputError.

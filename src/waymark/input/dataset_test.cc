@@ -8,6 +8,7 @@
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/exchange/trajectory.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/decode.h"
 #include "waymark/input/input.h"
 #include "waymark/input/testing/images.h"
 
@@ -49,6 +50,18 @@ void make_euroc(const TemporaryFolder& folder) {
   std::string right = sensor_yaml("0.5");
   right.replace(right.find("1, 0, 0, 0, 0, 0, 1"), 10, "1, 0, 0, 0.11");
   folder.write("mav0/cam1/sensor.yaml", right);
+}
+
+TEST(Euroc, GivesImagesOfBothCamerasAsJpegWhereAsked) {
+  const TemporaryFolder folder;
+  make_euroc(folder);
+  EXPECT_EQ(open_input(folder.path(), {.has_jpeg = true})->next()->right_jpeg, "");
+  const InputOptions both = {.has_jpeg = true, .has_right_jpeg = true};
+  const std::optional<InputFrame> first = open_input(folder.path(), both)->next();
+  EXPECT_NEAR(decode_grey_image(first->right_jpeg)->view().at(5, 5), 20, 2);
+  EXPECT_NE(first->right_jpeg, first->jpeg);
+  const InputOptions one = {.setup = Setup::kMono, .has_jpeg = true, .has_right_jpeg = true};
+  EXPECT_EQ(open_input(folder.path(), one)->next()->right_jpeg, "");
 }
 
 TEST(Euroc, GivesPairsWithExactTimesAndCalibration) {

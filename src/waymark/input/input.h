@@ -39,6 +39,8 @@ struct InputFrame {
   std::int64_t depth_lag_ns = 0;    ///< How much later the depth image was taken.
   std::optional<Image> mask;        ///< Of camera 0; 0 where the image is not to be used.
   std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
+  /// The same of camera 1, of data sets and folders of images; of other inputs empty.
+  std::string right_jpeg = {};
   FrameFault fault = FrameFault::kNone;  ///< Why there are no images.
   /// What is wrong with a file of the frame, be it that of the fault or a depth image that is left
   /// out, for people: "FILE: ..., expected ...". Empty: nothing.
@@ -60,7 +62,8 @@ struct InputOptions {
   std::optional<double> fps = {};  ///< Frames per second where nothing tells their times.
   /// One image, a folder with one per frame by name or order, or a video; empty: none.
   std::filesystem::path mask = {};
-  bool has_jpeg = false;  ///< Frames come with a JPEG file, too.
+  bool has_jpeg = false;        ///< Frames come with a JPEG file, too.
+  bool has_right_jpeg = false;  ///< And with one of camera 1.
   /// Of a bag: the images of camera 0, and those of camera 1 or the depth; empty: found.
   std::vector<std::string> topics = {};
   /// Calibration from settings; takes the place of the one the data set carries.

@@ -28,7 +28,8 @@ ListingInput::ListingInput(const std::filesystem::path& path,
     : listing_(std::move(listing)),
       selection_(select_frames(path, options, listing_.frames.size())),
       masks_(options.mask),
-      has_jpeg_(options.has_jpeg) {
+      has_jpeg_(options.has_jpeg),
+      has_right_jpeg_(options.has_right_jpeg) {
   info_.format = listing_.format;
   info_.setup = listing_.setup;
   info_.counts = listing_.counts;
@@ -77,6 +78,9 @@ InputFrame ListingInput::read(std::size_t index) {
   read_depth(listed, frame);
   masks_.attach(stem_of(listed), frame);
   if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front()).value_or("");
+  if (has_right_jpeg_ && frame.images.size() > 1) {
+    frame.right_jpeg = read_as_jpeg(listed.images[1]).value_or("");
+  }
   return frame;
 }
 

@@ -37,6 +37,7 @@ class ListingInput : public Input {
   FrameSelection selection_;
   MaskSource masks_;
   bool has_jpeg_;
+  bool has_right_jpeg_;
   InputInfo info_;
   std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
   std::size_t num_read_ = 0;
