@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <benchmark/benchmark.h>
 
+#include <cmath>
+
 #include "waymark/optimize/bundle.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/optimize/schur_solver.h"
@@ -39,9 +41,10 @@ BENCHMARK(optimize_pose_of_frame)
     ->Unit(benchmark::kMicrosecond);
 
 /// One round of five iterations. Arguments: solver (0 own, 1 Ceres), and what the scene takes.
-void adjust(benchmark::State& state, const testing::BundleScene& scene) {
+void adjust(benchmark::State& state, const testing::BundleScene& scene, unsigned num_threads = 1) {
   const auto minimize = state.range(0) == 0 ? minimize_with_schur : testing::minimize_with_ceres;
-  const BundleOptions options = {.max_iterations_per_round = 5, .relative_cost_tolerance = 0.0};
+  const BundleOptions options = {
+      .max_iterations_per_round = 5, .relative_cost_tolerance = 0.0, .num_threads = num_threads};
   const std::vector<std::uint8_t> is_used(scene.problem.observations.size(), 1);
   BundleRound result;
   for (auto _ : state) {
@@ -87,6 +90,29 @@ BENCHMARK(adjust_global_bundle)
     ->Args({1, 50})
     ->Args({0, 200})
     ->Args({1, 200})
+    ->Unit(benchmark::kMillisecond);
+
+/// A way in rows beside each other, as long as there are rows: 100 points per pose, six views of
+/// each in two rows; two threads. Second argument: poses. 10000 have a million points.
+void adjust_area_bundle(benchmark::State& state) {
+  const auto num_poses = static_cast<std::size_t>(state.range(1));
+  adjust(state,
+         testing::make_bundle_scene(
+             {.num_poses = num_poses,
+              .num_points = 100 * num_poses,
+              .views_per_point = 6,
+              .poses_per_row = static_cast<std::size_t>(std::sqrt(static_cast<double>(num_poses)))},
+             1),
+         2);
+}
+BENCHMARK(adjust_area_bundle)
+    ->Args({0, 1024})
+    ->Args({1, 1024})
+    ->Args({0, 10000})
+    ->Args({1, 10000})
+    ->Iterations(1)
+    ->MeasureProcessCPUTime()
+    ->UseRealTime()
     ->Unit(benchmark::kMillisecond);
 
 }  // namespace

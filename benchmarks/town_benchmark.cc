@@ -322,7 +322,7 @@ void close_first_loop(benchmark::State& state) {
 void register_all(std::int64_t num_keyframes) {
   const auto add = [&](const char* name, void (*step)(benchmark::State&), int num_iterations) {
     auto* registered = benchmark::RegisterBenchmark(name, step);
-    registered->Arg(num_keyframes)->Unit(benchmark::kMillisecond);
+    registered->Arg(num_keyframes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
     if (num_iterations > 0) registered->Iterations(num_iterations);
   };
   add("all/make_map", make_map, 1);

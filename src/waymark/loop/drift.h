@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <optional>
 #include <vector>
 
@@ -34,8 +35,12 @@ struct GraphWay {
 };
 
 /// The shortest way; nothing between sub-maps. Keyframes that share but a few landmarks are not
-/// linked: what was seen again by chance would be a shortcut.
-std::optional<GraphWay> shortest_way(const Map& map, KeyframeId from, KeyframeId to);
+/// linked: what was seen again by chance would be a shortcut. Where the way is at least `enough`
+/// long, a beginning of that length may come in its place. Time is that of what lies as near.
+std::optional<GraphWay> shortest_way(const Map& map,
+                                     KeyframeId from,
+                                     KeyframeId to,
+                                     double enough = std::numeric_limits<double>::infinity());
 
 /// Median distance of what a keyframe sees, in map units; 0 if that is nothing.
 double median_depth(const Map& map, KeyframeId id);

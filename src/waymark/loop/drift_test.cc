@@ -18,6 +18,11 @@ TEST(DriftTest, ShortestWayGoesAlongTheGraph) {
   EXPECT_GT(way->length, 2.2 * LoopScene::kRadius);
   EXPECT_LT(way->length, std::numbers::pi * LoopScene::kRadius);
   EXPECT_LT(way->num_steps, kRound / 2 - 1);
+  const double part = 0.3 * way->length;
+  const auto begun = shortest_way(scene.map, KeyframeId{kRound / 2 - 1}, KeyframeId{0}, part);
+  ASSERT_TRUE(begun);
+  EXPECT_GE(begun->length, part);
+  EXPECT_LT(begun->length, 0.6 * way->length);
   scene.start_submap(Sim3());
   const KeyframeId elsewhere = scene.add_keyframe(0);
   EXPECT_FALSE(shortest_way(scene.map, elsewhere, KeyframeId{0}));

@@ -140,9 +140,14 @@ std::optional<AdjustmentTask> GlobalMapper::take_task() {
 }
 
 void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment) {
-  if (task.num_closures != num_closures_) return;
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
-  mapper_.apply(adjustment);
+  if (task.num_closures == num_closures_) {
+    mapper_.apply(adjustment);
+  } else {
+    GlobalAdjustment rebased = adjustment;
+    rebase(*task.map, mapper_.map(), rebased);
+    mapper_.apply(rebased);
+  }
   look_with_calibration(before);
 }
 

@@ -52,7 +52,8 @@ class GlobalMapper {
   bool has_loop_task() const { return unadjusted_.is_valid(); }
   /// See Mapper.
   void set_motion(KeyframeId id, const RigMotion& motion) { mapper_.set_motion(id, motion); }
-  /// Takes in what a task gave, unless a loop was closed meanwhile: then a new task follows.
+  /// Takes in what a task gave, carried over where a loop was closed meanwhile: then a new task
+  /// follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
   /// The end: looks for loops a last time and consolidates.
   void finish();

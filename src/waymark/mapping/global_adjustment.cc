@@ -4,12 +4,23 @@
 
 #include <algorithm>
 #include <span>
+#include <thread>
 #include <utility>
 
 #include "waymark/base/median.h"
+#include "waymark/geometry/sim3.h"
 
 namespace waymark {
 namespace {
+
+/// world_of_now_from_world_of_before around a keyframe of both.
+Sim3 motion_since(const Map& before, const Map& now, KeyframeId id) {
+  const Keyframe& old_one = before.keyframes().at(id);
+  const Keyframe& new_one = now.keyframes().at(id);
+  const double scale = new_one.applied_scale / old_one.applied_scale;
+  const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), scale);
+  return Sim3(new_one.rig_from_world.inverse()) * resized * Sim3(old_one.rig_from_world);
+}
 
 /// New by old distance of what a keyframe sees, in the median; 1 where it sees nothing.
 double scale_around(const Map& map,
@@ -37,8 +48,12 @@ GlobalAdjustment adjust(const Map& frozen,
                         const KnownCalibration* known = nullptr) {
   GlobalAdjustment adjustment;
   if (window.moving.empty() || window.landmarks.empty()) return adjustment;
-  WindowAdjustment found =
-      compute_adjustment(frozen, window, {.num_rounds = 2, .max_iterations_per_round = 20}, known);
+  WindowAdjustment found = compute_adjustment(frozen,
+                                              window,
+                                              {.num_rounds = 2,
+                                               .max_iterations_per_round = 20,
+                                               .num_threads = std::thread::hardware_concurrency()},
+                                              known);
   adjustment.calibration = std::move(found.calibration);
   adjustment.correction = std::move(found.correction);
   adjustment.outliers = std::move(found.outliers);
@@ -59,6 +74,26 @@ GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap) {
 
 GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known) {
   return adjust(frozen, whole_map(frozen), &known);
+}
+
+void rebase(const Map& before, const Map& now, GlobalAdjustment& adjustment) {
+  MapCorrection rebased;
+  for (MapCorrection::LandmarkMove move : adjustment.correction.landmarks) {
+    const Landmark* const landmark = now.landmarks().find(move.landmark);
+    if (!landmark || !before.keyframes().contains(landmark->reference)) continue;
+    move.position_in_world =
+        motion_since(before, now, landmark->reference) * move.position_in_world;
+    rebased.landmarks.push_back(move);
+  }
+  for (MapCorrection::KeyframeMove move : adjustment.correction.keyframes) {
+    if (!now.keyframes().contains(move.keyframe)) continue;
+    const Sim3 motion = motion_since(before, now, move.keyframe);
+    const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), motion.scale);
+    const Sim3 moved = resized * Sim3(move.rig_from_world) * motion.inverse();
+    move.rig_from_world = {moved.rotation, moved.translation};
+    rebased.keyframes.push_back(move);
+  }
+  adjustment.correction = std::move(rebased);
 }
 
 void apply_adjustment(Map& map, const GlobalAdjustment& adjustment, DirtyLandmarks& dirty) {

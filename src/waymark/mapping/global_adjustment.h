@@ -25,6 +25,11 @@ GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
 /// The same over all sub-maps, and the calibration along with them: each tells of it what it shows.
 GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known);
 
+/// Carries what was found on `before` over to the map of now, which was moved since by other
+/// corrections, as of a loop that was closed: around each keyframe it moves as the map did. What is
+/// gone is left out.
+void rebase(const Map& before, const Map& now, GlobalAdjustment& adjustment);
+
 /// Takes in what was found but the calibration: moves what was known, lets what is younger follow,
 /// drops outliers.
 void apply_adjustment(Map& map, const GlobalAdjustment& adjustment, DirtyLandmarks& dirty);

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "waymark/map/align.h"
 #include "waymark/track/test_map.h"
 
 namespace waymark {
@@ -78,6 +79,26 @@ TEST_P(GlobalAdjustmentTest, LeavesTheFrozenMapAndMendsTheLivingOne) {
   apply_adjustment(scene_.map, adjustment, dirty_);
   EXPECT_EQ(scene_.map.broken_invariants(), "");
   for (std::uint32_t k = 0; k < kNumKnown; ++k) EXPECT_LT(step_error(k), 0.01) << k;
+}
+
+TEST_P(GlobalAdjustmentTest, IsCarriedOverToAMapThatMoved) {
+  bend();
+  const auto frozen = scene_.map.freeze();
+  GlobalAdjustment adjustment = adjust_globally(*frozen, scene_.submap);
+  const GlobalAdjustment as_found = adjustment;
+  const Sim3 motion(Sim3::exp((Vector7d() << 0.3, -0.1, 0.2, 0.1, 0.2, -0.1, 0.0).finished()));
+  Sim3 resized = motion;
+  if (!is_metric()) resized.scale = 1.5;
+  transform_submap(scene_.map, scene_.submap, resized);
+  rebase(*frozen, scene_.map, adjustment);
+  apply_adjustment(scene_.map, adjustment, dirty_);
+  EXPECT_EQ(scene_.map.broken_invariants(), "");
+  for (std::uint32_t k = 0; k + 1 < kNumKnown; ++k) EXPECT_LT(step_error(k), 0.01) << k;
+  for (const auto& move : as_found.correction.landmarks) {
+    const Landmark* const landmark = scene_.map.landmarks().find(move.landmark);
+    if (!landmark) continue;
+    EXPECT_LT((landmark->position_in_world - resized * move.position_in_world).norm(), 1e-6);
+  }
 }
 
 TEST_P(GlobalAdjustmentTest, OfAnEmptySubmapIsNothing) {

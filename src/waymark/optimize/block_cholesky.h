@@ -2,50 +2,87 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <hwy/aligned_allocator.h>
+
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
-#include <utility>
+#include <span>
 #include <vector>
 
+#include "waymark/base/thread_pool.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/optimize/factor_panels.h"
+#include "waymark/optimize/panel_kernel.h"
 
 namespace waymark {
 
-/// Rows and columns of blocks that are not zero, row > column, in any order; repeats allowed.
-using BlockPattern = std::vector<std::pair<std::uint32_t, std::uint32_t>>;
-
-/// An order of elimination that leaves few blocks to fill in, by approximate minimum degree
-/// (Amestoy, Davis & Duff 1996): per block its new index.
-std::vector<std::uint32_t> order_of_elimination(std::size_t num_blocks,
-                                                const BlockPattern& pattern);
-
 /// A symmetric positive definite matrix of 6 x 6 blocks, few of which are not zero, and its
-/// Cholesky decomposition in place (Davis 2006, chapter 4, on blocks). Only the lower triangle is
-/// stored, by columns, with room for what elimination fills in. Sums run in a fixed order.
+/// Cholesky decomposition in place. Only the lower triangle is stored, in dense panels of columns
+/// that share their rows, with room for what elimination fills in. Panels take what those before
+/// them contribute, by dense products, and are then factorized (left-looking and supernodal: Ng &
+/// Peyton 1993; Davis 2006, chapter 4; Chen et al. 2008). Each is one thread's work, which takes
+/// its sources in ascending order: the same bits with any number of threads, and with any vectors.
 class BlockCholesky {
  public:
+  /// A block where it is kept.
+  using Block = Eigen::Map<Matrix6d, 0, Eigen::OuterStride<kStripRows>>;
+
   BlockCholesky(std::size_t num_blocks, const BlockPattern& pattern);
 
   void set_zero();
-  /// Where a block of the pattern, or one of the diagonal, is kept.
-  std::uint32_t index_of(std::uint32_t row, std::uint32_t column) const;
-  Matrix6d& block(std::uint32_t index) { return blocks_[index]; }
-  Matrix6d& diagonal(std::uint32_t i) { return blocks_[first_[i]]; }
-  std::size_t num_blocks() const { return blocks_.size(); }
+  /// A block of the pattern or of the diagonal; row >= column.
+  Block block(std::uint32_t row, std::uint32_t column);
+  Block diagonal(std::uint32_t i) { return block(i, i); }
+  /// Of the factor; zeros that are kept for the sake of dense panels do not count.
+  std::size_t num_blocks() const { return plan_.num_blocks; }
+
+  /// The panels, in which a caller may fill in the matrix, each by one thread.
+  const FactorPanels& plan() const { return plan_; }
+  /// Sets a column of a panel (counted from its first) as a whole. blocks: one for each row of the
+  /// panel, those above the diagonal of any value, kPaddedBlockRows x 6 by columns.
+  void set_column(std::size_t panel, std::size_t column, std::span<const double> blocks);
 
   /// Replaces the matrix by its factor; false if it is not positive definite.
-  bool factorize();
+  bool factorize(ThreadPool& threads);
   /// Solves matrix * x = b for the matrix that was factorized; b has 6 entries per block row.
   void solve_in_place(Eigen::VectorXd& b) const;
+  /// The same for each column.
+  void solve_in_place(Eigen::MatrixXd& b) const;
 
  private:
-  void fill_in(const BlockPattern& pattern);
-  void subtract_products(std::uint32_t column);
+  using Panel = FactorPanels::Panel;
 
-  std::vector<std::uint32_t> first_;  ///< Per column its diagonal block; one past the end.
-  std::vector<std::uint32_t> row_;    ///< Per block, ascending within a column.
-  std::vector<Matrix6d> blocks_;
+  std::size_t num_strips(const Panel& panel) const {
+    return (panel.num_rows + kStripBlocks - 1) / kStripBlocks;
+  }
+  std::size_t strip_size(const Panel& panel) const {
+    return kStripRows * kBlockRows * panel.width();
+  }
+  double* strip(std::size_t panel, std::size_t index) const {
+    return values_.get() + first_value_[panel] + index * strip_size(plan_.panels[panel]);
+  }
+  /// By number of its row and column in the panel.
+  double* block_in(std::size_t panel, std::size_t row, std::size_t column) const {
+    return strip(panel, row / kStripBlocks) + column * kBlockRows * kStripRows +
+           row % kStripBlocks * kBlockRows;
+  }
+
+  void find_places(std::size_t panel,
+                   const FactorPanels::Source& source,
+                   std::vector<std::uint32_t>& places) const;
+  void subtract_source(std::size_t panel,
+                       const FactorPanels::Source& source,
+                       std::span<const std::uint32_t> places);
+  bool factorize_panel(std::size_t panel);
+  template <class Columns>
+  void solve_forward(std::size_t panel, Columns& b) const;
+  template <class Columns>
+  void solve_backward(std::size_t panel, Columns& b) const;
+
+  FactorPanels plan_;
+  std::vector<std::size_t> first_value_;  ///< Per panel, and one past the end.
+  hwy::AlignedFreeUniquePtr<double[]> values_;
 };
 
 }  // namespace waymark

@@ -97,6 +97,7 @@ struct BundleOptions {
   /// A round ends early when an iteration lowers the cost by less than this part of it.
   double relative_cost_tolerance = 1e-5;
   bool with_evidence = true;  ///< Of the calibration, where that is unknown; of the last round.
+  unsigned num_threads = 1;   ///< That share the work. The result is the same to the bit.
 };
 
 struct BundleResult {

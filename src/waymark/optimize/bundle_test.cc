@@ -85,6 +85,21 @@ TEST(Bundle, ConvergesDespiteOutliersAndNamesThem) {
   }
 }
 
+TEST(Bundle, HasTheSameBitsWithAnyNumberOfThreads) {
+  const BundleScene scene = make_bundle_scene({.num_poses = 250, .num_points = 5000}, 3);
+  std::vector<BundleProblem> problems;
+  for (const unsigned num_threads : {1u, 2u, 4u}) {
+    problems.push_back(problem_of(scene));
+    adjust_bundle(problems.back(), {.num_threads = num_threads});
+  }
+  for (const BundleProblem& problem : problems) {
+    EXPECT_EQ(problem.points, problems[0].points);
+    for (std::size_t i = 0; i < problem.rig_from_world.size(); ++i) {
+      EXPECT_EQ(problem.rig_from_world[i].matrix(), problems[0].rig_from_world[i].matrix());
+    }
+  }
+}
+
 TEST(Bundle, TakesPosesOfSeveralRigs) {
   const BundleScene scene = make_bundle_scene({.num_cameras = 2, .noise_px = 0.3}, 5);
   BundleProblem one = problem_of(scene);

@@ -41,25 +41,24 @@ void CalibrationBorder::begin_elimination(double damping) {
 void CalibrationBorder::eliminate_point(std::size_t point,
                                         const Eigen::Matrix3d& half,
                                         const Eigen::Vector3d& gradient) {
-  eliminated_.noalias() = half * points_.middleCols(column(point), gradient_.size());
-  reduced_information_.noalias() -= eliminated_.transpose() * eliminated_;
-  reduced_gradient_.noalias() -= eliminated_.transpose() * gradient;
+  auto eliminated = points_.middleCols(column(point), gradient_.size());
+  for (Eigen::Index i = 0; i < eliminated.cols(); ++i) {
+    eliminated.col(i) = half * eliminated.col(i).eval();
+  }
+  reduced_information_.noalias() -= eliminated.transpose() * eliminated;
+  reduced_gradient_.noalias() -= eliminated.transpose() * gradient;
 }
 
 void CalibrationBorder::eliminate_link(std::size_t slot,
+                                       std::size_t point,
                                        const Eigen::Matrix<double, 6, 3>& eliminated) {
   reduced_poses_.middleRows<6>(static_cast<Eigen::Index>(6 * slot)).noalias() -=
-      eliminated * eliminated_;
+      eliminated * points_.middleCols(column(point), gradient_.size());
 }
 
 bool CalibrationBorder::solve(const BlockCholesky& poses, Eigen::VectorXd& gradient) {
   solved_ = reduced_poses_;
-  Eigen::VectorXd column;
-  for (Eigen::Index i = 0; i < solved_.cols(); ++i) {
-    column = solved_.col(i);
-    poses.solve_in_place(column);
-    solved_.col(i) = column;
-  }
+  poses.solve_in_place(solved_);
   poses.solve_in_place(gradient);
   reduced_information_.noalias() -= reduced_poses_.transpose() * solved_;
   reduced_gradient_.noalias() -= reduced_poses_.transpose() * gradient;

@@ -56,13 +56,16 @@ class CalibrationBorder {
 
   /// Copies the equations for elimination, damped.
   void begin_elimination(double damping);
-  /// Eliminates a point. half: M with M^T * M the inverse of its damped block; gradient: M * that
-  /// of the point.
+  /// Eliminates a point, which until begin() is kept times M. half: M with M^T * M the inverse of
+  /// its damped block; gradient: M * that of the point.
   void eliminate_point(std::size_t point,
                        const Eigen::Matrix3d& half,
                        const Eigen::Vector3d& gradient);
-  /// The same for what the point has to do with a pose: link * M^T.
-  void eliminate_link(std::size_t slot, const Eigen::Matrix<double, 6, 3>& eliminated);
+  /// The same for what a point that was eliminated has to do with a pose: link * M^T. Slots may be
+  /// worked on by several threads.
+  void eliminate_link(std::size_t slot,
+                      std::size_t point,
+                      const Eigen::Matrix<double, 6, 3>& eliminated);
 
   /// Solves the whole: gradient, of the poses, becomes their solution. False if the equations have
   /// none.
@@ -71,14 +74,15 @@ class CalibrationBorder {
   const Eigen::VectorXd& solution() const { return solution_; }
   const Eigen::VectorXd& gradient() const { return gradient_; }
   auto diagonal() const { return information_.diagonal(); }
-  /// What the solution takes from the gradient of a point.
+  /// What the solution takes from the gradient of a point that was eliminated, times M.
   Eigen::Vector3d share_of_point(std::size_t point) const;
 
-  // After solve():
-  /// What a point has to do with the calibration: second derivative of the cost.
+  /// What a point has to do with the calibration: second derivative of the cost. Not between
+  /// eliminate_point() and begin().
   auto of_point(std::size_t point) const {
     return points_.middleCols(column(point), gradient_.size());
   }
+  // After solve():
   /// How a pose follows the calibration, negated.
   auto solved(std::size_t slot) const {
     return solved_.middleRows<6>(static_cast<Eigen::Index>(6 * slot));
@@ -100,7 +104,6 @@ class CalibrationBorder {
   Eigen::MatrixXd reduced_information_;
   Eigen::VectorXd reduced_gradient_;
   Eigen::MatrixXd reduced_poses_;
-  Eigen::Matrix3Xd eliminated_;  // Of the point at hand.
   Eigen::VectorXd solution_;
   Eigen::MatrixXd solved_;  // The reduced poses, times the inverse of their own equations.
   Eigen::MatrixXd scores_;  // A column per part of the way.

@@ -71,14 +71,16 @@ TEST_F(CalibrationBorderTest, SolvesAsTheDenseEquationsDo) {
     Eigen::Matrix<double, 6, 3> eliminated[2];
     for (int pose = 0; pose < kNumPoses; ++pose) {
       eliminated[pose] = hessian_.block<6, 3>(6 * pose, at) * half.transpose();
-      border.eliminate_link(static_cast<std::size_t>(pose), eliminated[pose]);
+      border.eliminate_link(
+          static_cast<std::size_t>(pose), static_cast<std::size_t>(point), eliminated[pose]);
       poses.segment<6>(6 * pose) -= eliminated[pose] * pull;
       reduced.diagonal(static_cast<std::uint32_t>(pose)) -=
           eliminated[pose] * eliminated[pose].transpose();
     }
-    reduced.block(reduced.index_of(1, 0)) -= eliminated[1] * eliminated[0].transpose();
+    reduced.block(1, 0) -= eliminated[1] * eliminated[0].transpose();
   }
-  ASSERT_TRUE(reduced.factorize());
+  ThreadPool one_thread(1);
+  ASSERT_TRUE(reduced.factorize(one_thread));
   ASSERT_TRUE(border.solve(reduced, poses));
   const Eigen::VectorXd expected = hessian_.ldlt().solve(gradient_);
   EXPECT_LT((poses - expected.head<12>()).norm(), 1e-9);

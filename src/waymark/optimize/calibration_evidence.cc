@@ -50,8 +50,9 @@ void SchurSolver::add_scores(std::size_t entry) {
 
 CalibrationEvidence SchurSolver::calibration_evidence() {
   linearize();
-  eliminate_points(kLeastDamping);
+  reduce(kLeastDamping);
   if (!solve_reduced()) return {};
+  linearize();  // Elimination has changed the links.
   for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) add_scores(entry);
   return border_->evidence();
 }

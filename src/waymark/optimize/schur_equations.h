@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numeric>
 #include <optional>
 #include <span>
 #include <vector>
@@ -49,7 +50,8 @@ struct NormalBlocks {
   std::vector<Vector6d> pose_gradient;  // Per slot.
   std::vector<Eigen::Matrix3d> points;  // Per entry of SchurPlan::points.
   std::vector<Eigen::Vector3d> point_gradient;
-  std::vector<Matrix63d> links;  // Pose by point.
+  /// Pose by point; eliminated ones times M^T. One more at the end is no link.
+  std::vector<Matrix63d> links;
 };
 
 /// Residual rows of one observation (bearing, bearing, range) times the root of their weight.
@@ -61,6 +63,9 @@ struct ResidualRows {
   Eigen::Matrix<double, kRows, 3> by_point_in_cam;
 };
 
+/// Points, or observations, that one thread works on at once.
+inline constexpr std::size_t kNumPointsAtOnce = 4096;
+
 /// Levenberg-Marquardt over one plan; see minimize_with_schur(), of which it is the inside.
 class SchurSolver {
  public:
@@ -70,6 +75,7 @@ class SchurSolver {
       : problem_(problem),
         options_(options),
         plan_(make_schur_plan(problem, is_used)),
+        threads_(options.num_threads),
         reduced_(plan_.num_slots, plan_.pattern) {
     state_.rig_from_world = problem.rig_from_world;
     state_.points = problem.points;
@@ -110,7 +116,17 @@ class SchurSolver {
     return calibration && calibration->has_depths;
   }
   void allocate();
-  double cost(const BundleState& state) const;
+  /// Of sum(begin, end) over parts of [0, count), which may run in several threads.
+  template <class Sum>
+  double sum_over(std::size_t count, const Sum& sum) {
+    std::vector<double> sums((count + kNumPointsAtOnce - 1) / kNumPointsAtOnce);
+    threads_.for_chunks(count, kNumPointsAtOnce, [&](std::size_t begin, std::size_t end) {
+      sums[begin / kNumPointsAtOnce] = sum(begin, end);
+    });
+    return std::accumulate(sums.begin(), sums.end(), 0.0);
+  }
+  double loss(std::size_t i, const BundleState& state) const;
+  double cost(const BundleState& state);
   void linearize();
   template <int kRows>
   void accumulate(const ResidualRows<kRows>& rows,
@@ -134,10 +150,14 @@ class SchurSolver {
   template <class Visit>
   void visit_rows(std::size_t i, const Visit& visit) const;
   void add_scores(std::size_t entry);
-  void eliminate_points(double damping);
-  void eliminate_point(std::size_t entry, double damping, std::size_t& first_pair);
+  /// Builds the reduced system of the damped equations; the links are eliminated ones after it.
+  void reduce(double damping);
+  void eliminate_point(std::size_t entry, double damping);
+  void reduce_panel(std::size_t panel, double damping);
+  void reduce_column(std::uint32_t slot, std::span<const std::uint32_t> places, double* sums);
   bool solve_reduced();
   double substitute_back(double damping);
+  double move_point(std::size_t entry, double damping);
 
   const BundleProblem& problem_;
   const BundleOptions& options_;
@@ -146,11 +166,14 @@ class SchurSolver {
   BundleState state_;
   BundleState candidate_;
   NormalBlocks blocks_;
-  std::vector<Eigen::Matrix3d> half_inverses_;  // M with M^T * M = inverse of the damped block.
-  std::vector<Matrix63d> eliminated_;           // Links of one point times M^T.
-  std::optional<CalibrationBorder> border_;     // Where the calibration is unknown.
+  std::vector<Eigen::Matrix3d> half_inverses_;   // M with M^T * M = inverse of the damped block.
+  std::vector<Eigen::Vector3d> half_gradients_;  // M times the gradients of points.
+  std::vector<std::uint32_t> entry_of_link_;
+  std::vector<std::uint32_t> links_of_slot_;     // Ascending.
+  std::vector<std::size_t> first_link_of_slot_;  // And one past the end.
+  std::optional<CalibrationBorder> border_;      // Where the calibration is unknown.
+  ThreadPool threads_;
   BlockCholesky reduced_;
-  std::vector<std::uint32_t> block_of_links_;  // In reduced_, per pair of links of a point.
   Eigen::VectorXd reduced_gradient_;
 };
 

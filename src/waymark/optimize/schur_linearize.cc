@@ -43,24 +43,30 @@ double SchurSolver::range_residual_of(std::size_t i,
   return residual(seen, observation.inverse_range - shift, sigma);
 }
 
-double SchurSolver::cost(const BundleState& state) const {
-  double sum = 0.0;
-  for (const std::uint32_t i : plan_.observations) {
-    const BundleObservation& observation = problem_.observations[i];
-    const Eigen::Vector3d point_in_rig =
-        apply(state.matrices[observation.pose], state.points[observation.point]);
-    const InverseRangePoint seen =
-        in_inverse_range(apply(camera_of(observation, state), point_in_rig));
-    if (!is_ahead(seen, observation.bearing)) {
-      sum += huber(kGrossSquaredResidual, options_.huber_px).loss;
-      continue;
-    }
-    sum += huber(residual_of(i, seen, state).squaredNorm(), options_.huber_px).loss;
-    if (observation.inverse_range_sigma > 0.0f) {
-      const double range = range_residual_of(i, seen, state);
-      sum += huber(range * range, options_.range_huber).loss;
-    }
+/// Of one observation, twice.
+double SchurSolver::loss(std::size_t i, const BundleState& state) const {
+  const BundleObservation& observation = problem_.observations[i];
+  const Eigen::Vector3d point_in_rig =
+      apply(state.matrices[observation.pose], state.points[observation.point]);
+  const InverseRangePoint seen =
+      in_inverse_range(apply(camera_of(observation, state), point_in_rig));
+  if (!is_ahead(seen, observation.bearing)) {
+    return huber(kGrossSquaredResidual, options_.huber_px).loss;
   }
+  double sum = huber(residual_of(i, seen, state).squaredNorm(), options_.huber_px).loss;
+  if (observation.inverse_range_sigma > 0.0f) {
+    const double range = range_residual_of(i, seen, state);
+    sum += huber(range * range, options_.range_huber).loss;
+  }
+  return sum;
+}
+
+double SchurSolver::cost(const BundleState& state) {
+  double sum = sum_over(plan_.observations.size(), [&](std::size_t begin, std::size_t end) {
+    double part = 0.0;
+    for (std::size_t k = begin; k < end; ++k) part += loss(plan_.observations[k], state);
+    return part;
+  });
   if (border_) {
     const Eigen::VectorXd off = state.calibration - problem_.calibration->prior_change;
     sum += off.dot(problem_.calibration->prior_information * off);

@@ -22,7 +22,7 @@ struct BundleRound {
 /// Levenberg-Marquardt that eliminates the points one by one (Schur complement; Triggs et al.
 /// 2000, 6.1; Lourakis & Argyros 2009) and solves the reduced system of the free poses by a sparse
 /// Cholesky decomposition. Robust by iteratively reweighted least squares. All sums run in a fixed
-/// order, on the caller's thread: the same input gives the same bits. Time is linear in the
+/// order: the same input gives the same bits, with any number of threads. Time is linear in the
 /// observations and, along a way, in the free poses; cubic in those that see the same.
 BundleRound minimize_with_schur(BundleProblem& problem,
                                 std::span<const std::uint8_t> is_used,

@@ -201,7 +201,7 @@ BundleRound minimize_with_ceres(BundleProblem& problem,
   add_residuals(problem, is_used, poses, problem.points, &loss, &range_loss, ceres_problem);
 
   ceres::Solver::Options solver_options;
-  solver_options.num_threads = 1;
+  solver_options.num_threads = static_cast<int>(options.num_threads);
   solver_options.max_num_iterations = options.max_iterations_per_round;
   solver_options.function_tolerance = options.relative_cost_tolerance;
   solver_options.linear_solver_type = num_free <= 60 ? ceres::DENSE_SCHUR : ceres::SPARSE_SCHUR;

@@ -10,7 +10,7 @@
 namespace waymark::testing {
 
 /// The same problem, loss and result as minimize_with_schur by Ceres: the independent opinion.
-/// One thread and contiguous blocks, which makes Ceres repeatable.
+/// With one thread Ceres is repeatable, since blocks are contiguous.
 BundleRound minimize_with_ceres(BundleProblem& problem,
                                 std::span<const std::uint8_t> is_used,
                                 const BundleOptions& options);

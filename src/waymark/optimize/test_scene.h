@@ -112,6 +112,9 @@ struct BundleSceneOptions {
   std::size_t num_fixed = 2;  ///< The first ones.
   std::size_t num_points = 200;
   std::size_t views_per_point = 4;  ///< Neighbouring poses.
+  /// Where the way turns back, beside itself: half of the views of a point are of the next row.
+  /// 0: one row.
+  std::size_t poses_per_row = 0;
   std::size_t num_cameras = 1;
   double noise_px = 1.0;
   double share_of_outliers = 0.0;
@@ -159,7 +162,9 @@ inline BundleScene make_bundle_scene(const BundleSceneOptions& options, std::uin
   scene.rig = make_rig(options.num_cameras);
   for (std::size_t i = 0; i < options.num_poses; ++i) {
     Vector6d tangent = random_tangent(rng, 0.05, 0.05);
-    tangent[0] += 0.4 * static_cast<double>(i);
+    const std::size_t row = options.poses_per_row > 0 ? i / options.poses_per_row : 0;
+    tangent[0] += 0.4 * static_cast<double>(i - row * options.poses_per_row);
+    tangent[1] += 0.4 * static_cast<double>(row);
     scene.rig_from_world.push_back(Rigid3::exp(tangent).inverse());
     const bool is_fixed = i < options.num_fixed;
     const Vector6d error = random_tangent(rng, options.pose_error, options.pose_error);
@@ -167,21 +172,22 @@ inline BundleScene make_bundle_scene(const BundleSceneOptions& options, std::uin
                                            scene.rig_from_world.back());
     scene.problem.is_pose_fixed.push_back(is_fixed);
   }
-  const std::size_t last_start = options.num_poses - options.views_per_point;
+  const bool has_rows = options.poses_per_row > 0;
+  const std::size_t num_rows = has_rows ? options.num_poses / options.poses_per_row : 1;
+  const std::size_t num_views = has_rows ? options.views_per_point / 2 : options.views_per_point;
+  const std::size_t row_length = has_rows ? options.poses_per_row : options.num_poses;
   for (std::size_t i = 0; i < options.num_points; ++i) {
-    const auto start = rng.below(static_cast<std::uint32_t>(last_start) + 1);
-    const double middle =
-        0.4 * (static_cast<double>(start) + 0.5 * static_cast<double>(options.views_per_point));
+    const auto start = rng.below(static_cast<std::uint32_t>(row_length - num_views) + 1);
+    const auto row = has_rows ? rng.below(static_cast<std::uint32_t>(num_rows) - 1) : 0;
+    const double middle = 0.4 * (static_cast<double>(start) + 0.5 * static_cast<double>(num_views));
     const double x = middle + rng.uniform(-1.5, 1.5);
-    const double y = rng.uniform(-1.5, 1.5);
+    const double y = 0.4 * row + rng.uniform(-1.5, 1.5);
     scene.points.emplace_back(x, y, rng.uniform(2.0, 8.0));
     scene.problem.points.push_back(scene.points.back() + random_vector(rng, options.point_error));
     for (std::size_t view = 0; view < options.views_per_point; ++view) {
-      observe(options,
-              start + static_cast<std::uint32_t>(view),
-              static_cast<std::uint32_t>(i),
-              rng,
-              scene);
+      const std::size_t row_of_view = row + view / num_views;
+      const std::size_t pose = row_of_view * row_length + start + view % num_views;
+      observe(options, static_cast<std::uint32_t>(pose), static_cast<std::uint32_t>(i), rng, scene);
     }
   }
   return scene;
