@@ -86,6 +86,23 @@ struct EstimatedCalibrationSummary {
   bool is_sure = false;         ///< Whether the motion told it.
 };
 
+/// The markers of a run.
+struct MarkerSummary {
+  /// One marker of the map.
+  struct Entry {
+    int id = 0;                     ///< Its number.
+    std::string verdict;            ///< "used", or why it was left out.
+    std::size_t num_keyframes = 0;  ///< That see it.
+    double rms_px = 0.0;            ///< Of its corners.
+    std::string fault;              ///< In words; empty where it is used.
+  };
+  std::string family;          ///< As it was asked for.
+  std::string frame = "none";  ///< "none", "scale", "marker 0" or "surveyed".
+  double scale_sigma = 0.0;    ///< Of the scale, as a part of it; 0 where it is known otherwise.
+  double survey_rms_m = 0.0;   ///< Of the corners of surveyed markers.
+  std::vector<Entry> markers;  ///< By number.
+};
+
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -114,6 +131,7 @@ struct RunSummary {
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
   std::vector<CalibrationEstimate> refined_calibration;  ///< Empty where it stayed as it was.
+  std::optional<MarkerSummary> markers = std::nullopt;   ///< Where some were looked for.
 };
 
 /// Statistics per stage over all rows, in the order of the table.

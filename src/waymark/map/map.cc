@@ -51,6 +51,7 @@ Map Map::thaw(const Map& frozen) {
   map.landmark_forwarding_ = decltype(landmark_forwarding_)::thaw(frozen.landmark_forwarding_);
   map.submaps_ = frozen.submaps_;
   map.loop_edges_ = frozen.loop_edges_;
+  map.markers_ = frozen.markers_;
   map.newest_frame_ = frozen.newest_frame_;
   map.freeze();  // Keeps references to what is edited first.
   return map;
