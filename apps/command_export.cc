@@ -18,11 +18,12 @@
 #include "waymark/exchange/exports.h"
 #include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/marker/known_markers.h"
 
 namespace waymark {
 namespace {
 
-enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti };
+enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti, kMarkers };
 
 struct ExportOptions {
   std::filesystem::path map;
@@ -77,6 +78,16 @@ void export_model(const ExportOptions& options,
   write_split_images(options.out / "images", options.out / "masks", split, stored.images);
 }
 
+/// The markers of a sub-map as markers.yaml, as if they had been surveyed there.
+void write_markers(const std::filesystem::path& path, const Map& map, SubmapId submap) {
+  KnownMarkers markers;
+  for (const MapMarker& marker : map.markers()) {
+    if (map.submap_of(marker) != submap) continue;
+    markers.by_id[marker.id] = {marker.side_m, map.world_from_marker(marker)};
+  }
+  write_file_atomically(path, format_known_markers(markers));
+}
+
 /// The number-th largest sub-map.
 void export_submap(const ExportOptions& options,
                    const StoredMap& stored,
@@ -90,6 +101,8 @@ void export_submap(const ExportOptions& options,
     case ExportFormat::kKitti:
       return write_trajectory(
           file, keyframe_trajectory(*stored.map, submap), TrajectoryFormat::kKitti);
+    case ExportFormat::kMarkers:
+      return write_markers(file, *stored.map, submap);
     case ExportFormat::kPly:
       return write_ply(file, make_export_scene(*stored.map, submap, stored.images));
     case ExportFormat::kColmap:
@@ -108,6 +121,10 @@ void export_submaps(const ExportOptions& options,
 int export_map(const ExportOptions& options) {
   const StoredMap stored = load_map(options.map);
   const std::vector<SubmapId> submaps = submaps_by_size(*stored.map);
+  if (options.format == ExportFormat::kMarkers && stored.map->markers().empty()) {
+    throw InputError(options.map.string(),
+                     "knows no markers, expected some (run --set markers.family=...)");
+  }
   if (submaps.empty()) {
     throw InputError(options.map.string(), "has no keyframes, expected some to export");
   }
@@ -126,7 +143,7 @@ int export_map(const ExportOptions& options) {
                options.map.string(),
                options.out.string());
   if (stored.images.empty() && options.format != ExportFormat::kTum &&
-      options.format != ExportFormat::kKitti) {
+      options.format != ExportFormat::kKitti && options.format != ExportFormat::kMarkers) {
     print_message("note: the map holds no images (run --keep-images); points are grey\n");
   }
   return kDone;
@@ -141,7 +158,7 @@ void add_export_command(CLI::App& program, Command& command) {
   exporting
       .add_option("-o,--out",
                   options->out,
-                  "File for ply, tum, kitti (of keyframes); folder for colmap, nerfstudio")
+                  "File for ply, tum, kitti (of keyframes), markers; folder for colmap, nerfstudio")
       ->required();
   add_choice<ExportFormat>(exporting,
                            "--format",
@@ -150,8 +167,9 @@ void add_export_command(CLI::App& program, Command& command) {
                             {"colmap", ExportFormat::kColmap},
                             {"nerfstudio", ExportFormat::kNerfstudio},
                             {"tum", ExportFormat::kTum},
-                            {"kitti", ExportFormat::kKitti}},
-                           "ply, colmap, nerfstudio, tum or kitti [ply]");
+                            {"kitti", ExportFormat::kKitti},
+                            {"markers", ExportFormat::kMarkers}},
+                           "ply, colmap, nerfstudio, tum, kitti or markers [ply]");
   exporting.add_flag("--text", options->is_text, "COLMAP's text form instead of its binary one");
   exporting
       .add_option("--split-views",
