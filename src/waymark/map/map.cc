@@ -37,6 +37,7 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
   frozen->submaps_ = submaps_;
   frozen->loop_edges_ = loop_edges_;
+  frozen->markers_ = markers_;
   frozen->newest_frame_ = newest_frame_;
   last_frozen_ = frozen;
   return frozen;

@@ -223,8 +223,7 @@ WindowAdjustment compute_adjustment(const Map& map,
   }
   if (!map.markers().empty() && !window_problem.problem.calibration) {
     const std::vector<KeyframeId> keyframes = keyframes_of(window);
-    const SubmapId submap = map.keyframes().at(keyframes.front()).submap;
-    window_problem.marker_rigs = add_markers(map, submap, keyframes, window_problem.problem);
+    window_problem.marker_rigs = add_markers(map, keyframes, window_problem.problem);
   }
   const BundleResult result = adjust_bundle(window_problem.problem, options);
   WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};

@@ -22,13 +22,14 @@ struct MarkerInKeyframe {
 
 std::vector<MarkerInKeyframe> list_sightings(const Map& map,
                                              std::span<const KeyframeId> keyframes,
-                                             int id) {
+                                             const MapMarker& of_map) {
+  const SubmapId submap = map.submap_of(of_map);
   std::vector<MarkerInKeyframe> sightings;
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
-    const auto& markers = map.keyframes().at(keyframes[i]).markers;
-    if (!markers) continue;
-    for (const MarkerSighting& marker : *markers) {
-      if (marker.id == id) sightings.push_back({static_cast<std::uint32_t>(i), &marker});
+    const Keyframe& keyframe = map.keyframes().at(keyframes[i]);
+    if (!keyframe.markers || keyframe.submap != submap) continue;
+    for (const MarkerSighting& marker : *keyframe.markers) {
+      if (marker.id == of_map.id) sightings.push_back({static_cast<std::uint32_t>(i), &marker});
     }
   }
   return sightings;
@@ -69,14 +70,12 @@ Measurement sighting_measurement(const MarkerSighting& marker, std::size_t corne
 }  // namespace
 
 std::vector<std::shared_ptr<const Rig>> add_markers(const Map& map,
-                                                    SubmapId submap,
                                                     std::span<const KeyframeId> keyframes,
                                                     BundleProblem& problem) {
   WAYMARK_CHECK(!problem.calibration);
   std::vector<std::shared_ptr<const Rig>> rigs;
   for (const MapMarker& marker : map.markers()) {
-    if (map.submap_of(marker) != submap) continue;
-    const std::vector<MarkerInKeyframe> sightings = list_sightings(map, keyframes, marker.id);
+    const std::vector<MarkerInKeyframe> sightings = list_sightings(map, keyframes, marker);
     if (sightings.size() < 2) continue;
     const auto rig = rigs.emplace_back(rig_before(marker.side_m));
     const auto& surveyed = marker.surveyed_world_from_marker;

@@ -11,7 +11,7 @@
 
 namespace waymark {
 
-/// Adds the markers of a sub-map to a problem whose poses are those of `keyframes`, in this order,
+/// Adds the markers of a map to a problem whose poses are those of `keyframes`, in this order,
 /// behind all that is there. A marker is a pose as a rig is: that of a camera that stands before it
 /// and sees its corners where the square of its size has them, as exactly as prints are made. The
 /// corners are points that keyframes see as well: so they are held by each other and hold the
@@ -21,7 +21,6 @@ namespace waymark {
 /// Returns the rigs of the markers, which have to live as long as the problem. Not for problems
 /// with an unknown calibration.
 std::vector<std::shared_ptr<const Rig>> add_markers(const Map& map,
-                                                    SubmapId submap,
                                                     std::span<const KeyframeId> keyframes,
                                                     BundleProblem& problem);
 

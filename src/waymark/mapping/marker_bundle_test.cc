@@ -67,7 +67,7 @@ TEST_F(MarkerBundleTest, AMarkerOfKnownSizeHoldsTheScale) {
   EXPECT_NEAR(survey.frame->world_from_map.scale, 1.0 / kWrongScale, 0.003);
   note_markers(map_, SubmapId{0}, known_, survey, Sim3());
   BundleProblem adjusted = problem();
-  const auto rigs = add_markers(map_, SubmapId{0}, keyframes_, adjusted);
+  const auto rigs = add_markers(map_, keyframes_, adjusted);
   ASSERT_EQ(rigs.size(), 1u);
   EXPECT_EQ(adjusted.points.size(), 4u);
   EXPECT_EQ(adjusted.observations.size(), 4u * 7u);
@@ -100,7 +100,7 @@ TEST_F(MarkerBundleTest, ASurveyedMarkerStaysAndHoldsTheMap) {
   EXPECT_TRUE(is_held_by_survey(map_, SubmapId{0}));
   BundleProblem adjusted = problem();
   adjusted.is_pose_fixed.assign(adjusted.is_pose_fixed.size(), 0);
-  const auto rigs = add_markers(map_, SubmapId{0}, keyframes_, adjusted);
+  const auto rigs = add_markers(map_, keyframes_, adjusted);
   EXPECT_TRUE(adjusted.is_pose_fixed.back());
   adjust_bundle(adjusted, {.max_iterations_per_round = 50});
   const Rigid3 world_from_rig = *known.pose_of(4) * (truth_[3] * hung_).inverse();
