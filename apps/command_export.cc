@@ -81,7 +81,9 @@ int run_export(ExportOptions options) {
                options.map.string(),
                what.out.string(),
                models);
-  const bool has_colors = what.format != ExportFormat::kTum && what.format != ExportFormat::kKitti;
+  const bool has_colors = what.format != ExportFormat::kTum &&
+                          what.format != ExportFormat::kKitti &&
+                          what.format != ExportFormat::kMarkers;
   if (stored.images.empty() && what.input.empty() && has_colors) {
     print_message("note: the map holds no images (run --keep-images); points are grey\n");
   }
@@ -119,7 +121,7 @@ void add_export_command(CLI::App& program, Command& command) {
   exporting
       .add_option("-o,--out",
                   options->what.out,
-                  "File for ply, tum, kitti (of keyframes); folder for colmap, nerfstudio")
+                  "File for ply, tum, kitti (of keyframes), markers; folder for colmap, nerfstudio")
       ->required();
   add_choice<ExportFormat>(exporting,
                            "--format",
@@ -128,8 +130,9 @@ void add_export_command(CLI::App& program, Command& command) {
                             {"colmap", ExportFormat::kColmap},
                             {"nerfstudio", ExportFormat::kNerfstudio},
                             {"tum", ExportFormat::kTum},
-                            {"kitti", ExportFormat::kKitti}},
-                           "ply, colmap, nerfstudio, tum or kitti [ply]");
+                            {"kitti", ExportFormat::kKitti},
+                            {"markers", ExportFormat::kMarkers}},
+                           "ply, colmap, nerfstudio, tum, kitti or markers [ply]");
   exporting.add_flag(
       "--text", options->what.is_text, "COLMAP's text form instead of its binary one");
   exporting

@@ -43,6 +43,23 @@ struct RunOptions {
   bool has_report = false;        ///< Whether a page on it is among the results.
 };
 
+/// A line for all, and one for each that was left out.
+void report_markers(Reporter& reporter, const MarkerSummary& markers) {
+  const auto used = std::ranges::count(markers.markers, "used", &MarkerSummary::Entry::verdict);
+  std::string line = fmt::format("{} markers found, {} used", markers.markers.size(), used);
+  if (markers.frame == "none") line += "; they do not tell the scale of the map";
+  if (markers.frame == "scale") line += "; the map is in metres by them";
+  if (markers.frame == "marker 0") line += "; the map is in metres, in the frame of marker 0";
+  if (markers.frame == "surveyed") {
+    line += fmt::format("; the map is where the surveyed ones are, these {:.3f} m off (rms)",
+                        markers.survey_rms_m);
+  }
+  reporter.info(line);
+  for (const MarkerSummary::Entry& entry : markers.markers) {
+    if (!entry.fault.empty()) reporter.info(entry.fault);
+  }
+}
+
 void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
   const RunSummary& summary = results.summary;
   const FrameCounts& counts = summary.counts;
@@ -59,6 +76,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                   summary.submaps));
   report_reasons(reporter, results.table);
   if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
+  if (summary.markers) report_markers(reporter, *summary.markers);
   if (!results.ego_mask.values.empty()) {
     reporter.info(
         fmt::format("{:.1f} % of the image moves along with the camera and has no features: {}",

@@ -185,6 +185,31 @@ int simulate(const SimulateOptions& options) {
   return kDone;
 }
 
+void add_population_options(CLI::App& simulation, SequenceSpec& spec) {
+  simulation
+      .add_option("--walkers",
+                  spec.num_walkers,
+                  "People who cross the view at any time; 3 hide up to half of it")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  simulation.add_flag("--operator",
+                      spec.has_operator,
+                      "Somebody who carries the camera on a pole above the head, seen below it");
+  simulation
+      .add_option("--changes",
+                  spec.num_changes,
+                  "Cupboards that are gone and doors that are open in the second half")
+      ->check(CLI::Range(0, 20))
+      ->capture_default_str();
+  simulation
+      .add_option("--markers",
+                  spec.num_markers,
+                  "Square markers on the walls (tag36h11), with their sizes and true poses in "
+                  "markers.yaml")
+      ->check(CLI::Range(0, 500))
+      ->capture_default_str();
+}
+
 void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
   simulation
       .add_option("--readout",
@@ -260,21 +285,7 @@ void add_simulate_command(CLI::App& program, Command& command) {
           options->exposure_ms,
           "Milliseconds that the shutter is open, of a world: what moves meanwhile blurs [0]")
       ->check(number_between(0.0, 1000.0));
-  simulation
-      .add_option("--walkers",
-                  spec.num_walkers,
-                  "People who cross the view at any time; 3 hide up to half of it")
-      ->check(CLI::Range(0, 20))
-      ->capture_default_str();
-  simulation.add_flag("--operator",
-                      spec.has_operator,
-                      "Somebody who carries the camera on a pole above the head, seen below it");
-  simulation
-      .add_option("--changes",
-                  spec.num_changes,
-                  "Cupboards that are gone and doors that are open in the second half")
-      ->check(CLI::Range(0, 20))
-      ->capture_default_str();
+  add_population_options(simulation, spec);
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
   add_flaw_options(simulation, *options);
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");

@@ -21,6 +21,7 @@ using Program = std::function<int(const std::vector<std::string>&)>;
 void add_run_command(CLI::App& program, Command& command);
 void add_localize_command(CLI::App& program, Command& command);
 void add_map_command(CLI::App& program, Command& command);
+void add_markers_command(CLI::App& program, Command& command);
 void add_calibrate_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);
 void add_report_command(CLI::App& program, Command& command);

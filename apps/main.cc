@@ -63,6 +63,7 @@ int run_program(const std::vector<std::string>& arguments) {
   add_import_command(program, command);
   add_calibrate_command(program, command);
   add_config_command(program, command);
+  add_markers_command(program, command);
 
   check_command_name(program, arguments);
   try {

@@ -1,7 +1,7 @@
 # Everything comes from the distribution; nothing is downloaded.
 find_package(Threads REQUIRED)
 find_package(Eigen3 3.4 REQUIRED NO_MODULE)
-find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs videoio calib3d features2d)
+find_package(OpenCV 4 REQUIRED COMPONENTS core imgproc imgcodecs videoio calib3d features2d aruco)
 find_package(Boost 1.74 REQUIRED) # Headers of Asio and Beast.
 find_package(yaml-cpp REQUIRED)
 find_package(fmt REQUIRED)

@@ -1,10 +1,10 @@
 # find_package(waymark) gives waymark::waymark, which is all of it, and its modules one by one:
-# waymark::base geometry camera image map match place optimize track mapping loop bag input mapfile
+# waymark::base geometry camera image marker map match place optimize track mapping loop bag input mapfile
 # exchange system session view simulate evaluate.
 include(CMakeFindDependencyMacro)
 find_dependency(Threads)
 find_dependency(Eigen3 3.4 NO_MODULE)
-find_dependency(OpenCV 4 COMPONENTS core imgproc imgcodecs videoio)
+find_dependency(OpenCV 4 COMPONENTS core imgproc imgcodecs videoio calib3d aruco)
 find_dependency(yaml-cpp)
 find_dependency(fmt)
 find_dependency(BZip2)

@@ -125,8 +125,9 @@ ExportFormat format_argument(const std::string& name) {
   if (name == "nerfstudio") return ExportFormat::kNerfstudio;
   if (name == "tum") return ExportFormat::kTum;
   if (name == "kitti") return ExportFormat::kKitti;
+  if (name == "markers") return ExportFormat::kMarkers;
   throw py::value_error("format: is " + quote_for_message(name) +
-                        ", expected ply, colmap, nerfstudio, tum or kitti");
+                        ", expected ply, colmap, nerfstudio, tum, kitti or markers");
 }
 
 ExportedFrames frames_argument(const py::object& frames) {

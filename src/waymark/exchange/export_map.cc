@@ -16,6 +16,7 @@
 #include "waymark/exchange/export_split.h"
 #include "waymark/exchange/exports.h"
 #include "waymark/exchange/recorded_images.h"
+#include "waymark/marker/known_markers.h"
 
 namespace waymark {
 namespace {
@@ -190,6 +191,16 @@ class ModelWriter {
   MapExportCounts counts_;
 };
 
+/// The markers of a sub-map as markers.yaml, as if they had been surveyed there.
+void write_markers(const std::filesystem::path& path, const Map& map, SubmapId submap) {
+  KnownMarkers markers;
+  for (const MapMarker& marker : map.markers()) {
+    if (map.submap_of(marker) != submap) continue;
+    markers.by_id[marker.id] = {marker.side_m, map.world_from_marker(marker)};
+  }
+  write_file_atomically(path, format_known_markers(markers));
+}
+
 void write_file(const MapExport& options,
                 const StoredMap& stored,
                 SubmapId submap,
@@ -198,6 +209,7 @@ void write_file(const MapExport& options,
   if (options.format == ExportFormat::kPly) {
     return write_ply(file, make_export_scene(*stored.map, submap, stored.images));
   }
+  if (options.format == ExportFormat::kMarkers) return write_markers(file, *stored.map, submap);
   const auto format =
       options.format == ExportFormat::kTum ? TrajectoryFormat::kTum : TrajectoryFormat::kKitti;
   write_trajectory(file, keyframe_trajectory(*stored.map, submap), format);
@@ -210,6 +222,9 @@ MapExportCounts export_map(const StoredMap& stored,
                            const MapExport& options) {
   check_options(options);
   const std::vector<SubmapId> submaps = submaps_by_size(*stored.map);
+  if (options.format == ExportFormat::kMarkers && stored.map->markers().empty()) {
+    throw InputError(name, "knows no markers, expected some (run --set markers.family=...)");
+  }
   if (submaps.empty()) throw InputError(name, "has no keyframes, expected some to export");
   if (!makes_folder(options.format)) {
     for (std::size_t i = 0; i < submaps.size(); ++i) write_file(options, stored, submaps[i], i);

@@ -15,7 +15,7 @@
 namespace waymark {
 
 /// For whom a map is written.
-enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti };
+enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti, kMarkers };
 
 /// What to write of a map, and where.
 struct MapExport {

@@ -100,6 +100,27 @@ void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajec
   json["lost_count"] = counts.lost_count;
 }
 
+Json to_json(const MarkerSummary& summary) {
+  Json json;
+  json["family"] = summary.family;
+  json["frame"] = summary.frame;
+  json["scale_sigma"] = summary.scale_sigma;
+  json["survey_rms_m"] = summary.survey_rms_m;
+  json["used"] = std::ranges::count(summary.markers, "used", &MarkerSummary::Entry::verdict);
+  Json markers = Json::array();
+  for (const MarkerSummary::Entry& entry : summary.markers) {
+    Json marker;
+    marker["id"] = entry.id;
+    marker["verdict"] = entry.verdict;
+    marker["keyframes"] = entry.num_keyframes;
+    marker["rms_px"] = rounded(entry.rms_px);
+    if (!entry.fault.empty()) marker["fault"] = entry.fault;
+    markers.push_back(marker);
+  }
+  json["markers"] = markers;
+  return json;
+}
+
 }  // namespace
 
 void FrameRecord::set_stages(std::span<const double> times_ms) {
@@ -194,6 +215,7 @@ std::string format_summary_json(const RunSummary& summary) {
   if (summary.quality) json["quality"] = to_json(*summary.quality);
   if (summary.moves_along) json["moves_along"] = *summary.moves_along;
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
+  if (summary.markers) json["markers"] = to_json(*summary.markers);
   if (!summary.refined_calibration.empty()) {
     json["refined_calibration"] = to_json(summary.refined_calibration);
   }

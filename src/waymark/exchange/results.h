@@ -105,6 +105,23 @@ struct LoopFrames {
   std::optional<std::uint32_t> to;    ///< That showed its place again.
 };
 
+/// The markers of a run.
+struct MarkerSummary {
+  /// One marker of the map.
+  struct Entry {
+    int id = 0;                     ///< Its number.
+    std::string verdict;            ///< "used", or why it was left out.
+    std::size_t num_keyframes = 0;  ///< That see it.
+    double rms_px = 0.0;            ///< Of its corners.
+    std::string fault;              ///< In words; empty where it is used.
+  };
+  std::string family;          ///< As it was asked for.
+  std::string frame = "none";  ///< "none", "scale", "marker 0" or "surveyed".
+  double scale_sigma = 0.0;    ///< Of the scale, as a part of it; 0 where it is known otherwise.
+  double survey_rms_m = 0.0;   ///< Of the corners of surveyed markers.
+  std::vector<Entry> markers;  ///< By number.
+};
+
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -137,7 +154,8 @@ struct RunSummary {
   std::vector<std::string> input;                        ///< What was understood of it, in words.
   /// Settings that are not as by default, "KEY: VALUE" as in a file.
   std::vector<std::string> settings;
-  std::vector<RunAdvice> advice;  ///< Empty where all went well.
+  std::vector<RunAdvice> advice;                        ///< Empty where all went well.
+  std::optional<MarkerSummary> markers = std::nullopt;  ///< Where some were looked for.
 };
 
 /// Statistics per stage over all rows, in the order of the table.

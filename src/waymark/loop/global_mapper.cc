@@ -2,11 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/loop/global_mapper.h"
 
+#include <algorithm>
 #include <utility>
 
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
+#include "waymark/map/align.h"
 #include "waymark/map/parts.h"
 
 namespace waymark {
@@ -23,6 +25,12 @@ constexpr std::size_t kFirstCalibration = 30;
 /// In the end so few are looked at: they tell the readout of a rolling shutter.
 constexpr std::size_t kFewestInTheEnd = 5;
 
+/// Placing and adjusting by turns: markers that were seen since the last survey join in.
+constexpr int kMarkerPasses = 2;
+
+/// Keyframes of a sub-map with markers when they are surveyed first, then at a quarter more.
+constexpr std::size_t kFirstMarkerSurvey = 5;
+
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
 
@@ -32,13 +40,16 @@ GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            const MappingSettings& mapping,
                            const LoopSettings& loop,
                            const CalibrationSettings& calibration,
-                           std::uint64_t seed)
+                           std::uint64_t seed,
+                           std::optional<KnownMarkers> markers)
     : settings_(loop),
       seed_(seed),
       next_calibration_(kFirstCalibration),
       mapper_(rig, mapping, calibration),
       verifier_(rig, seed),
-      projection_(rig) {}
+      projection_(rig),
+      known_markers_(std::move(markers)),
+      next_survey_(kFirstMarkerSurvey) {}
 
 void GlobalMapper::take_over(const MapSnapshot& before) {
   mapper_.take_over(*before.map);
@@ -52,6 +63,7 @@ void GlobalMapper::add(const NewKeyframe& message) {
   const Mapper::Changes changes = mapper_.add(message);
   look_with_calibration(before);
   update_places(changes);
+  look_at_markers(changes.added.back());
   if (!settings_.enabled || close_alike(changes.added.back())) return;
   if (!unadjusted_.is_valid()) consolidate_some(kNumConsolidatedPerKeyframe);
 }
@@ -131,6 +143,7 @@ std::optional<AdjustmentTask> GlobalMapper::take_task() {
                     ? submaps_by_size(mapper_.map()).front()
                     : mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
   task.num_closures = num_closures_;
+  task.num_placements = num_placements_;
   if (mapper_.is_calibrating()) {
     task.calibration = mapper_.calibration();
     if (is_calibration_due) next_calibration_ *= 2;
@@ -140,6 +153,12 @@ std::optional<AdjustmentTask> GlobalMapper::take_task() {
 }
 
 void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment) {
+  if (task.num_placements != num_placements_) {
+    if (!task.is_for_calibration && !unadjusted_.is_valid()) {
+      unadjusted_ = mapper_.map().resolve(task.submap);
+    }
+    return;
+  }
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
   if (task.num_closures == num_closures_) {
     mapper_.apply(adjustment);
@@ -163,15 +182,70 @@ void GlobalMapper::refine_globally(bool with_calibration) {
   look_with_calibration(before);
 }
 
+/// Puts the map into the frame of its markers once they tell it, and what is seen of them later
+/// to where it belongs in that.
+void GlobalMapper::look_at_markers(KeyframeId newest) {
+  const Keyframe* keyframe = mapper_.map().keyframes().find(newest);
+  if (!known_markers_ || !keyframe || !keyframe->markers) return;
+  const SubmapId submap = keyframe->submap;
+  const std::size_t count = count_marker_keyframes(mapper_.map(), submap);
+  if (count < next_survey_) return;
+  next_survey_ = count + std::max<std::size_t>(count / 4, 1);
+  marker_survey_ = survey_markers(mapper_.map(), submap, *known_markers_);
+  if (!is_firm(marker_survey_)) return;
+  const MarkerFrame::Basis basis = marker_survey_.frame->basis;
+  const auto placed = placed_.find(submap);
+  const bool is_to_move = placed == placed_.end() || placed->second < basis;
+  mapper_.change([&](Map& map, DirtyLandmarks&) {
+    if (is_to_move) {
+      place_by_markers(map, submap, *known_markers_, marker_survey_);
+    } else {
+      note_markers(map, submap, *known_markers_, marker_survey_, Sim3());
+    }
+  });
+  if (!is_to_move) return;
+  placed_[submap] = basis;
+  // What is being adjusted is of another frame; what comes next has the markers with it.
+  ++num_placements_;
+  unadjusted_ = submap;
+}
+
+/// The end: places all sub-maps, the largest first, whose markers then are known to the others, and
+/// adjusts them with their markers. What has a scale by these is in metres.
+void GlobalMapper::place_rest_by_markers() {
+  if (!known_markers_) return;
+  KnownMarkers known = *known_markers_;
+  const std::vector<SubmapId> submaps = submaps_by_size(mapper_.map());
+  for (const SubmapId submap : submaps) {
+    MarkerSurvey survey = survey_markers(mapper_.map(), submap, known);
+    for (int pass = 0; survey.frame && pass < kMarkerPasses; ++pass) {
+      mapper_.change(
+          [&](Map& map, DirtyLandmarks&) { place_by_markers(map, submap, known, survey); });
+      mapper_.apply(adjust_globally(mapper_.map(), submap));
+      survey = survey_markers(mapper_.map(), submap, known);
+    }
+    if (survey.frame) {
+      mapper_.change([&](Map& map, DirtyLandmarks&) {
+        place_by_markers(map, submap, known, survey);
+        if (!map.submaps()[submap.value].is_metric) map = declare_metric(map, submap);
+      });
+      known = with_placed_markers(mapper_.map(), submap, known);
+    }
+    if (submap == submaps.front()) marker_survey_ = std::move(survey);
+  }
+}
+
 void GlobalMapper::finish() {
   const std::uint32_t end = mapper_.map().keyframes().end_id().value;
   if (!settings_.enabled || end == 0) {
     refine_globally(true);
+    place_rest_by_markers();
     return;
   }
   if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_alike(KeyframeId{end - 1});
   if (num_closures_ == 0) unconsolidated_ = all_keyframes();
   consolidate();
+  place_rest_by_markers();
 }
 
 void GlobalMapper::consolidate() {

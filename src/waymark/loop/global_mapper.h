@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -12,6 +13,7 @@
 #include "waymark/loop/verify.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
+#include "waymark/mapping/markers.h"
 #include "waymark/place/place_index.h"
 #include "waymark/track/map_snapshot.h"
 
@@ -21,7 +23,8 @@ namespace waymark {
 struct AdjustmentTask {
   std::shared_ptr<const Map> map;
   SubmapId submap;
-  std::uint32_t num_closures = 0;  ///< Loops closed and sub-maps joined before.
+  std::uint32_t num_closures = 0;    ///< Loops closed and sub-maps joined before.
+  std::uint32_t num_placements = 0;  ///< Sub-maps moved by their markers before.
   /// What is to be adjusted along, if anything.
   std::optional<KnownCalibration> calibration = std::nullopt;
   bool is_for_calibration = false;  ///< Without a new calibration nothing is to change.
@@ -39,7 +42,8 @@ class GlobalMapper {
                const MappingSettings& mapping,
                const LoopSettings& loop,
                const CalibrationSettings& calibration,
-               std::uint64_t seed);
+               std::uint64_t seed,
+               std::optional<KnownMarkers> markers = std::nullopt);
 
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const MapSnapshot& before);
@@ -52,8 +56,8 @@ class GlobalMapper {
   bool has_loop_task() const { return unadjusted_.is_valid(); }
   /// See Mapper.
   void set_motion(KeyframeId id, const RigMotion& motion) { mapper_.set_motion(id, motion); }
-  /// Takes in what a task gave, carried over where a loop was closed meanwhile: then a new task
-  /// follows.
+  /// Takes in what a task gave, carried over where a loop was closed meanwhile, or not at all where
+  /// the map was moved by its markers: then a new task follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
   /// The end: looks for loops a last time and consolidates.
   void finish();
@@ -68,6 +72,8 @@ class GlobalMapper {
   const KnownCalibration& calibration() const { return mapper_.calibration(); }
   MapSnapshot snapshot();
   int num_loops() const { return num_loops_; }
+  /// Of the sub-map with most keyframes, as surveyed last; empty where no markers are looked for.
+  const MarkerSurvey& marker_survey() const { return marker_survey_; }
   int num_joins() const { return static_cast<int>(num_closures_) - num_loops_; }
 
  private:
@@ -79,6 +85,8 @@ class GlobalMapper {
   std::vector<KeyframeId> all_keyframes() const;
   void look_with_calibration(const std::shared_ptr<const Rig>& before);
   void refine_globally(bool with_calibration);
+  void look_at_markers(KeyframeId newest);
+  void place_rest_by_markers();
 
   const LoopSettings settings_;
   const std::uint64_t seed_;
@@ -91,6 +99,11 @@ class GlobalMapper {
   std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
+  const std::optional<KnownMarkers> known_markers_;  ///< Nothing: none are looked for.
+  MarkerSurvey marker_survey_;
+  std::map<SubmapId, MarkerFrame::Basis> placed_;  ///< Sub-maps that are in a frame of markers.
+  std::uint32_t num_placements_ = 0;
+  std::size_t next_survey_;  ///< Keyframes of a sub-map with markers when it is due again.
 };
 
 /// Two maps in one.

@@ -37,6 +37,7 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
   frozen->submaps_ = submaps_;
   frozen->loop_edges_ = loop_edges_;
+  frozen->markers_ = markers_;
   frozen->newest_frame_ = newest_frame_;
   last_frozen_ = frozen;
   return frozen;
@@ -51,6 +52,7 @@ Map Map::thaw(const Map& frozen) {
   map.landmark_forwarding_ = decltype(landmark_forwarding_)::thaw(frozen.landmark_forwarding_);
   map.submaps_ = frozen.submaps_;
   map.loop_edges_ = frozen.loop_edges_;
+  map.markers_ = frozen.markers_;
   map.newest_frame_ = frozen.newest_frame_;
   map.freeze();  // Keeps references to what is edited first.
   return map;

@@ -7,7 +7,9 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "waymark/base/cow_table.h"
@@ -16,6 +18,7 @@
 #include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/sim3.h"
 #include "waymark/image/features.h"
+#include "waymark/marker/marker.h"
 
 namespace waymark {
 
@@ -33,6 +36,19 @@ struct Keyframe {
   std::shared_ptr<const Features> features;  ///< Never null.
   RigMotion motion;                          ///< At its time, as far as it is known.
   std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
+  /// Markers that it sees; null where there are none or none were looked for.
+  std::shared_ptr<const MarkerSightings> markers = nullptr;
+};
+
+/// A square marker that is known in the map, by where it lies to a keyframe: it moves with that.
+struct MapMarker {
+  int id = 0;                    ///< Its number within the family.
+  double side_m = 0.0;           ///< Of its black square, in metres.
+  KeyframeId reference;          ///< May be erased: see Map::world_from_marker().
+  double reference_scale = 1.0;  ///< applied_scale of the reference when this was stored.
+  Rigid3 marker_from_reference;  ///< From its rig, lengths as they were then.
+  /// Where it was surveyed to be in the frame of the map, if so: it holds the map in place.
+  std::optional<Rigid3> surveyed_world_from_marker = std::nullopt;
 };
 
 /// How many landmarks two keyframes share.
@@ -154,6 +170,7 @@ struct MapParts {
   std::vector<ErasedKeyframe> erased_keyframes;  ///< Ascending.
   std::vector<MergedLandmark> merged_landmarks;  ///< Ascending; that are gone.
   std::vector<LoopEdge> loop_edges;              ///< As Map::measured_loop_edges() gives them.
+  std::vector<MapMarker> markers;                ///< By number.
   KeyframeId end_keyframe;                       ///< One past the largest id ever given.
   LandmarkId end_landmark;                       ///< The same.
 };
@@ -212,6 +229,17 @@ class Map {
   std::vector<LoopEdge> loop_edges() const;
   /// The same, lengths in the units before any correction. For writers of files.
   const std::vector<LoopEdge>& measured_loop_edges() const { return loop_edges_; }
+  /// The markers that hold the map in metres, by number; one may be there once per sub-map.
+  const std::vector<MapMarker>& markers() const { return markers_; }
+  /// Where a marker is, in metres in the frame of its sub-map.
+  Rigid3 world_from_marker(const MapMarker& marker) const {
+    return rig_from_world(marker.reference, marker.marker_from_reference, marker.reference_scale)
+        .inverse();
+  }
+  /// The sub-map that a marker is in.
+  SubmapId submap_of(const MapMarker& marker) const {
+    return keyframes_.at(resolve(marker.reference)).submap;
+  }
   /// Whether a keyframe is an end of a loop edge.
   bool has_loop_edge(KeyframeId id) const;
   /// Pose of a rig that was stored relative to a keyframe: the rig from the world as of now.
@@ -252,6 +280,12 @@ class Map {
                         std::shared_ptr<const Features> features);
   /// Notes how the rig moved at a keyframe; its features stay as they are.
   void set_motion(KeyframeId id, const RigMotion& motion) { keyframes_.edit(id).motion = motion; }
+  /// Sets the markers that a keyframe sees; null: none.
+  void set_sightings(KeyframeId id, std::shared_ptr<const MarkerSightings> markers) {
+    keyframes_.edit(id).markers = std::move(markers);
+  }
+  /// Takes the place of all markers there were.
+  void set_markers(std::vector<MapMarker> markers) { markers_ = std::move(markers); }
   /// Notes that lengths around a keyframe were multiplied by a factor.
   void rescale_keyframe(KeyframeId id, double factor);
   /// Adds an edge between two living keyframes, measured in the units of now.
@@ -286,6 +320,7 @@ class Map {
   FrameId newest_frame_{0};  ///< Of all keyframes that ever were.
   std::vector<Submap> submaps_;
   std::vector<LoopEdge> loop_edges_;        ///< Lengths in the units before any correction.
+  std::vector<MapMarker> markers_;          ///< By number.
   std::shared_ptr<const Map> last_frozen_;  ///< Keeps references alive until the next freeze().
 };
 

@@ -72,6 +72,11 @@ void append_submaps(const Map& map, const Shift& shift, MapParts& parts) {
     edge.to = shift(edge.to);
     parts.loop_edges.push_back(edge);
   }
+  for (MapMarker marker : map.markers()) {
+    marker.reference = shift(marker.reference);
+    parts.markers.push_back(marker);
+  }
+  std::ranges::stable_sort(parts.markers, {}, &MapMarker::id);
 }
 
 void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
@@ -123,6 +128,7 @@ Map Map::restore(MapParts parts) {
   Map map;
   map.submaps_ = std::move(parts.submaps);
   map.loop_edges_ = std::move(parts.loop_edges);
+  map.markers_ = std::move(parts.markers);
   for (MapParts::StoredLandmark& stored : parts.landmarks) {
     map.landmarks_.put(stored.id, std::move(stored.landmark));
   }

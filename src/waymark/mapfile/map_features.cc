@@ -2,10 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <cmath>
+#include <memory>
 #include <utility>
 
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/pyramid.h"
+#include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_reader.h"
 
 namespace waymark {
@@ -132,6 +135,43 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
                     return std::pair(features->keypoints[i].x_px, features->keypoints[i].y_px);
                   });
   return features;
+}
+
+std::shared_ptr<const MarkerSightings> read_markers(MapRecord& record, const Rig& rig) {
+  if (!record.has("marker")) return nullptr;
+  const auto numbers = record.array<std::uint32_t>("marker", std::nullopt);
+  const std::size_t count = numbers.size();
+  if (count == 0 || count > kMaxMarkersPerKeyframe) {
+    record.fail(fmt::format("has {} markers, expected 1 to {}", count, kMaxMarkersPerKeyframe));
+  }
+  const auto cameras = record.array<std::uint8_t>("marker_camera", count);
+  const auto pixels = record.array<Eigen::Vector2f>("marker_pixel", 4 * count);
+  const auto bearings = record.array<Eigen::Vector3f>("marker_bearing", 4 * count);
+  const auto slopes = record.array<Matrix23f>("marker_pixel_from_bearing", 4 * count, kSlopeRange);
+  auto sightings = std::make_shared<MarkerSightings>(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    MarkerSighting& sighting = (*sightings)[i];
+    if (numbers[i] > kMaxMarkerNumber || cameras[i] >= rig.cameras.size()) {
+      record.fail(fmt::format("has marker {} of camera {}, expected one up to {} of {} cameras",
+                              numbers[i],
+                              cameras[i],
+                              kMaxMarkerNumber,
+                              rig.cameras.size()));
+    }
+    sighting.id = static_cast<int>(numbers[i]);
+    sighting.camera = cameras[i];
+    for (std::size_t corner = 0; corner < 4; ++corner) {
+      sighting.pixels[corner] = pixels[4 * i + corner];
+      sighting.bearings[corner] = bearings[4 * i + corner];
+      sighting.pixel_from_bearing[corner] = slopes[4 * i + corner];
+      const double length = sighting.bearings[corner].cast<double>().norm();
+      if (!(std::abs(length - 1.0) <= kMaxUnitError)) {
+        record.fail(fmt::format(
+            "marker_bearing of marker {} has the length {}, expected 1", sighting.id, length));
+      }
+    }
+  }
+  return sightings;
 }
 
 }  // namespace waymark

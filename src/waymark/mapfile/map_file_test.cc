@@ -116,6 +116,63 @@ TEST(MapFile, SavingWhatWasLoadedGivesTheSameBytes) {
   }
 }
 
+/// A map whose keyframes see markers that are known in it.
+StoredMap map_with_markers() {
+  StoredMap stored = stored_map(1);
+  MapParts parts = take_apart(*stored.map);
+  for (auto& [id, keyframe] : parts.keyframes) {
+    if (id.value % 3 != 0) continue;
+    auto sightings = std::make_shared<MarkerSightings>(2);
+    for (std::size_t i = 0; i < 2; ++i) {
+      MarkerSighting& sighting = (*sightings)[i];
+      sighting.id = static_cast<int>(i) + 7;
+      for (std::size_t corner = 0; corner < 4; ++corner) {
+        sighting.pixels[corner] = {10.0f * static_cast<float>(corner), 0.25f};
+        sighting.bearings[corner] = keyframe.features->bearings[corner];
+        sighting.pixel_from_bearing[corner] = keyframe.features->level_pixel_from_bearing[corner];
+      }
+    }
+    keyframe.markers = sightings;
+  }
+  const Rigid3 pose = Rigid3::exp((Vector6d() << 1, 2, 3, 0.1, 0.2, 0.3).finished());
+  parts.markers.push_back({7, 0.16, parts.keyframes[3].id, 1.5, pose});
+  parts.markers.push_back({8, 0.2, parts.erased_keyframes[0].id, 1.0, pose.inverse(), pose});
+  stored.map = Map::restore(std::move(parts)).freeze();
+  return stored;
+}
+
+TEST(MapFile, HoldsMarkers) {
+  const TemporaryFolder folder;
+  const StoredMap saved = map_with_markers();
+  save_map(folder / "a.wmap", saved);
+  const StoredMap loaded = load_map(folder / "a.wmap");
+  ASSERT_EQ(loaded.map->markers().size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    const MapMarker& a = saved.map->markers()[i];
+    const MapMarker& b = loaded.map->markers()[i];
+    EXPECT_EQ(std::tie(a.id, a.side_m, a.reference, a.reference_scale),
+              std::tie(b.id, b.side_m, b.reference, b.reference_scale));
+    EXPECT_EQ(a.marker_from_reference.matrix(), b.marker_from_reference.matrix());
+    EXPECT_EQ(a.surveyed_world_from_marker.has_value(), b.surveyed_world_from_marker.has_value());
+    EXPECT_EQ(saved.map->world_from_marker(a).matrix(), loaded.map->world_from_marker(b).matrix());
+  }
+  std::size_t num_seen = 0;
+  saved.map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    const auto& markers = loaded.map->keyframes().at(id).markers;
+    ASSERT_EQ(keyframe.markers != nullptr, markers != nullptr);
+    if (!markers) return;
+    ++num_seen;
+    ASSERT_EQ(markers->size(), 2u);
+    EXPECT_EQ((*markers)[1].id, 8);
+    EXPECT_EQ((*markers)[1].bearings, (*keyframe.markers)[1].bearings);
+    EXPECT_EQ((*markers)[1].pixel_from_bearing, (*keyframe.markers)[1].pixel_from_bearing);
+    EXPECT_EQ((*markers)[1].pixels, (*keyframe.markers)[1].pixels);
+  });
+  EXPECT_GT(num_seen, 3u);
+  save_map(folder / "b.wmap", loaded);
+  EXPECT_EQ(read_text_file(folder / "a.wmap", "a map"), read_text_file(folder / "b.wmap", "a map"));
+}
+
 /// Its ranges from stereo had no precision, and features of camera 1 showed landmarks.
 TEST(MapFile, ReadsEarlierMaps) {
   const TemporaryFolder folder;

@@ -45,6 +45,7 @@ const std::vector<MapReader::Kind>& MapReader::kinds() {
       {"erased_keyframe", false, &MapReader::read_erased_keyframe},
       {"merged_landmarks", true, &MapReader::read_merged_landmarks},
       {"loop_edge", true, &MapReader::read_loop_edge},
+      {"marker", true, &MapReader::read_marker},
       {"image", false, &MapReader::read_image}};
   return kKinds;
 }
@@ -136,6 +137,7 @@ void MapReader::read_keyframe(MapRecord& record) {
   const auto begin_of_camera1 =
       keyframe.landmarks.begin() + static_cast<std::ptrdiff_t>(keyframe.features->num_primary);
   std::fill(begin_of_camera1, keyframe.landmarks.end(), LandmarkId{});
+  keyframe.markers = read_markers(record, *keyframe.rig);
   parts_.keyframes.push_back(std::move(stored));
 }
 
@@ -211,6 +213,25 @@ void MapReader::read_loop_edge(MapRecord& record) {
   const Rigid3 rigid = record.transform("to_from_from");
   edge.to_from_from = {rigid.rotation, rigid.translation, record.number("scale", kScaleRange)};
   parts_.loop_edges.push_back(edge);
+}
+
+void MapReader::read_marker(MapRecord& record) {
+  MapMarker marker;
+  marker.id = static_cast<int>(record.whole("number", kMaxMarkerNumber));
+  marker.side_m = record.number("side_m", kMarkerSideRange);
+  marker.reference = record.id<KeyframeId>("reference", parts_.end_keyframe.value);
+  if (!marker.reference.is_valid()) record.fail("has no reference, expected a keyframe");
+  marker.reference_scale = record.number("reference_scale", kScaleRange);
+  marker.marker_from_reference = record.transform("marker_from_reference");
+  if (record.has("surveyed_world_from_marker")) {
+    marker.surveyed_world_from_marker = record.transform("surveyed_world_from_marker");
+  }
+  if (!parts_.markers.empty() && marker.id < parts_.markers.back().id) {
+    record.fail(fmt::format("has number {} after {}, expected numbers that do not descend",
+                            marker.id,
+                            parts_.markers.back().id));
+  }
+  parts_.markers.push_back(marker);
 }
 
 void MapReader::read_image(MapRecord& record) {

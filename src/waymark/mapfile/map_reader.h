@@ -16,6 +16,10 @@ namespace waymark {
 /// Reads the features of a keyframe that the rig made. Throws InputError for what cannot be.
 std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig);
 
+/// Reads the markers that a keyframe of a rig sees; null where it has none. Throws InputError for
+/// what cannot be.
+std::shared_ptr<const MarkerSightings> read_markers(MapRecord& record, const Rig& rig);
+
 /// Gathers a map from the records of version 1, which come in the order of kinds that
 /// docs/map-format.md gives. What one record says is checked here; how they fit together is left to
 /// Map::list_broken_invariants().
@@ -45,6 +49,7 @@ class MapReader {
   void read_erased_keyframe(MapRecord& record);
   void read_merged_landmarks(MapRecord& record);
   void read_loop_edge(MapRecord& record);
+  void read_marker(MapRecord& record);
   void read_image(MapRecord& record);
   template <class Stored>
   std::vector<LandmarkId> read_landmark_ids(MapRecord& record, const std::vector<Stored>& before);

@@ -116,6 +116,27 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   writer.add_array("inverse_range_sigma", features.inverse_range_sigma, kNotNegative);
 }
 
+void add_markers(MapRecordWriter& writer, const MarkerSightings& sightings) {
+  std::vector<std::uint32_t> numbers;
+  std::vector<std::uint8_t> cameras;
+  std::vector<Eigen::Vector2f> pixels;
+  std::vector<Eigen::Vector3f> bearings;
+  std::vector<Matrix23f> slopes;
+  for (const MarkerSighting& sighting : sightings) {
+    numbers.push_back(static_cast<std::uint32_t>(sighting.id));
+    cameras.push_back(sighting.camera);
+    pixels.insert(pixels.end(), sighting.pixels.begin(), sighting.pixels.end());
+    bearings.insert(bearings.end(), sighting.bearings.begin(), sighting.bearings.end());
+    const auto& of_corners = sighting.pixel_from_bearing;
+    slopes.insert(slopes.end(), of_corners.begin(), of_corners.end());
+  }
+  writer.add_array("marker", numbers);
+  writer.add_array("marker_camera", cameras);
+  writer.add_array("marker_pixel", pixels);
+  writer.add_array("marker_bearing", bearings);
+  writer.add_array("marker_pixel_from_bearing", slopes, kSlopeRange);
+}
+
 void write_keyframes(MapRecordWriter& writer, const Map& map, const RigTable& rigs) {
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     writer.begin("keyframe", id.value);
@@ -128,6 +149,7 @@ void write_keyframes(MapRecordWriter& writer, const Map& map, const RigTable& ri
     writer.add_number("applied_scale", keyframe.applied_scale, kScaleRange);
     add_features(writer, *keyframe.features);
     writer.add_array("landmark", keyframe.landmarks);
+    if (keyframe.markers) add_markers(writer, *keyframe.markers);
     writer.end();
   });
 }
@@ -231,6 +253,22 @@ void write_loop_edges(MapRecordWriter& writer, const Map& map) {
   }
 }
 
+void write_markers(MapRecordWriter& writer, const Map& map) {
+  std::uint64_t id = 0;
+  for (const MapMarker& marker : map.markers()) {
+    writer.begin("marker", id++);
+    writer.add("number", static_cast<std::uint64_t>(marker.id));
+    writer.add_number("side_m", marker.side_m, kMarkerSideRange);
+    writer.add_id("reference", marker.reference);
+    writer.add_number("reference_scale", marker.reference_scale, kScaleRange);
+    writer.add_transform("marker_from_reference", marker.marker_from_reference);
+    if (const auto& surveyed = marker.surveyed_world_from_marker) {
+      writer.add_transform("surveyed_world_from_marker", *surveyed);
+    }
+    writer.end();
+  }
+}
+
 void write_images(MapRecordWriter& writer, const StoredMap& stored) {
   for (const auto& [id, jpeg] : stored.images) {
     if (!stored.map->keyframes().contains(id)) continue;  // Erased meanwhile.
@@ -287,6 +325,7 @@ void save_map(const std::filesystem::path& path, const StoredMap& stored) {
   write_erased_keyframes(writer, map);
   write_merged_landmarks(writer, map);
   write_loop_edges(writer, map);
+  write_markers(writer, map);
   write_images(writer, stored);
   writer.write_counts();
   file.commit();

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <cmath>
+#include <memory>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/mapping/depth_offset.h"
+#include "waymark/mapping/marker_bundle.h"
 #include "waymark/mapping/readout.h"
 #include "waymark/optimize/residual.h"
 
@@ -96,15 +98,22 @@ void fix_gauge(BundleWindow& window) {
 
 struct WindowProblem {
   BundleProblem problem;
-  std::vector<Observation> observations;  ///< Parallel to problem.observations.
+  /// Parallel to the first of problem.observations; behind them are those of markers.
+  std::vector<Observation> observations;
+  std::vector<std::shared_ptr<const Rig>> marker_rigs;  ///< That the problem refers to.
 };
+
+std::vector<KeyframeId> keyframes_of(const BundleWindow& window) {
+  std::vector<KeyframeId> keyframes = window.moving;
+  keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
+  std::sort(keyframes.begin(), keyframes.end());
+  return keyframes;
+}
 
 WindowProblem make_problem(const Map& map, const BundleWindow& window) {
   WindowProblem result;
   BundleProblem& problem = result.problem;
-  std::vector<KeyframeId> keyframes = window.moving;
-  keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
-  std::sort(keyframes.begin(), keyframes.end());
+  const std::vector<KeyframeId> keyframes = keyframes_of(window);
   for (KeyframeId id : keyframes) {
     problem.rig_from_world.push_back(map.keyframes().at(id).rig_from_world);
     problem.rigs.push_back(map.keyframes().at(id).rig.get());
@@ -130,9 +139,7 @@ WindowProblem make_problem(const Map& map, const BundleWindow& window) {
 
 MapCorrection moves_of(const BundleWindow& window, const BundleProblem& problem) {
   MapCorrection correction;
-  std::vector<KeyframeId> keyframes = window.moving;
-  keyframes.insert(keyframes.end(), window.fixed.begin(), window.fixed.end());
-  std::sort(keyframes.begin(), keyframes.end());
+  const std::vector<KeyframeId> keyframes = keyframes_of(window);
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     if (problem.is_pose_fixed[i]) continue;
     correction.keyframes.push_back({keyframes[i], problem.rig_from_world[i]});
@@ -170,6 +177,10 @@ BundleWindow whole_submap(const Map& map, SubmapId submap) {
     if (landmark.submap == submap) window.landmarks.push_back(id);
   });
   if (!window.moving.empty()) fix_gauge(window);
+  if (is_held_by_survey(map, submap)) {
+    window.moving = keyframes_of(window);
+    window.fixed.clear();
+  }
   return window;
 }
 
@@ -177,7 +188,8 @@ BundleWindow whole_map(const Map& map) {
   BundleWindow window;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     const bool is_root = id == map.submaps().at(keyframe.submap.value).root;
-    (is_root ? window.fixed : window.moving).push_back(id);
+    const bool is_fixed = is_root && !is_held_by_survey(map, keyframe.submap);
+    (is_fixed ? window.fixed : window.moving).push_back(id);
   });
   map.landmarks().for_each([&](LandmarkId id, const Landmark&) { window.landmarks.push_back(id); });
   return window;
@@ -209,6 +221,10 @@ WindowAdjustment compute_adjustment(const Map& map,
       calibration =
           find_depth_offset(map, window_problem.observations, *known, window_problem.problem);
     }
+  }
+  if (!map.markers().empty() && !window_problem.problem.calibration) {
+    const std::vector<KeyframeId> keyframes = keyframes_of(window);
+    window_problem.marker_rigs = add_markers(map, keyframes, window_problem.problem);
   }
   const BundleResult result = adjust_bundle(window_problem.problem, options);
   WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};

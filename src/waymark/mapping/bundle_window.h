@@ -25,10 +25,10 @@ struct BundleWindow {
 /// The keyframes most covisible with one, what they see, and who else sees that.
 BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_keyframes);
 
-/// A whole sub-map; its root is fixed.
+/// A whole sub-map; its root is fixed, unless surveyed markers hold it.
 BundleWindow whole_submap(const Map& map, SubmapId submap);
 
-/// All sub-maps; their roots are fixed.
+/// All sub-maps; their roots are fixed, but where surveyed markers hold them.
 BundleWindow whole_map(const Map& map);
 
 /// What adjusting a window finds.

@@ -13,6 +13,7 @@
 #include "waymark/mapping/fuse.h"
 #include "waymark/mapping/triangulate.h"
 #include "waymark/mapping/triangulate_edges.h"
+#include "waymark/marker/detect.h"
 
 namespace waymark {
 namespace {
@@ -50,6 +51,7 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
     keyframe.rig = calibration_.rig;
     keyframe.features = measured(initial.features, message.rig);
     keyframe.motion = initial.features->motion;
+    keyframe.markers = measured(initial.markers, message.rig);
     if (!ids.empty()) keyframe.parent = ids.back();
     ids.push_back(map_.add_keyframe(std::move(keyframe)));
   }
@@ -117,6 +119,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
   keyframe.rig = calibration_.rig;
   keyframe.features = measured(message.features, message.rig);
   keyframe.motion = message.features->motion;
+  keyframe.markers = measured(message.markers, message.rig);
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
   for (std::uint32_t i = 0; i < message.features->num_primary; ++i) {
     const LandmarkId landmark = map_.resolve(message.landmarks[i]);
@@ -137,6 +140,13 @@ std::shared_ptr<const Features> Mapper::measured(const std::shared_ptr<const Fea
   return measure_anew(*features, *calibration_.rig, features->motion);
 }
 
+std::shared_ptr<const MarkerSightings> Mapper::measured(
+    const std::shared_ptr<const MarkerSightings>& markers,
+    const std::shared_ptr<const Rig>& rig) const {
+  if (!rig || rig == calibration_.rig) return markers;
+  return measure_anew(markers, *calibration_.rig);
+}
+
 void Mapper::look_with(const KnownCalibration& calibration) {
   std::vector<KeyframeId> seen_so;
   map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
@@ -146,6 +156,7 @@ void Mapper::look_with(const KnownCalibration& calibration) {
     const Keyframe& keyframe = map_.keyframes().at(id);
     map_.measure_keyframe(
         id, calibration.rig, measure_anew(*keyframe.features, *calibration.rig, keyframe.motion));
+    map_.set_sightings(id, measure_anew(map_.keyframes().at(id).markers, *calibration.rig));
     for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
       if (landmark.is_valid()) dirty_.insert(landmark);
     }

@@ -59,6 +59,9 @@ class Mapper {
   KeyframeId insert(const NewKeyframe& message);
   std::shared_ptr<const Features> measured(const std::shared_ptr<const Features>& features,
                                            const std::shared_ptr<const Rig>& rig) const;
+  std::shared_ptr<const MarkerSightings> measured(
+      const std::shared_ptr<const MarkerSightings>& markers,
+      const std::shared_ptr<const Rig>& rig) const;
   void look_for_readout(KeyframeId newest);
   void look_with(const KnownCalibration& calibration);
   void refresh_appearances();

@@ -65,6 +65,25 @@ RunSummary summarize(const System& system, const FedFrames& frames) {
   return summary;
 }
 
+std::optional<MarkerSummary> summarize(const MarkerReport& report) {
+  if (report.family.empty()) return std::nullopt;
+  MarkerSummary summary;
+  summary.family = report.family;
+  if (report.frame) {
+    summary.frame = to_string(report.frame->basis);
+    summary.scale_sigma = report.frame->scale_sigma;
+    summary.survey_rms_m = report.frame->rms_m;
+  }
+  for (const SurveyedMarker& marker : report.markers) {
+    summary.markers.push_back({marker.id,
+                               to_string(marker.verdict),
+                               marker.num_views,
+                               marker.rms_px,
+                               describe_fault(marker)});
+  }
+  return summary;
+}
+
 /// Finishes the system; what fails then ends the session as what fails before.
 void finish(System& system, const SessionHooks& hooks, FedFrames& frames) {
   try {
@@ -166,6 +185,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   results.summary.loop_frames = list_loops(system, frames);
   results.table = std::move(frames.table);
   results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
+  results.summary.markers = summarize(system.markers());
   results.ego_mask = system.ego_mask();
   results.summary.moves_along = ego_share(results.ego_mask);
   if (hooks.watch) results.summary.mistakes = hooks.watch->mistakes();

@@ -169,6 +169,9 @@ void write_dataset(SimulatedSequence& sequence,
     writer.add(frame, frame.world_from_rig * rig_from_camera0);
     if (done) done(i);
   }
+  if (sequence.spec().num_markers > 0) {
+    write_file_atomically(folder / "markers.yaml", format_known_markers(sequence.markers()));
+  }
   writer.finish();
 }
 

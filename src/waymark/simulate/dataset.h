@@ -16,6 +16,7 @@ namespace waymark {
 ///   stereo          EuRoC: mav0/cam0, mav0/cam1 with sensor.yaml (T_BS; the body is the rig); for
 ///                   cameras that sensor.yaml cannot describe as TUM-VI: dso/camchain.yaml instead
 ///   mono            EuRoC for perspective cameras, else images/ and times.txt
+/// With markers: markers.yaml, their sizes and true poses.
 /// With each: groundtruth.txt (TUM format, world_from_camera0) and camchain.yaml (Kalibr); where
 /// the spec tells a wrong calibration the right one is in calibration_true.yaml. Calls done(frame)
 /// after each frame, if given. Throws OutputError, and InputError for what cannot be told wrong.

@@ -8,6 +8,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/simulate/changes.h"
+#include "waymark/simulate/markers.h"
 #include "waymark/simulate/operator.h"
 #include "waymark/simulate/walkers.h"
 
@@ -37,10 +38,16 @@ std::uint64_t stream_of(int frame, std::uint64_t stream) {
   return static_cast<std::uint64_t>(frame) * kStreamsPerFrame + stream;
 }
 
-std::shared_ptr<const World> populated_world(const SequenceSpec& spec, const Motion& motion) {
+std::shared_ptr<const World> populated_world(const SequenceSpec& spec,
+                                             const Motion& motion,
+                                             KnownMarkers& markers) {
   std::shared_ptr<const World> world = make_world(spec.world, spec.seed);
-  if (spec.num_walkers == 0 && spec.num_changes == 0 && !spec.has_operator) return world;
+  if (spec.num_walkers == 0 && spec.num_changes == 0 && !spec.has_operator &&
+      spec.num_markers == 0) {
+    return world;
+  }
   auto populated = std::make_shared<World>(*world);
+  markers = add_markers(spec.num_markers, motion, spec.seed, *populated);
   add_changes(spec.num_changes, motion, spec.seed, *populated);
   add_walkers(spec.num_walkers, motion, spec.seed, *populated);
   if (spec.has_operator) add_operator(motion, spec.seed, *populated);
@@ -70,7 +77,7 @@ SimulatedSequence::SimulatedSequence(SequenceSpec spec,
     : spec_(std::move(spec)),
       rig_(make_rig(spec_.chain, registry)),
       motion_(make_motion(spec_.world, spec_.motion, spec_.num_frames / spec_.rate_hz)),
-      world_(populated_world(spec_, motion_)),
+      world_(populated_world(spec_, motion_, markers_)),
       pool_(std::make_unique<ThreadPool>(num_threads)) {
   WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
   WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0);

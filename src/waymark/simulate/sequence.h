@@ -11,6 +11,7 @@
 
 #include "waymark/base/thread_pool.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/marker/known_markers.h"
 #include "waymark/simulate/calibration_error.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
@@ -41,6 +42,7 @@ struct SequenceSpec {
   int num_walkers = 0;            ///< People who cross the view at any time, see add_walkers().
   bool has_operator = false;      ///< Somebody carries the camera above the head: add_operator().
   int num_changes = 0;            ///< Things that are gone or open later, see add_changes().
+  int num_markers = 0;            ///< Square markers on the walls, see add_markers().
   /// Rolling shutter: time from the first row to the last. A frame's time is that of its middle
   /// row; each row is as long exposed as a whole image otherwise.
   double readout_s = 0.0;
@@ -90,6 +92,8 @@ class SimulatedSequence {
   const Rig& rig() const { return rig_; }
   /// What they see.
   const World& world() const { return *world_; }
+  /// The markers in it, with their true poses.
+  const KnownMarkers& markers() const { return markers_; }
   /// That of the spec.
   int num_frames() const { return spec_.num_frames; }
   /// Time of a frame, without rendering it.
@@ -111,6 +115,7 @@ class SimulatedSequence {
   SequenceSpec spec_;
   Rig rig_;
   Motion motion_;
+  KnownMarkers markers_;
   std::shared_ptr<const World> world_;
   std::vector<Renderer> renderers_;
   std::vector<Stitch> stitches_;         ///< Per camera, or none.

@@ -14,6 +14,7 @@
 #include "waymark/camera/scaled_camera.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/frame_builder.h"
+#include "waymark/system/marker_finder.h"
 #include "waymark/system/query_calibration.h"
 #include "waymark/system/temporary_map.h"
 #include "waymark/track/keyframes_near.h"
@@ -85,9 +86,10 @@ SubmapId submap_of(const Map& map, const std::vector<LandmarkId>& landmarks) {
 class Localizer::Impl {
  public:
   Impl(Rig rig, const Settings& settings, std::shared_ptr<const Map> map)
-      : full_rig_(with_depth_offset(std::move(rig), settings.depth.inverse_offset)),
-        reduction_(reduction_for(full_rig_, *map)),
-        rig_(std::make_shared<const Rig>(reduced(full_rig_, reduction_))),
+      : full_rig_(std::make_shared<const Rig>(
+            with_depth_offset(std::move(rig), settings.depth.inverse_offset))),
+        reduction_(reduction_for(*full_rig_, *map)),
+        rig_(std::make_shared<const Rig>(reduced(*full_rig_, reduction_))),
         uses_range_(is_metric(*map)),
         settings_(settings),
         builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
@@ -95,7 +97,8 @@ class Localizer::Impl {
         temporary_(std::in_place, rig_, snapshot_),
         tracker_(rig_, uses_range_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
         relocalizer_(rig_, settings.tracking, static_cast<std::uint64_t>(settings.seed)),
-        calibration_(rig_, settings.calibration, snapshot_.map) {
+        calibration_(rig_, settings.calibration, snapshot_.map),
+        marker_finder_(settings.markers) {
     tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   }
 
@@ -115,7 +118,7 @@ class Localizer::Impl {
   /// From the next frame on.
   void look_with(std::shared_ptr<const Rig> rig);
 
-  const Rig full_rig_;
+  const std::shared_ptr<const Rig> full_rig_;
   const double reduction_;
   std::shared_ptr<const Rig> rig_;  ///< Of the reduced images, as calibrated by now.
   const bool uses_range_;
@@ -128,6 +131,7 @@ class Localizer::Impl {
   Tracker tracker_;
   Relocalizer relocalizer_;
   QueryCalibration calibration_;
+  const MarkerFinder marker_finder_;
   std::uint32_t num_frames_ = 0;
   std::uint32_t num_tracked_ = 0;                  ///< Of the stream.
   std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
@@ -140,8 +144,11 @@ Frame Localizer::Impl::build(const FrameImages& images,
   if (!uses_range_) used.image1 = {}, used.depth = {};
   auto features = find_features(used, motion);
   result.num_features = static_cast<std::uint32_t>(features->num_primary);
-  Frame frame{
-      FrameId{num_frames_}, images.timestamp_ns, std::move(features), builder_.small_image()};
+  Frame frame{FrameId{num_frames_},
+              images.timestamp_ns,
+              std::move(features),
+              builder_.small_image(),
+              marker_finder_.search_in(images, full_rig_)};
   ++num_frames_;
   result.frame = frame.id;
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
@@ -152,7 +159,7 @@ Frame Localizer::Impl::build(const FrameImages& images,
 std::shared_ptr<const Features> Localizer::Impl::find_features(const FrameImages& images,
                                                                const RigMotion& motion) {
   if (reduction_ == 1.0) return builder_.build(images, motion);
-  check_sizes(images, full_rig_);
+  check_sizes(images, *full_rig_);
   const Image image0 = reduce(images.image0, reduction_);
   Image image1, mask;
   DepthImage depth;
@@ -196,7 +203,7 @@ void Localizer::Impl::look_with(std::shared_ptr<const Rig> rig) {
 }
 
 Rig Localizer::Impl::rig() const {
-  Rig rig = full_rig_;
+  Rig rig = *full_rig_;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     const RigCamera& now = rig_->cameras[c];
     rig.cameras[c].cam_from_rig = now.cam_from_rig;
@@ -268,6 +275,7 @@ std::optional<LocatedFrame> Localizer::Impl::search(const Frame& frame,
       return located;
     }
   }
+  if (auto located = relocalizer_.locate_at_markers(frame, *snapshot_.map)) return located;
   return relocalizer_.locate(frame, *snapshot_.map, *snapshot_.places);
 }
 

@@ -7,6 +7,7 @@
 #include "waymark/image/settings.h"
 #include "waymark/loop/settings.h"
 #include "waymark/mapping/settings.h"
+#include "waymark/marker/settings.h"
 #include "waymark/track/settings.h"
 
 namespace waymark {
@@ -24,6 +25,7 @@ struct Settings {
   MappingSettings mapping;          ///< Landmarks and keyframes.
   CalibrationSettings calibration;  ///< Of the cameras, estimated along.
   LoopSettings loop;                ///< Places seen before.
+  MarkerSettings markers;           ///< Square markers, off at first.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -53,6 +55,7 @@ struct Settings {
     field("mapping", self.mapping, SettingInfo{.help = "Landmarks and keyframes."});
     field("calibration", self.calibration, SettingInfo{.help = "Of the cameras, estimated along."});
     field("loop", self.loop, SettingInfo{.help = "Places seen before."});
+    field("markers", self.markers, SettingInfo{.help = "Square markers of known size."});
   }
 };
 

@@ -8,6 +8,9 @@
 #include "waymark/base/check.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/loop/global_mapper.h"
+#include "waymark/marker/known_markers.h"
+#include "waymark/system/marker_finder.h"
+#include "waymark/system/starting_map.h"
 #include "waymark/system/workers.h"
 #include "waymark/track/tracker.h"
 #include "waymark/track/trajectory_memory.h"
@@ -25,37 +28,6 @@ bool has_focal_check(const Map& map, FrameId first) {
   const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});
   return newest.is_valid() &&
          map.keyframes().at(newest).frame.value >= first.value + kFramesToCheck;
-}
-
-/// The id after those of all frames of a map, which may be null.
-FrameId frame_after(const Map* map) {
-  constexpr std::uint32_t kMaxFrame = UINT32_MAX / 2;
-  FrameId after{0};
-  if (!map) return after;
-  map->keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    after = std::max(after, FrameId{keyframe.frame.value + 1});
-    if (keyframe.frame.value > kMaxFrame) {
-      throw InputError("map", "the numbers of its frames leave none for more");
-    }
-  });
-  return after;
-}
-
-/// Throws InputError for a map that cannot take ranges in metres.
-void check_has_scale(const Map& map) {
-  if (!is_metric(map)) {
-    throw InputError("map", "its scale is free, expected images of one camera without depth");
-  }
-}
-
-/// Throws InputError for a map with a camera of an unknown model: mapping looks through all of
-/// them.
-void check_cameras(const Map& map) {
-  map.keyframes().for_each([](KeyframeId, const Keyframe& keyframe) {
-    for (const RigCamera& camera : keyframe.rig->cameras) {
-      if (!camera.camera->can_project()) camera.camera->project({}, {}, {});
-    }
-  });
 }
 
 bool has_pose(FrameState state) {
@@ -78,7 +50,9 @@ class System::Impl {
                 settings.mapping,
                 settings.loop,
                 settings.calibration,
-                static_cast<std::uint64_t>(settings.seed)),
+                static_cast<std::uint64_t>(settings.seed),
+                markers_to_look_for(settings.markers)),
+        marker_finder_(settings.markers),
         adjuster_(timing),
         worker_(timing, [this](const MapTask& task) { return process(task); }) {
     if (!map) return;
@@ -103,6 +77,7 @@ class System::Impl {
   const FocalCheck* focal_check() const;
   const FrameDetails& details() const { return details_; }
   const Image& ego_mask() const { return builder_.ego_mask(); }
+  MarkerReport markers() const;
 
  private:
   void make_tracker(bool has_range);
@@ -138,6 +113,7 @@ class System::Impl {
 
   // The mapper's thread, and the caller's once that has ended.
   GlobalMapper mapper_;
+  const MarkerFinder marker_finder_;  // Any thread.
   AdjustmentWorker adjuster_;
   FrameId adjustment_due_;
   std::vector<double> mapping_ms_;
@@ -165,7 +141,11 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
   auto features = builder_.build(images, motion);
   result.num_features = static_cast<std::uint32_t>(features->num_primary);
-  const Frame frame{id, images.timestamp_ns, std::move(features), builder_.small_image()};
+  const Frame frame{id,
+                    images.timestamp_ns,
+                    std::move(features),
+                    builder_.small_image(),
+                    marker_finder_.search_in(images, rig_)};
   result.stages[Stage::kFeatures] = builder_.times().features_ms;
   result.stages[Stage::kDepth] = builder_.times().depth_ms;
   {
@@ -181,6 +161,10 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   result.is_keyframe = outcome.message.has_value();
   result.is_relocalized = outcome.is_relocalized;
   if (outcome.message) {
+    if (frame.find_markers) {
+      StageTimer timer(result.stages, Stage::kKeyframe);
+      add_markers(frame, *outcome.message);
+    }
     // The mapper works in send() in kInline, and what kRealtime has to wait for is a sub-map.
     const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);
     const bool waits = timing_ == Timing::kInline || (timing_ == Timing::kRealtime && is_submap);
@@ -360,6 +344,12 @@ std::vector<TrajectoryFrame> System::Impl::trajectory() const {
   return frames;
 }
 
+MarkerReport System::Impl::markers() const {
+  if (!is_finished_ || !marker_finder_.is_on()) return {};
+  const MarkerSurvey& survey = mapper_.marker_survey();
+  return {marker_finder_.family(), survey.markers, survey.frame};
+}
+
 std::vector<FrameState> System::Impl::frame_states() const {
   std::vector<FrameState> states;
   for (const auto& memory : memory_.entries()) states.push_back(memory.state);
@@ -389,6 +379,7 @@ void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
 const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
+MarkerReport System::markers() const { return impl_->markers(); }
 Image System::ego_mask() const { return impl_->ego_mask(); }
 std::shared_ptr<const Rig> System::rig() const { return impl_->rig(); }
 std::vector<CalibrationEstimate> System::calibration() const { return impl_->calibration(); }

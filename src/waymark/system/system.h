@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <memory>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "waymark/base/timing.h"
@@ -13,6 +14,7 @@
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/focal_check.h"
+#include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
 #include "waymark/track/frame_verdict.h"
 #include "waymark/track/stage_times.h"
@@ -45,6 +47,13 @@ struct SystemStatistics {
   int num_loops = 0;               ///< Closed in the session.
   int num_relocalizations = 0;     ///< Of the session.
   std::vector<double> mapping_ms;  ///< One entry per keyframe.
+};
+
+/// What became of the markers that were looked for.
+struct MarkerReport {
+  std::string family;                   ///< As it was asked for; empty: none were looked for.
+  std::vector<SurveyedMarker> markers;  ///< Of the sub-map with most keyframes, by number.
+  std::optional<MarkerFrame> frame;     ///< Of the map, where they define one.
 };
 
 /// Visual SLAM on a stream of frames. One thread feeds; mapping runs beside it unless the timing is
@@ -101,6 +110,9 @@ class System {
   /// What was found to move along with camera 0 by now: 0 there, else 255, in the size of its
   /// image; empty while nothing was.
   Image ego_mask() const;
+
+  /// What became of the markers that were looked for. Empty before finish().
+  MarkerReport markers() const;
 
   /// The newest finished map, immutable.
   std::shared_ptr<const Map> map() const;

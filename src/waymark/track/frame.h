@@ -3,10 +3,12 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <memory>
 
 #include "waymark/base/id.h"
 #include "waymark/image/features.h"
+#include "waymark/marker/marker.h"
 
 namespace waymark {
 
@@ -18,6 +20,8 @@ struct Frame {
   std::int64_t timestamp_ns = 0;
   std::shared_ptr<const Features> features;
   std::shared_ptr<const SmallImage> image = nullptr;  ///< Of camera 0; null where there is none.
+  /// Looks for markers in its image, which takes its time; empty where none are looked for.
+  std::function<MarkerSightings()> find_markers = nullptr;
 };
 
 }  // namespace waymark

@@ -11,6 +11,7 @@
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/image/features.h"
+#include "waymark/marker/marker.h"
 
 namespace waymark {
 
@@ -44,6 +45,7 @@ struct NewKeyframe {
   std::vector<LandmarkId> landmarks;         ///< Per feature, invalid where none.
   std::vector<Sighting> sightings;           ///< Ascending by landmark.
   std::shared_ptr<const Rig> rig;            ///< As calibrated when the features were measured.
+  std::shared_ptr<const MarkerSightings> markers = nullptr;  ///< That it sees; null: none.
 };
 
 /// A point of a new sub-map and the primary feature that sees it in each of its keyframes.
@@ -54,10 +56,11 @@ struct InitialLandmark {
 
 /// A keyframe of a new sub-map.
 struct InitialKeyframe {
-  FrameId frame;                             ///< Which one.
-  std::int64_t timestamp_ns = 0;             ///< Of its images.
-  Rigid3 rig_from_world;                     ///< In the frame of the new sub-map.
-  std::shared_ptr<const Features> features;  ///< Never null.
+  FrameId frame;                                             ///< Which one.
+  std::int64_t timestamp_ns = 0;                             ///< Of its images.
+  Rigid3 rig_from_world;                                     ///< In the frame of the new sub-map.
+  std::shared_ptr<const Features> features;                  ///< Never null.
+  std::shared_ptr<const MarkerSightings> markers = nullptr;  ///< That it sees; null: none.
 };
 
 /// The tracker starts a sub-map: one keyframe where there is stereo or depth, else two.

@@ -7,6 +7,7 @@
 #include <tuple>
 #include <utility>
 
+#include "waymark/marker/square_pose.h"
 #include "waymark/track/last_frame.h"
 
 namespace waymark {
@@ -24,6 +25,49 @@ constexpr std::array kEnds = {FrameReason::kNone,
                               FrameReason::kTooFewInliers,
                               FrameReason::kTooFewMatches};
 
+/// Keyframes near where a marker has the rig, compared by appearance if its pose is too coarse.
+constexpr std::size_t kMaxNearMarker = 4;
+
+/// The poses that the markers of a frame leave open.
+std::vector<MarkerPose> poses_by_markers(const MarkerSightings& sightings,
+                                         const Rig& rig,
+                                         const Map& map) {
+  std::vector<MarkerPose> poses;
+  for (const MarkerSighting& sighting : sightings) {
+    for (const MapMarker& marker : map.markers()) {
+      if (marker.id != sighting.id) continue;
+      const Rigid3 world_from_marker = map.world_from_marker(marker);
+      const Rigid3 rig_from_cam = rig.cameras[sighting.camera].cam_from_rig.inverse();
+      for (const Rigid3& cam_from_marker : square_poses(sighting, marker.side_m)) {
+        poses.push_back({map.submap_of(marker),
+                         rig_from_cam * cam_from_marker * world_from_marker.inverse(),
+                         world_from_marker.translation});
+      }
+    }
+  }
+  return poses;
+}
+
+/// Keyframes that look at a marker from nearest to a pose, the nearest first.
+std::vector<KeyframeId> keyframes_at(const Map& map, const MarkerPose& pose) {
+  const Eigen::Vector3d centre = pose.rig_from_world.origin_in_source();
+  const Eigen::Vector3d to_marker = (pose.rig_from_world * pose.marker_in_world).normalized();
+  const double range = (pose.marker_in_world - centre).norm();
+  std::vector<std::pair<double, KeyframeId>> found;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.submap != pose.submap) return;
+    const Eigen::Vector3d sees = (keyframe.rig_from_world * pose.marker_in_world).normalized();
+    const double away = (keyframe.rig_from_world.origin_in_source() - centre).norm() / range;
+    found.push_back({away + (sees - to_marker).norm(), id});
+  });
+  std::ranges::sort(found);
+  std::vector<KeyframeId> keyframes;
+  for (const auto& [distance, id] : found) {
+    if (keyframes.size() < kMaxNearMarker) keyframes.push_back(id);
+  }
+  return keyframes;
+}
+
 bool is_near(const LastPlace& last, const Map& map, const LocatedFrame& located) {
   const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
   const double moved = (centre - last.rig_from_world.origin_in_source()).norm();
@@ -36,7 +80,7 @@ bool is_near(const LastPlace& last, const Map& map, const LocatedFrame& located)
 Relocalizer::Relocalizer(std::shared_ptr<const Rig> rig,
                          const TrackingSettings& settings,
                          std::uint64_t seed)
-    : locator_(std::move(rig), seed), min_inliers_(settings.min_inliers) {}
+    : rig_(rig), locator_(std::move(rig), seed), min_inliers_(settings.min_inliers) {}
 
 std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const Map& map,
@@ -51,6 +95,27 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
     candidates.push_back(candidate.keyframe);
   }
   return locate_among(frame, map, candidates, last);
+}
+
+std::optional<LocatedFrame> Relocalizer::locate_at(const Frame& frame,
+                                                   const Map& map,
+                                                   const MarkerPose& pose) {
+  const std::vector<KeyframeId> near = keyframes_at(map, pose);
+  if (near.empty()) return std::nullopt;
+  auto place = locator_.locate_near(*frame.features, map, near.front(), pose.rig_from_world);
+  if (place && place->frame.num_inliers >= min_inliers_) return std::move(place->frame);
+  return locate_among(frame, map, near, LastPlace{near.front(), pose.rig_from_world});
+}
+
+std::optional<LocatedFrame> Relocalizer::locate_at_markers(const Frame& frame, const Map& map) {
+  if (!frame.find_markers || map.markers().empty()) return std::nullopt;
+  std::optional<LocatedFrame> best;
+  for (const MarkerPose& pose : poses_by_markers(frame.find_markers(), *rig_, map)) {
+    auto located = locate_at(frame, map, pose);
+    if (!located || (best && best->num_inliers >= located->num_inliers)) continue;
+    best = std::move(located);
+  }
+  return best;
 }
 
 std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,

@@ -24,6 +24,13 @@ struct LastPlace {
   Rigid3 rig_from_world;
 };
 
+/// Where a marker says that the rig is.
+struct MarkerPose {
+  SubmapId submap;
+  Rigid3 rig_from_world;
+  Eigen::Vector3d marker_in_world;
+};
+
 /// Finds frames of which nothing is known in the map: similar places from the index, the first of
 /// which that shows what the frame shows is the answer. The cost is bounded whatever the size of
 /// the map, and misses are preferred to wrong places. Keeps its buffers.
@@ -45,13 +52,19 @@ class Relocalizer {
                                            std::span<const KeyframeId> candidates,
                                            const std::optional<LastPlace>& last = {});
 
+  /// Where the markers that the frame shows are known in the map, the pose by one of them: of the
+  /// two that each leaves open the one that what else is seen agrees with.
+  std::optional<LocatedFrame> locate_at_markers(const Frame& frame, const Map& map);
+
   /// What became of the last search, of the place that came closest or was found; the reason is
   /// kNoCandidate or PlaceAttempt::failure.
   const FrameStatus& diagnosis() const { return diagnosis_; }
 
  private:
   void note(const PlaceAttempt& attempt);
+  std::optional<LocatedFrame> locate_at(const Frame& frame, const Map& map, const MarkerPose& pose);
 
+  std::shared_ptr<const Rig> rig_;
   PlaceLocator locator_;
   int min_inliers_;
   FrameStatus diagnosis_;

@@ -88,7 +88,11 @@ Frame Tracker::straightened(const Frame& frame, const LocatedFrame& located) con
   if (mode_ != Mode::kTracking || rig_->cameras[0].readout_s == 0.0) return frame;
   const RigMotion motion =
       last_.motion_in(*map_, frame.timestamp_ns, located.rig_from_world, located.landmarks);
-  return {frame.id, frame.timestamp_ns, moved(frame.features, *rig_, motion), frame.image};
+  return {frame.id,
+          frame.timestamp_ns,
+          moved(frame.features, *rig_, motion),
+          frame.image,
+          frame.find_markers};
 }
 
 TrackOutcome Tracker::track(const Frame& seen, const MapSnapshot& visible, StageTimes& times) {
@@ -243,7 +247,8 @@ std::optional<LocatedFrame> Tracker::relocalize(const Frame& frame, StageTimes& 
   if (last_.has_pose() && num_lost_ < kPatience) {
     last = {map_->resolve(last_.reference()), last_.rig_from_world()};
   }
-  std::optional<LocatedFrame> located = relocalizer_.locate(frame, *map_, *places_, last);
+  std::optional<LocatedFrame> located = relocalizer_.locate_at_markers(frame, *map_);
+  if (!located) located = relocalizer_.locate(frame, *map_, *places_, last);
   if (!located) return std::nullopt;
   local_map_source_.reset();
   last_.forget_motion();

@@ -1,0 +1,41 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <utility>
+
+#include "waymark/camera/camera.h"
+#include "waymark/camera/rig.h"
+#include "waymark/image/image.h"
+#include "waymark/marker/family.h"
+#include "waymark/marker/marker.h"
+
+namespace waymark {
+
+/// Finds the markers of a family in images of any central camera. Candidates and numbers are
+/// OpenCV's (Garrido-Jurado et al. 2014); corners are measured anew as meetings of the outline's
+/// sides, see refine_outline(). The same image gives the same result.
+class MarkerDetector {
+ public:
+  /// Of one family.
+  explicit MarkerDetector(MarkerFamily family) : family_(std::move(family)) {}
+
+  /// The markers of an image of that camera, by id. Those whose corners are not all in the field of
+  /// view or whose outline does not fit a square's are left out. camera_index: of the sightings.
+  MarkerSightings detect(ImageView image, const Camera& camera, std::uint8_t camera_index) const;
+
+  /// What is looked for.
+  const MarkerFamily& family() const { return family_; }
+
+ private:
+  MarkerFamily family_;
+};
+
+/// The same sightings as a rig that is calibrated otherwise measures their pixels, without those
+/// that it has no bearings of; null as it was.
+std::shared_ptr<const MarkerSightings> measure_anew(
+    const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig);
+
+}  // namespace waymark
