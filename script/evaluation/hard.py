@@ -53,8 +53,10 @@ SHORT_EXPOSURE = ("--frames", 300, "--exposure", 5)
 WALK = ("--motion", "loop", "--frames", 300, "--rate", 15)
 LONG_WALK = ("--motion", "loop", "--frames", 1200, "--rate", 12)
 SPHERE = ("--camera", "equirectangular")
+ROUNDS = ("--motion", "rounds", "--frames", 900, "--rate", 15)
 # A blank flat beside the same one with texture, and with a crowd in it; places that look alike; a 360
-# degree camera by itself, and above the head of somebody who carries it.
+# degree camera by itself, above the head of somebody who carries it, and of two lenses; a flat in
+# which things have gone when the camera comes back.
 SIMULATED = tuple(Simulated(motion, ALL_SETUPS, ("room", "--motion", motion, *SHORT_EXPOSURE))
                   for motion in ("turns_150", "turns_250", "shaken")) + tuple(
                       Simulated(world, ALL_SETUPS, (world, *WALK)) for world in ("blank", "apartment")) + (
@@ -62,7 +64,10 @@ SIMULATED = tuple(Simulated(motion, ALL_SETUPS, ("room", "--motion", motion, *SH
                           Simulated("corridor", ALL_SETUPS, ("corridor", *LONG_WALK)),
                           Simulated("shop", ALL_SETUPS, ("shop", *LONG_WALK)),
                           Simulated("sphere", ("mono",), ("apartment", *WALK, *SPHERE)),
-                          Simulated("operator", ("mono",), ("apartment", *WALK, *SPHERE, "--operator")))
+                          Simulated("operator", ("mono",), ("apartment", *WALK, *SPHERE, "--operator")),
+                          Simulated("stitched", ("mono",), ("apartment", *WALK, *SPHERE, "--stitched", 0.05)),
+                          Simulated("unchanged", ("mono", "rgbd"), ("apartment", *ROUNDS)),
+                          Simulated("changed", ("mono", "rgbd"), ("apartment", *ROUNDS, "--changes", 5)))
 
 
 class Frames:
