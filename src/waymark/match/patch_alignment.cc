@@ -17,6 +17,8 @@ namespace {
 
 constexpr std::size_t kNumPatchLevels = 3;
 constexpr int kMaxPatchSteps = 10;
+/// More tell hardly more, and take longer.
+constexpr std::size_t kMaxPatches = 300;
 /// A patch has 5 x 5 pixels.
 constexpr int kRadius = 2;
 constexpr std::size_t kPatchPixels = (2 * kRadius + 1) * (2 * kRadius + 1);
@@ -70,17 +72,32 @@ void PatchAligner::build_levels() {
   }
 }
 
+void PatchAligner::choose_candidates(std::span<const Eigen::Vector3d> points_in_a) {
+  pixels_.resize(points_in_a.size()), is_seen_.resize(points_in_a.size());
+  levels_[0].project(points_in_a, pixels_, is_seen_);
+  const auto num_seen = static_cast<std::size_t>(
+      std::ranges::count_if(is_seen_, [](std::uint8_t is_seen) { return is_seen != 0; }));
+  const std::size_t stride = 1 + num_seen / kMaxPatches;
+  candidates_.clear();
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < points_in_a.size(); ++i) {
+    if (is_seen_[i] && count++ % stride == 0) candidates_.push_back(static_cast<std::uint32_t>(i));
+  }
+}
+
 void PatchAligner::choose_points(std::size_t index, std::span<const Eigen::Vector3d> points_in_a) {
   const ScaledCamera& camera = levels_[index];
   const Image& image = a_[index];
   const bool wraps = camera.wrap_width_px() > 0.0;
   const int width = image.width_px;
   points_ = {};
-  pixels_.resize(points_in_a.size()), is_seen_.resize(points_in_a.size());
-  camera.project(points_in_a, pixels_, is_seen_);
+  std::vector<Eigen::Vector3d> points;
+  for (const std::uint32_t i : candidates_) points.push_back(points_in_a[i]);
+  pixels_.resize(points.size()), is_seen_.resize(points.size());
+  camera.project(points, pixels_, is_seen_);
   std::vector<Eigen::Vector2d> patch;
   std::vector<double> ranges;
-  for (std::size_t i = 0; i < points_in_a.size(); ++i) {
+  for (std::size_t i = 0; i < points.size(); ++i) {
     const auto x0 = static_cast<int>(std::lround(pixels_[i].x()));
     const auto y0 = static_cast<int>(std::lround(pixels_[i].y()));
     const int margin = kRadius + 1;
@@ -89,10 +106,10 @@ void PatchAligner::choose_points(std::size_t index, std::span<const Eigen::Vecto
     for (int y = y0 - kRadius; y <= y0 + kRadius; ++y) {
       for (int x = x0 - kRadius; x <= x0 + kRadius; ++x) {
         patch.emplace_back((x + width) % width, y);
-        ranges.push_back(points_in_a[i].norm());
+        ranges.push_back(points[i].norm());
       }
     }
-    points_.indices.push_back(static_cast<std::uint32_t>(i));
+    points_.indices.push_back(candidates_[i]);
   }
   const std::size_t count = patch.size();
   bearings_.resize(count), pixels_.resize(count), is_seen_.resize(count);
@@ -250,6 +267,7 @@ PatchAlignment PatchAligner::align(const Image& a,
     a_.push_back(reduce(a_.back().view(), 0.5));
     b_.push_back(reduce(b_.back().view(), 0.5));
   }
+  choose_candidates(points_in_a);
   for (std::size_t level = kNumPatchLevels; level-- > 0;) {
     choose_points(level, points_in_a);
     if (points_.points.empty()) return alignment;

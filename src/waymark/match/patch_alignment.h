@@ -54,6 +54,8 @@ class PatchAligner {
   };
 
   void build_levels();
+  /// Fills candidates_.
+  void choose_candidates(std::span<const Eigen::Vector3d> points_in_a);
   void choose_points(std::size_t level, std::span<const Eigen::Vector3d> points_in_a);
   void look(std::size_t level, const Rigid3& b_from_a);
   void centre();
@@ -66,6 +68,7 @@ class PatchAligner {
   double factor_;
   std::vector<ScaledCamera> levels_;  ///< Fine to coarse; made when first used.
   std::vector<Image> a_, b_;
+  std::vector<std::uint32_t> candidates_;  ///< Of the points that image a shows, ascending.
   Points points_;
   double range_ = 1.0;  ///< Of the points, in the median.
   Matrix6d information_;

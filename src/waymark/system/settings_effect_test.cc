@@ -388,7 +388,10 @@ TEST(SettingsEffect, IsShownOfEverySetting) {
                                               "tracking.max_keyframe_interval",
                                               "mapping.window_keyframes",
                                               "calibration.refine",
-                                              "loop.enabled"));
+                                              "loop.enabled",
+                                              "markers.family",  // Shown in tests/markers_test.py.
+                                              "markers.size",
+                                              "markers.file"));
 }
 
 }  // namespace

@@ -168,7 +168,10 @@ std::optional<LocatedFrame> Tracker::locate_by_patches(Frame& frame, StageTimes&
   LocatedFrame located = patch_locator_.pose_of(before, *found);
   located.landmarks = locator_.find(
       *frame.features, local_.landmarks, located.rig_from_world, {.radius_px = kLocatedRadiusPx});
-  patch_locator_.add_features(*found, local_.landmarks, frame, located);
+  Frame with_patches = frame;
+  patch_locator_.add_features(*found, local_.landmarks, with_patches, located);
+  if (located.num_inliers < settings_.min_inliers) return std::nullopt;
+  frame = std::move(with_patches);
   return located;
 }
 
