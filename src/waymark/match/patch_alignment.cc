@@ -18,7 +18,7 @@ namespace {
 constexpr std::size_t kNumPatchLevels = 3;
 constexpr int kMaxPatchSteps = 10;
 /// More tell hardly more, and take longer.
-constexpr std::size_t kMaxPatches = 300;
+constexpr std::size_t kMaxPatches = 800;
 /// A patch has 5 x 5 pixels.
 constexpr int kRadius = 2;
 constexpr std::size_t kPatchPixels = (2 * kRadius + 1) * (2 * kRadius + 1);
