@@ -52,6 +52,12 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
   command
       .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")
       ->check(number_between(0.01, 10000.0));
+  command
+      .add_option("--resize",
+                  reading.resize_px,
+                  "Makes images smaller, to this width in pixels, and the calibration with them "
+                  "[as they are]")
+      ->check(whole_from(16));
   add_choice<std::optional<Setup>>(
       command,
       "--setup",

@@ -13,6 +13,7 @@
 #include "waymark/input/decode.h"
 #include "waymark/input/listing_input.h"
 #include "waymark/input/pairing.h"
+#include "waymark/input/resized_input.h"
 
 namespace waymark {
 namespace {
@@ -84,15 +85,8 @@ Listing list_files(const std::filesystem::path& path,
                    fmt::format("is {}, expected {}", quote_for_message(format), kKnownFormats));
 }
 
-}  // namespace
-
-bool is_camera(const std::filesystem::path& path) {
-  const std::string text = path.string();
-  return text.starts_with("camera:") || text.starts_with("/dev/video");
-}
-
-std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
-  silence_image_library();
+std::unique_ptr<Input> open_in_full_size(const std::filesystem::path& path,
+                                         const InputOptions& options) {
   if (is_camera(path)) {
     check_companions("camera", options);
     return open_camera(path, options);
@@ -112,6 +106,19 @@ std::unique_ptr<Input> open_input(const std::filesystem::path& path, const Input
         path.string(),
         fmt::format("cannot be read: {}, expected the right to", error.code().message()));
   }
+}
+
+}  // namespace
+
+bool is_camera(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  return text.starts_with("camera:") || text.starts_with("/dev/video");
+}
+
+std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
+  silence_image_library();
+  std::unique_ptr<Input> input = open_in_full_size(path, options);
+  return options.resize_px ? resize_input(std::move(input), *options.resize_px) : std::move(input);
 }
 
 std::optional<std::filesystem::path> find_groundtruth(const std::filesystem::path& input) {

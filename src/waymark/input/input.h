@@ -60,6 +60,9 @@ struct InputOptions {
   /// Depth images of a folder of images, by name or order; empty: none.
   std::filesystem::path depth = {};
   std::optional<double> fps = {};  ///< Frames per second where nothing tells their times.
+  /// Width that images of camera 0 are made smaller to, and all else with them: see
+  /// resize_input().
+  std::optional<int> resize_px = {};
   /// One image, a folder with one per frame by name or order, or a video; empty: none.
   std::filesystem::path mask = {};
   bool has_jpeg = false;        ///< Frames come with a JPEG file, too.

@@ -5,18 +5,13 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <cstddef>
-#include <string_view>
+
+#include "waymark/camera/resized_camera.h"
 
 namespace waymark {
 namespace {
-
-/// Models whose intrinsics end with fu fv pu pv.
-constexpr std::array<std::string_view, 5> kWithPlane = {
-    "pinhole", "omni", "eucm", "ds", "division"};
-constexpr std::size_t kNumPlane = 4;
 
 /// Focal lengths relative to the width; a fisheye lens of 200 degrees has 0.3.
 constexpr double kMinFocal = 0.1;
@@ -34,12 +29,8 @@ constexpr double kMaxBaselineM = 5.0;
 constexpr double kMinIntervalNs = 5e5;
 constexpr double kMaxIntervalNs = 5e9;
 
-bool has_plane(const CameraDescription& camera) {
-  return std::ranges::find(kWithPlane, camera.camera_model) != kWithPlane.end();
-}
-
 double focal_length_px(const CameraDescription& camera) {
-  return camera.intrinsics[camera.intrinsics.size() - kNumPlane];
+  return camera.intrinsics[camera.intrinsics.size() - kNumPlaneIntrinsics];
 }
 
 std::optional<std::string> advise_on_focal_length(const CameraDescription& camera) {
@@ -80,7 +71,7 @@ std::vector<std::string> advise_on_numbers(const CameraChain& chain) {
   std::vector<std::string> advice;
   for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
     const CameraDescription& camera = chain.cameras[i].description;
-    if (!has_plane(camera)) continue;
+    if (!has_image_plane(camera)) continue;
     for (const auto& line : {advise_on_focal_length(camera), advise_on_size(camera)}) {
       if (line) advice.push_back(fmt::format("camera {}: {}", i, *line));
     }
@@ -136,7 +127,7 @@ std::optional<std::string> advise_on_residuals(const FocalCheck& check,
                                   "fisheye), and are its coefficients in order?");
   }
   if (!check.is_off()) return std::nullopt;
-  if (check.is_beyond || !has_plane(camera)) {
+  if (check.is_beyond || !has_image_plane(camera)) {
     return describe(check) + ": are focal length and model of the lens right?";
   }
   return fmt::format("{}: try {:.0f} px in place of {:g}, or calibrate anew",
