@@ -128,7 +128,7 @@ TEST(DamagedBag, OfSqliteGivesWhatCanBeRead) {
     std::string bytes = whole;
     for (int k = 0; k < 4; ++k) {
       const auto at = static_cast<std::size_t>(rng.uniform() * static_cast<double>(bytes.size()));
-      bytes[at] = static_cast<char>(rng.uniform() * 256.0);
+      bytes[at] = static_cast<char>(rng.below(256));
     }
     if (i % 4 == 0) bytes.resize(bytes.size() * 3 / 4);
     write_bytes(folder / "a.db3", bytes);
