@@ -43,6 +43,32 @@ BasicImage<T> pick(const BasicImageView<T>& image, double factor) {
   return result;
 }
 
+/// Means over squares of this side, 2 to 16: as of any factor, but several times faster.
+Image reduce_squares(ImageView image, double factor, int side) {
+  Image result(static_cast<int>(factor * image.width_px),
+               static_cast<int>(factor * image.height_px));
+  const auto used = static_cast<std::size_t>(result.width_px * side);
+  const auto area = static_cast<unsigned>(side * side);
+  std::vector<std::uint16_t> sums(used);
+  for (int y = 0; y < result.height_px; ++y) {
+    std::fill(sums.begin(), sums.end(), std::uint16_t{0});
+    for (int k = 0; k < side; ++k) {
+      const std::uint8_t* from = image.row(side * y + k);
+      for (std::size_t x = 0; x < used; ++x) {
+        sums[x] = static_cast<std::uint16_t>(sums[x] + from[x]);
+      }
+    }
+    const std::uint16_t* next = sums.data();
+    std::uint8_t* to = result.row(y);
+    for (int x = 0; x < result.width_px; ++x, next += side) {
+      unsigned sum = area / 2;
+      for (int k = 0; k < side; ++k) sum += next[k];
+      to[x] = static_cast<std::uint8_t>(sum / area);
+    }
+  }
+  return result;
+}
+
 }  // namespace
 
 Image to_grey(const ColorView& image) {
@@ -79,6 +105,10 @@ DepthImage depth_in_units(const BasicImageView<float>& depth_m, const DepthSetti
 }
 
 Image reduce(ImageView image, double factor) {
+  const double side = std::round(1.0 / factor);
+  if (side >= 2.0 && side <= 16.0 && std::abs(factor * side - 1.0) < 1e-12) {
+    return reduce_squares(image, factor, static_cast<int>(side));
+  }
   const std::vector<Cover> columns = covers(image.width_px, factor);
   const std::vector<Cover> rows = covers(image.height_px, factor);
   Image result(static_cast<int>(columns.size()), static_cast<int>(rows.size()));

@@ -19,7 +19,7 @@ Image random_area(int width_px, int height_px) {
 
 TEST(Reduce, IsTheMeanOfAreasAsInOpenCv) {
   const Image image = random_area(150, 90);
-  for (const double factor : {0.5, 0.4, 2.0 / 3.0}) {
+  for (const double factor : {0.5, 0.4, 2.0 / 3.0, 1.0 / 3.0, 0.1}) {
     const Image reduced = reduce(image.view(), factor);
     const cv::Mat source(90, 150, CV_8U, const_cast<std::uint8_t*>(image.values.data()));
     cv::Mat expected;
