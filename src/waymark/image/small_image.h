@@ -7,12 +7,11 @@
 namespace waymark {
 
 /// A frame's image at no more than 80 pixels to a side, from which whole images are compared (Klein
-/// and Murray 2008: small blurry images).
+/// and Murray 2008: small blurry images), and at no more than 320, from which patches are.
 struct SmallImage {
-  Image grey;  ///< Means over these squares; incomplete ones are left out.
-  Image mask;  ///< 0 where the frame is not looked at. Empty: it is everywhere.
-  /// Means over smaller squares, from which patches are aligned: at most 320 pixels to a side.
-  Image detail;
+  Image grey;    ///< Means over these squares; incomplete ones are left out.
+  Image mask;    ///< 0 where the frame is not looked at. Empty: it is everywhere.
+  Image detail;  ///< Means over smaller squares. Empty: there is none.
 };
 
 /// Its size as part of that of an image.

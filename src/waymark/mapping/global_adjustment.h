@@ -19,7 +19,7 @@ struct GlobalAdjustment {
 
 /// Bundle adjustment over all of a sub-map; its root stays. In mono the scale around each keyframe
 /// is how much further away the landmarks that it sees are than before, in the median. Any thread;
-/// nothing is shared.
+/// nothing is shared. Uses all cores.
 GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
 
 /// The same over all sub-maps, and the calibration along with them: each tells of it what it shows.

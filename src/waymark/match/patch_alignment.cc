@@ -11,6 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/sample.h"
+#include "waymark/match/correlation.h"
 
 namespace waymark {
 namespace {
@@ -26,10 +27,12 @@ constexpr std::size_t kPatchPixels = (2 * kRadius + 1) * (2 * kRadius + 1);
 constexpr double kSmallStep = 0.02;
 /// Grey values are off by so much at least, by noise and since patches are no planes.
 constexpr float kMinErrorGrey = 1.0f;
-/// What the pose may be off before, in radians and parts of the distance: all but free.
-constexpr double kPriorSigma = 0.2;
+/// A step is damped as if the pose were known to so many radians and parts of the distance.
+constexpr double kStepSigma = 0.2;
+/// Of the gain, around 1.
+constexpr double kGainSigma = 0.2;
 
-/// Of a point's own patch, and in grey values squared.
+/// Of a point's own patch, and its variance in grey values squared.
 constexpr double kMinCorrelation = 0.7;
 constexpr double kMinVariance = 0.5;
 /// Points are spread, one for each square of this side.
@@ -42,23 +45,10 @@ Eigen::Matrix<double, 3, 6> moved_by(const Eigen::Vector3d& point) {
   return by;
 }
 
-/// Sums that tell the correlation of pairs.
-struct Pairs {
-  double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0;
-
-  void add(double in_a, double in_b) {
-    n += 1.0, a += in_a, b += in_b;
-    aa += in_a * in_a, bb += in_b * in_b, ab += in_a * in_b;
-  }
-  /// Whether the patch is more than noise in both.
-  bool has_contrast() const { return aa > kMinVariance * n && bb > kMinVariance * n; }
-  double correlation() const {
-    const double variance_a = aa - a * a / n;
-    const double variance_b = bb - b * b / n;
-    if (!(variance_a > 0.0) || !(variance_b > 0.0)) return 0.0;  // Nothing to see.
-    return (ab - a * b / n) / std::sqrt(variance_a * variance_b);
-  }
-};
+/// Whether both vary by more than noise.
+bool has_contrast(const Correlation& pairs, double min_variance) {
+  return pairs.scatter_a() > min_variance * pairs.n && pairs.scatter_b() > min_variance * pairs.n;
+}
 
 }  // namespace
 
@@ -86,60 +76,82 @@ void PatchAligner::choose_candidates(std::span<const Eigen::Vector3d> points_in_
 }
 
 void PatchAligner::choose_points(std::size_t index, std::span<const Eigen::Vector3d> points_in_a) {
-  const ScaledCamera& camera = levels_[index];
   const Image& image = a_[index];
-  const bool wraps = camera.wrap_width_px() > 0.0;
-  const int width = image.width_px;
+  const bool wraps = levels_[index].wrap_width_px() > 0.0;
   points_ = {};
+  patches_ = {};
   std::vector<Eigen::Vector3d> points;
   for (const std::uint32_t i : candidates_) points.push_back(points_in_a[i]);
   pixels_.resize(points.size()), is_seen_.resize(points.size());
-  camera.project(points, pixels_, is_seen_);
-  std::vector<Eigen::Vector2d> patch;
-  std::vector<double> ranges;
+  levels_[index].project(points, pixels_, is_seen_);
   for (std::size_t i = 0; i < points.size(); ++i) {
     const auto x0 = static_cast<int>(std::lround(pixels_[i].x()));
     const auto y0 = static_cast<int>(std::lround(pixels_[i].y()));
     const int margin = kRadius + 1;
     if (!is_seen_[i] || y0 < margin || y0 + margin >= image.height_px) continue;
-    if (!wraps && (x0 < margin || x0 + margin >= width)) continue;
+    if (!wraps && (x0 < margin || x0 + margin >= image.width_px)) continue;
+    patches_.indices.push_back(candidates_[i]);
+    patches_.ranges.push_back(points[i].norm());
     for (int y = y0 - kRadius; y <= y0 + kRadius; ++y) {
       for (int x = x0 - kRadius; x <= x0 + kRadius; ++x) {
-        patch.emplace_back((x + width) % width, y);
-        ranges.push_back(points[i].norm());
+        patches_.pixels.emplace_back((x + image.width_px) % image.width_px, y);
       }
     }
-    points_.indices.push_back(candidates_[i]);
   }
-  const std::size_t count = patch.size();
+  linearize(index);
+  if (!patches_.ranges.empty()) range_ = median(patches_.ranges);
+  const std::size_t count = points_.points.size();
+  moved_.resize(count), pixels_.resize(count), is_seen_.resize(count), seen_greys_.resize(count);
+}
+
+/// Patches that reach beyond what the lens shows are left out.
+void PatchAligner::linearize(std::size_t index) {
+  const std::size_t count = patches_.pixels.size();
   bearings_.resize(count), pixels_.resize(count), is_seen_.resize(count);
   pixel_from_point_.resize(count);
-  camera.unproject(patch, bearings_, is_seen_);
-  for (std::size_t k = 0; k < count; ++k) points_.points.push_back(ranges[k] * bearings_[k]);
-  camera.project_with_jacobian(points_.points, pixels_, pixel_from_point_, is_seen_);
+  std::vector<std::uint8_t> has_bearing(count);
+  levels_[index].unproject(patches_.pixels, bearings_, has_bearing);
   for (std::size_t k = 0; k < count; ++k) {
-    const auto x = static_cast<int>(patch[k].x());
-    const auto y = static_cast<int>(patch[k].y());
+    // What has no bearing is not seen either.
+    bearings_[k] = has_bearing[k]
+                       ? Eigen::Vector3d(patches_.ranges[k / kPatchPixels] * bearings_[k])
+                       : Eigen::Vector3d(0.0, 0.0, 1.0);
+  }
+  levels_[index].project_with_jacobian(bearings_, pixels_, pixel_from_point_, is_seen_);
+  for (std::size_t i = 0; i < patches_.indices.size(); ++i) {
+    bool is_whole = true;
+    for (std::size_t k = i * kPatchPixels; k < (i + 1) * kPatchPixels; ++k) {
+      is_whole = is_whole && has_bearing[k] && is_seen_[k] && pixel_from_point_[k].allFinite();
+    }
+    if (is_whole) add_patch(index, i);
+  }
+}
+
+/// Without the means of its grey values and gradients.
+void PatchAligner::add_patch(std::size_t index, std::size_t patch) {
+  const Image& image = a_[index];
+  const int width = image.width_px;
+  points_.indices.push_back(patches_.indices[patch]);
+  Vector6d mean_gradient = Vector6d::Zero();
+  float mean_grey = 0.0f;
+  for (std::size_t k = patch * kPatchPixels; k < (patch + 1) * kPatchPixels; ++k) {
+    const auto x = static_cast<int>(patches_.pixels[k].x());
+    const auto y = static_cast<int>(patches_.pixels[k].y());
     const std::uint8_t* const row = image.row(y);
     const Eigen::RowVector2d slope(0.5 * (row[(x + 1) % width] - row[(x + width - 1) % width]),
                                    0.5 * (image.row(y + 1)[x] - image.row(y - 1)[x]));
-    const bool is_usable = is_seen_[k] && pixel_from_point_[k].allFinite();
-    points_.gradients.push_back(
-        is_usable
-            ? Vector6d((slope * pixel_from_point_[k] * moved_by(points_.points[k])).transpose())
-            : Vector6d::Zero());
+    const Eigen::Matrix<double, 2, 6> pixel_by = pixel_from_point_[k] * moved_by(bearings_[k]);
+    points_.points.push_back(bearings_[k]);
+    points_.pixel_by_motion.push_back(pixel_by);
+    points_.gradients.push_back((slope * pixel_by).transpose());
     points_.greys.push_back(row[x]);
+    mean_gradient += points_.gradients.back() / static_cast<double>(kPatchPixels);
+    mean_grey += points_.greys.back() / static_cast<float>(kPatchPixels);
   }
-  for (std::size_t first = 0; first < count; first += kPatchPixels) {
-    Eigen::Map<Eigen::ArrayXf> greys(&points_.greys[first], kPatchPixels);
-    greys -= greys.mean();
-    Vector6d mean = Vector6d::Zero();
-    for (std::size_t k = first; k < first + kPatchPixels; ++k) mean += points_.gradients[k];
-    mean /= static_cast<double>(kPatchPixels);
-    for (std::size_t k = first; k < first + kPatchPixels; ++k) points_.gradients[k] -= mean;
+  for (std::size_t k = points_.points.size() - kPatchPixels; k < points_.points.size(); ++k) {
+    points_.gradients[k] -= mean_gradient;
+    points_.greys[k] -= mean_grey;
   }
-  if (!ranges.empty()) range_ = median(ranges);
-  moved_.resize(count), seen_greys_.resize(count);
 }
 
 void PatchAligner::look(std::size_t index, const Rigid3& b_from_a) {
@@ -163,6 +175,14 @@ void PatchAligner::centre() {
   }
 }
 
+double PatchAligner::mean_shift_px(const Vector6d& motion) const {
+  double sum = 0.0;
+  for (std::size_t k = 0; k < points_.points.size(); k += kPatchPixels) {
+    sum += (points_.pixel_by_motion[k] * motion).norm();
+  }
+  return sum / static_cast<double>(points_.indices.size());
+}
+
 double PatchAligner::step(PatchAlignment& alignment) {
   errors_.clear();
   const auto gain = static_cast<float>(alignment.gain);
@@ -177,8 +197,8 @@ double PatchAligner::step(PatchAlignment& alignment) {
   Vector7d unit = Vector7d::Ones();
   unit.head<3>().setConstant(range_);  // So that lengths are of the size of angles.
   Eigen::Matrix<double, 7, 7> hessian = Eigen::Matrix<double, 7, 7>::Zero();
-  hessian.diagonal().head<6>().setConstant(std::pow(sigma / kPriorSigma, 2));
-  hessian(6, 6) = std::pow(sigma / kPriorSigma, 2);
+  hessian.diagonal().head<6>().setConstant(std::pow(sigma / kStepSigma, 2));
+  hessian(6, 6) = std::pow(sigma / kGainSigma, 2);
   Vector7d gradient = Vector7d::Zero();
   gradient[6] = hessian(6, 6) * (1.0 - alignment.gain);
   for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
@@ -200,23 +220,23 @@ double PatchAligner::step(PatchAlignment& alignment) {
   Eigen::Matrix<double, 7, 7> full = hessian.selfadjointView<Eigen::Lower>();
   full.array() *= (unit.cwiseInverse() * unit.cwiseInverse().transpose()).array();
   information_ = full.topLeftCorner<6, 6>() / (sigma * sigma);
-  const double pixels_per_rad = std::max(1.0, pixel_from_point_.front().norm() * range_);
-  return (motion.head<3>().norm() / range_ + motion.tail<3>().norm()) * pixels_per_rad;
+  return mean_shift_px(motion);
 }
 
 void PatchAligner::judge(PatchAlignment& alignment) {
-  Pairs pairs;
+  Correlation pairs;
   for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
     if (is_seen_[k]) pairs.add(points_.greys[k], seen_greys_[k]);
   }
   alignment.num_points = static_cast<int>(pairs.n) / static_cast<int>(kPatchPixels);
   if (alignment.num_points == 0) return;
-  alignment.correlation = pairs.correlation();
+  if (!has_contrast(pairs, 0.0)) return;
+  alignment.correlation = pairs.coefficient();
   choose_alike(alignment);
   const Matrix6d in_a = information_.ldlt().solve(Matrix6d::Identity());
   double sum = 0.0;
   for (std::size_t k = 0; k < points_.points.size(); k += kPatchPixels) {
-    const Eigen::Matrix<double, 2, 6> by = pixel_from_point_[k] * moved_by(points_.points[k]);
+    const Eigen::Matrix<double, 2, 6>& by = points_.pixel_by_motion[k];
     sum += (by * in_a * by.transpose()).trace();
   }
   const auto count = static_cast<double>(points_.points.size() / kPatchPixels);
@@ -237,7 +257,7 @@ void PatchAligner::choose_alike(PatchAlignment& alignment) const {
   for (std::size_t i = 0; i < points_.indices.size(); ++i) {
     const std::size_t first = i * kPatchPixels;
     if (!is_seen_[first]) continue;
-    Pairs pairs;
+    Correlation pairs;
     for (std::size_t k = first; k < first + kPatchPixels; ++k) {
       pairs.add(points_.greys[k], seen_greys_[k]);
     }
@@ -245,7 +265,7 @@ void PatchAligner::choose_alike(PatchAlignment& alignment) const {
     const int column = std::clamp(static_cast<int>(pixel.x()) / kCellPx, 0, columns - 1);
     const int row = std::clamp(static_cast<int>(pixel.y()) / kCellPx, 0, rows - 1);
     Best& cell = best[static_cast<std::size_t>(row * columns + column)];
-    const double correlation = pairs.has_contrast() ? pairs.correlation() : 0.0;
+    const double correlation = has_contrast(pairs, kMinVariance) ? pairs.coefficient() : 0.0;
     if (correlation > cell.correlation) cell = {correlation, points_.indices[i]};
   }
   for (const Best& cell : best) {
@@ -260,6 +280,7 @@ PatchAlignment PatchAligner::align(const Image& a,
                                    const Rigid3& initial_b_from_a) {
   PatchAlignment alignment;
   alignment.b_from_a = initial_b_from_a;
+  information_.setZero();
   if (levels_.empty()) build_levels();
   a_.assign(1, a);
   b_.assign(1, b);

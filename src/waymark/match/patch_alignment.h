@@ -45,21 +45,35 @@ class PatchAligner {
                        const Rigid3& initial_b_from_a);
 
  private:
-  /// The pixels of the patches of a level.
+  /// Squares of a level of image a, each of as many pixels, row by row.
+  struct Patches {
+    std::vector<std::uint32_t> indices;   ///< Of the point of each.
+    std::vector<double> ranges;           ///< Of the point of each, as its unit is.
+    std::vector<Eigen::Vector2d> pixels;  ///< Of all.
+  };
+  /// What is aligned: the pixels of those patches that the lens shows whole.
   struct Points {
     std::vector<std::uint32_t> indices;   ///< Of the point of each patch.
     std::vector<Eigen::Vector3d> points;  ///< In the camera of image a.
-    std::vector<Vector6d> gradients;      ///< Of the grey value, by a motion of the point.
-    std::vector<float> greys;
+    /// Derivatives by xi, where the point is at exp(xi) * point: of the pixel, in px of the level.
+    std::vector<Eigen::Matrix<double, 2, 6>> pixel_by_motion;
+    std::vector<Vector6d> gradients;  ///< And of the grey value, less the patch's mean.
+    std::vector<float> greys;         ///< Less the patch's mean.
   };
 
   void build_levels();
   /// Fills candidates_.
   void choose_candidates(std::span<const Eigen::Vector3d> points_in_a);
+  /// Fills patches_ and points_.
   void choose_points(std::size_t level, std::span<const Eigen::Vector3d> points_in_a);
+  void linearize(std::size_t level);
+  void add_patch(std::size_t level, std::size_t patch);
+  /// What image b shows of the points: fills is_seen_ and seen_greys_.
   void look(std::size_t level, const Rigid3& b_from_a);
   void centre();
-  /// One Gauss-Newton step; how far the points move by it, in pixels of the level.
+  /// How far patches move by a motion, in the mean, in pixels of the level.
+  double mean_shift_px(const Vector6d& motion) const;
+  /// One Gauss-Newton step; how far patches move by it.
   double step(PatchAlignment& alignment);
   void judge(PatchAlignment& alignment);
   void choose_alike(PatchAlignment& alignment) const;
@@ -69,9 +83,10 @@ class PatchAligner {
   std::vector<ScaledCamera> levels_;  ///< Fine to coarse; made when first used.
   std::vector<Image> a_, b_;
   std::vector<std::uint32_t> candidates_;  ///< Of the points that image a shows, ascending.
+  Patches patches_;
   Points points_;
-  double range_ = 1.0;  ///< Of the points, in the median.
-  Matrix6d information_;
+  double range_ = 1.0;                       ///< Of the points, in the median.
+  Matrix6d information_ = Matrix6d::Zero();  ///< Of the last step, by xi.
   std::vector<Eigen::Vector3d> moved_, bearings_;
   std::vector<Eigen::Vector2d> pixels_;
   std::vector<Matrix23d> pixel_from_point_;

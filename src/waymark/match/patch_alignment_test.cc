@@ -103,9 +103,10 @@ TEST_P(PatchAlignmentTest, IsNotCertainWhereThereIsNothingToSee) {
   EXPECT_FALSE(aligner_.align(look(here_), {}, look(here_), {}).is_certain());
 }
 
-INSTANTIATE_TEST_SUITE_P(Cameras,
-                         PatchAlignmentTest,
-                         ::testing::Values("perspective", "fisheye", "equirectangular"));
+INSTANTIATE_TEST_SUITE_P(
+    Cameras,
+    PatchAlignmentTest,
+    ::testing::Values("perspective", "fisheye", "fisheye_200", "equirectangular"));
 
 }  // namespace
 }  // namespace waymark

@@ -13,6 +13,7 @@
 #include "waymark/geometry/rigid3.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/sample.h"
+#include "waymark/match/correlation.h"
 
 namespace waymark {
 namespace {
@@ -174,29 +175,23 @@ void TurnAligner::look(const Trial& trial) {
 }
 
 TurnAligner::Candidate TurnAligner::compare(const Eigen::Quaterniond& b_from_a) const {
-  double n = 0.0, a = 0.0, b = 0.0, aa = 0.0, bb = 0.0, ab = 0.0, all = 0.0;
+  Correlation pairs;
+  double all = 0.0;
   for (std::size_t i = 0; i < seen_greys_.size(); ++i) {
     const double weight = points_.weights[i];
     all += weight;
-    if (!is_seen_[i]) continue;
-    const double in_a = points_.greys[i];
-    const double in_b = seen_greys_[i];
-    n += weight;
-    a += weight * in_a;
-    b += weight * in_b;
-    aa += weight * in_a * in_a;
-    bb += weight * in_b * in_b;
-    ab += weight * in_a * in_b;
+    if (is_seen_[i]) pairs.add(points_.greys[i], seen_greys_[i], weight);
   }
   Candidate candidate{{b_from_a}};
+  const double n = pairs.n;
   if (n < kMinOverlap * all || n < kMinPixels) return candidate;
-  const double variance_a = aa - a * a / n;
-  const double variance_b = bb - b * b / n;
-  if (variance_a <= n || variance_b <= n) return candidate;  // Nothing to see.
+  const double scatter_a = pairs.scatter_a();
+  const double scatter_b = pairs.scatter_b();
+  if (scatter_a <= n || scatter_b <= n) return candidate;  // Nothing to see.
   TurnAlignment& alignment = candidate.alignment;
-  alignment.gain = std::sqrt(variance_b / variance_a);
-  alignment.offset = (b - alignment.gain * a) / n;
-  alignment.correlation = (ab - a * b / n) / std::sqrt(variance_a * variance_b);
+  alignment.gain = std::sqrt(scatter_b / scatter_a);
+  alignment.offset = (pairs.b - alignment.gain * pairs.a) / n;
+  alignment.correlation = pairs.coefficient();
   candidate.certainty = std::atanh(std::min(alignment.correlation, 0.9999)) * std::sqrt(n - 3.0);
   return candidate;
 }
