@@ -228,8 +228,6 @@ void PatchAligner::judge(PatchAlignment& alignment) {
   for (std::size_t k = 0; k < seen_greys_.size(); ++k) {
     if (is_seen_[k]) pairs.add(points_.greys[k], seen_greys_[k]);
   }
-  alignment.num_points = static_cast<int>(pairs.n) / static_cast<int>(kPatchPixels);
-  if (alignment.num_points == 0) return;
   if (!has_contrast(pairs, 0.0)) return;
   alignment.correlation = pairs.coefficient();
   choose_alike(alignment);

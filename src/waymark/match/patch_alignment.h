@@ -20,8 +20,8 @@ struct PatchAlignment {
   Matrix6d covariance = Matrix6d::Zero();  ///< Of a perturbation of b_from_a on the left.
   double gain = 1.0;                       ///< Grey value in b by that in a.
   double correlation = 0.0;                ///< Of the grey values that both images show; at most 1.
-  double pixel_sigma = 1e9;                ///< What the points move by with the pose's error.
-  int num_points = 0;                      ///< With a patch that both images show.
+  /// Standard deviation of where the points are seen, by that of the pose; in px of the images.
+  double pixel_sigma = 1e9;
   /// Indices of points whose own patch is alike in both, spread over the image, ascending.
   std::vector<std::uint32_t> alike;
 
@@ -29,10 +29,11 @@ struct PatchAlignment {
   bool is_certain() const { return alike.size() >= 15 && correlation >= 0.7 && pixel_sigma <= 0.3; }
 };
 
-/// Aligns the patches around points of known place with another image, directly: pose and an affine
-/// change of brightness by the inverse compositional method (Baker and Matthews 2004; Forster et
-/// al. 2014) with a robust weight per pixel, coarse to fine. Neither corners nor edges are needed,
-/// nor a sharp image; a patch is taken to be as far away as its point.
+/// Aligns the patches around points of known place with another image, directly: pose and a
+/// common gain by the inverse compositional method (Baker and Matthews 2004; Forster et al. 2014)
+/// with a robust weight per pixel, coarse to fine. Each patch counts without its mean. Neither
+/// corners nor edges are needed, nor a sharp image; a patch is taken to be as far away as its
+/// point.
 class PatchAligner {
  public:
   /// camera: what all images are of, in full size; they are handed in reduced by the factor.
