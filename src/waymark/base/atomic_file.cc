@@ -9,54 +9,19 @@
 
 #include <cerrno>
 #include <charconv>
-#include <ctime>
 #include <exception>
 #include <optional>
-#include <system_error>
 #include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
+#include "waymark/base/write_fully.h"
 
 namespace waymark {
 namespace {
 
 constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
 constexpr int kMaxNames = 1000;
-
-/// Writing beyond the file size limit (ulimit -f) sends SIGXFSZ, which by default kills the
-/// program. For the duration of this scope the calling thread holds it back and swallows it, so
-/// that write() reports EFBIG instead; other threads and the handlers of the process are untouched.
-class FileSizeSignalGuard {
- public:
-  FileSizeSignalGuard() {
-    sigemptyset(&signal_);
-    sigaddset(&signal_, SIGXFSZ);
-    sigset_t pending;
-    sigpending(&pending);
-    was_pending_ = sigismember(&pending, SIGXFSZ) == 1;
-    pthread_sigmask(SIG_BLOCK, &signal_, &before_);
-  }
-  ~FileSizeSignalGuard() {
-    const int saved_errno = errno;
-    if (!was_pending_) {
-      const timespec no_wait{};
-      while (sigtimedwait(&signal_, nullptr, &no_wait) > 0) {
-      }
-    }
-    pthread_sigmask(SIG_SETMASK, &before_, nullptr);
-    errno = saved_errno;
-  }
-  FileSizeSignalGuard(const FileSizeSignalGuard&) = delete;
-  FileSizeSignalGuard& operator=(const FileSizeSignalGuard&) = delete;
-
- private:
-  sigset_t signal_;
-  sigset_t before_;
-  bool was_pending_ = false;
-};
-
-std::string error_text(int error_number) { return std::generic_category().message(error_number); }
 
 /// After a rename the name itself is on the disk only when the folder is flushed too. File systems
 /// that cannot do that are no reason to fail: the content is safe by then.
@@ -139,13 +104,7 @@ void AtomicFile::commit() {
 }
 
 void AtomicFile::flush() {
-  const FileSizeSignalGuard guard;
-  for (std::size_t done = 0; done < buffer_.size();) {
-    const ssize_t written = ::write(descriptor_, buffer_.data() + done, buffer_.size() - done);
-    if (written < 0 && errno == EINTR) continue;
-    if (written <= 0) fail("be written", written < 0 ? errno : ENOSPC);
-    done += static_cast<std::size_t>(written);
-  }
+  if (const int error = write_fully(descriptor_, buffer_)) fail("be written", error);
   buffer_.clear();
 }
 
