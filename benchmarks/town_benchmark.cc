@@ -27,6 +27,7 @@
 #include "waymark/loop/global_mapper.h"
 #include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/mapfile/map_journal.h"
 #include "waymark/simulate/testing/town_map.h"
 #include "waymark/simulate/testing/town_session.h"
 
@@ -289,6 +290,42 @@ void save_town(benchmark::State& state) {
                               1024.0 / static_cast<double>(state.range(0));
 }
 
+/// The last keyframes of a map once more, as if the camera had stood there again.
+void repeat_last_keyframes(Map& map, std::uint32_t count) {
+  const std::uint32_t end = map.keyframes().end_id().value;
+  for (std::uint32_t i = end - std::min(end, count); i < end; ++i) {
+    const Keyframe* last = map.keyframes().find(KeyframeId{i});
+    if (!last) continue;
+    Keyframe keyframe = *last;
+    keyframe.frame = FrameId{keyframe.frame.value + (1u << 24)};
+    keyframe.parent = KeyframeId{i};
+    const std::vector<LandmarkId> landmarks = std::exchange(keyframe.landmarks, {});
+    const KeyframeId id = map.add_keyframe(std::move(keyframe));
+    for (std::uint32_t f = 0; f < landmarks.size(); ++f) {
+      if (landmarks[f].is_valid()) map.observe(id, f, landmarks[f]);
+    }
+  }
+}
+
+/// What autosaving costs after 100 new keyframes.
+void save_new_keyframes(benchmark::State& state) {
+  const TownScene& scene = closed_scene(state);
+  constexpr std::uint64_t kNoFileIsSmall = 0;
+  MapJournal journal(temporary_file(), kNoFileIsSmall);
+  journal.save({.map = scene.town.map, .settings = {}, .images = {}});
+  Map map = Map::thaw(*scene.town.map);
+  repeat_last_keyframes(map, 100);
+  const StoredMap grown{.map = map.freeze(), .settings = {}, .images = {}};
+  {
+    const PeakCounter peak(state);
+    for (auto _ : state) journal.save(grown);
+  }
+  std::filesystem::path changes = temporary_file();
+  changes += ".journal";
+  state.counters["saved_kb"] = static_cast<double>(std::filesystem::file_size(changes)) / 1024.0;
+  std::filesystem::remove(changes);
+}
+
 /// After save_town().
 void load_town(benchmark::State& state) {
   {
@@ -339,6 +376,7 @@ void register_all(std::int64_t num_keyframes) {
   add("all/restore", restore_map, 1);
   add("all/check", check_map, 1);
   add("all/save", save_town, 1);
+  add("one/save_new", save_new_keyframes, 1);
   add("all/load", load_town, 1);
   add("all/fuse_overlaps", fuse_all_overlaps, 1);
   add("all/spread_drift", spread_drift_of_loop, 1);

@@ -49,6 +49,12 @@ StoredMap read_map(std::istream& stream,
                    const std::string& name,
                    const CameraRegistry& registry = CameraRegistry::with_builtin_models());
 
+/// The same of a map file and its journal.
+StoredMap read_map(std::istream& stream,
+                   std::istream& journal,
+                   const std::string& name,
+                   const CameraRegistry& registry = CameraRegistry::with_builtin_models());
+
 /// What load_map() would complain of: the first damage, or else every invariant of the map that is
 /// violated, up to 1000, a line each. Empty if there is nothing.
 std::vector<std::string> find_map_faults(

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <iterator>
+#include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
@@ -18,13 +19,34 @@ namespace {
 constexpr std::size_t kMaxCameraNumbers = 16;
 constexpr std::uint64_t kMaxImageSizePx = 1u << 16;
 
+/// The row of an id, or the end.
+template <class Rows, class IdType>
+auto find_row(Rows& rows, IdType id) {
+  const auto at = std::lower_bound(
+      rows.begin(), rows.end(), id, [](const auto& row, IdType wanted) { return row.id < wanted; });
+  return at != rows.end() && at->id == id ? at : rows.end();
+}
+
+void read_landmarks_of(MapRecord& record, Keyframe& keyframe) {
+  keyframe.landmarks = record.array<LandmarkId>("landmark", keyframe.features->size());
+  // Earlier maps have those of camera 1, too.
+  const auto begin_of_camera1 =
+      keyframe.landmarks.begin() + static_cast<std::ptrdiff_t>(keyframe.features->num_primary);
+  std::fill(begin_of_camera1, keyframe.landmarks.end(), LandmarkId{});
+}
+
 template <class Stored, class IdType>
 bool is_among(const std::vector<Stored>& stored, IdType id) {
-  const auto at =
-      std::lower_bound(stored.begin(), stored.end(), id, [](const Stored& row, IdType wanted) {
-        return row.id < wanted;
-      });
-  return at != stored.end() && at->id == id;
+  return find_row(stored, id) != stored.end();
+}
+
+/// Takes rows out whose ids are among some in any order.
+template <class Stored, class IdType>
+void drop(std::vector<Stored>& rows, std::vector<IdType> ids) {
+  if (ids.empty()) return;
+  std::sort(ids.begin(), ids.end());
+  std::erase_if(
+      rows, [&](const Stored& row) { return std::binary_search(ids.begin(), ids.end(), row.id); });
 }
 
 }  // namespace
@@ -33,6 +55,7 @@ struct MapReader::Kind {
   std::string_view name;
   bool is_counted;  // Ids count up from 0; else they are ids of the map, which ascend.
   void (MapReader::*read)(MapRecord&);
+  bool is_of_changes = false;  // In journals only.
 };
 
 const std::vector<MapReader::Kind>& MapReader::kinds() {
@@ -41,7 +64,9 @@ const std::vector<MapReader::Kind>& MapReader::kinds() {
       {"camera", true, &MapReader::read_camera},
       {"submap", true, &MapReader::read_submap},
       {"keyframe", false, &MapReader::read_keyframe},
+      {"keyframe_state", false, &MapReader::read_keyframe_state, true},
       {"landmarks", true, &MapReader::read_landmarks},
+      {"erased_landmarks", true, &MapReader::read_erased_landmarks, true},
       {"erased_keyframe", false, &MapReader::read_erased_keyframe},
       {"merged_landmarks", true, &MapReader::read_merged_landmarks},
       {"loop_edge", true, &MapReader::read_loop_edge},
@@ -53,7 +78,7 @@ const std::vector<MapReader::Kind>& MapReader::kinds() {
 void MapReader::add(MapRecord& record, const std::string& kind) {
   const auto at = std::find_if(
       kinds().begin(), kinds().end(), [&](const Kind& known) { return known.name == kind; });
-  if (at == kinds().end()) {
+  if (at == kinds().end() || (at->is_of_changes && !has_changes_)) {
     record.fail(fmt::format("has the kind {}, expected one of version 1", quote_for_message(kind)));
   }
   const auto place = static_cast<std::size_t>(at - kinds().begin());
@@ -69,8 +94,10 @@ void MapReader::check_order(const MapRecord& record, std::size_t kind, std::uint
         fmt::format("comes after one of the kind {}, expected it before", kinds()[kind_].name));
   }
   const std::uint64_t num_before = counts_[std::string(kinds()[kind].name)]++;
-  if (kinds()[kind].is_counted && id != num_before) {
-    record.fail(fmt::format("has the id {}, expected {}", id, num_before));
+  const bool is_camera = kinds()[kind].read == &MapReader::read_camera;
+  const std::uint64_t expected = is_camera ? num_cameras_ : num_before;
+  if (kinds()[kind].is_counted && id != expected) {
+    record.fail(fmt::format("has the id {}, expected {}", id, expected));
   }
   if (num_before > 0 && id <= id_) {
     record.fail(fmt::format("comes after that of id {}, expected ids that ascend", id_));
@@ -79,17 +106,71 @@ void MapReader::check_order(const MapRecord& record, std::size_t kind, std::uint
   id_ = id;
 }
 
+/// Of the end of the file or of the change before.
+void MapReader::end(MapRecord& record) {
+  const auto stated = record.counts("counts");
+  if (!std::equal(stated.begin(),
+                  stated.end(),
+                  counts_.begin(),
+                  counts_.end(),
+                  [](const auto& a, const auto& b) {
+                    return a.first == b.first && a.second == b.second;
+                  })) {
+    record.fail("has other counts than there are records, expected all that were written");
+  }
+  record.expect_no_more();
+  if (counts_.empty()) record.fail("comes first, expected a record of the kind map");
+  has_changes_ = true;
+  kind_ = 0;
+  id_ = 0;
+  counts_.clear();
+  last_landmark_ = last_erased_ = last_merged_ = {};
+  num_rigs_before_ = rigs_.size();
+}
+
+/// What a change has as a whole takes the place of what there was.
+void MapReader::begin_change() {
+  parts_.submaps.clear();
+  parts_.merged_landmarks.clear();
+  parts_.loop_edges.clear();
+  parts_.markers.clear();
+}
+
 void MapReader::read_map(MapRecord& record) {
   if (counts_["map"] > 1) record.fail("is the second of its kind, expected one");
+  if (has_changes_) begin_change();
+  const KeyframeId end_keyframe = std::exchange(parts_.end_keyframe, KeyframeId{0});
+  const LandmarkId end_landmark = std::exchange(parts_.end_landmark, LandmarkId{0});
   parts_.end_keyframe.value = static_cast<std::uint32_t>(record.whole("end_keyframe", kMaxIds));
   parts_.end_landmark.value = static_cast<std::uint32_t>(record.whole("end_landmark", kMaxIds));
+  if (has_changes_ && (parts_.end_keyframe < end_keyframe || parts_.end_landmark < end_landmark)) {
+    record.fail("has ends before those of earlier, expected ids to ascend");
+  }
   stored_.settings = record.text("settings", kMaxTextBytes);
+}
+
+/// Adds a row whose id is above all there are, or replaces the one of its id.
+template <class Stored>
+void MapReader::put(const MapRecord& record, std::vector<Stored>& rows, Stored row) const {
+  if (rows.empty() || rows.back().id < row.id) {
+    rows.push_back(std::move(row));
+    return;
+  }
+  const auto at = find_row(rows, row.id);
+  if (at == rows.end()) {
+    record.fail(fmt::format("has the id {}, expected one that was there or one above {}",
+                            row.id.value,
+                            rows.back().id.value));
+  }
+  *at = std::move(row);
 }
 
 void MapReader::read_camera(MapRecord& record) {
   const std::uint64_t rig = record.whole("rig", rigs_.size());
-  if (rig + 1 < rigs_.size()) {
-    record.fail(fmt::format("belongs to rig {}, expected those of rig {}", rig, rigs_.size() - 1));
+  const std::size_t first_rig =
+      std::max(num_rigs_before_, std::max<std::size_t>(rigs_.size(), 1) - 1);
+  if (rig < first_rig) {
+    record.fail(fmt::format("belongs to rig {}, expected those of rig {}", rig, first_rig));
   }
   if (rig == rigs_.size()) rigs_.push_back(std::make_shared<Rig>());
   if (rigs_.back()->cameras.size() == kMaxCamerasPerRig) {
@@ -104,6 +185,7 @@ void MapReader::read_camera(MapRecord& record) {
   description.width_px = static_cast<int>(record.whole("width_px", kMaxImageSizePx));
   description.height_px = static_cast<int>(record.whole("height_px", kMaxImageSizePx));
   const Rigid3 cam_from_rig = record.transform("cam_from_rig");
+  ++num_cameras_;
   rigs_.back()->cameras.push_back(
       {registry_.make_stored_camera(description), cam_from_rig, description});
 }
@@ -126,44 +208,53 @@ void MapReader::read_keyframe(MapRecord& record) {
   Keyframe& keyframe = stored.keyframe;
   keyframe.frame = FrameId{static_cast<std::uint32_t>(record.whole("frame", UINT32_MAX))};
   keyframe.timestamp_ns = record.signed_whole("timestamp_ns");
+  read_state(record, keyframe);
+  keyframe.features = read_features(record, *keyframe.rig);
+  read_landmarks_of(record, keyframe);
+  keyframe.markers = read_markers(record, *keyframe.rig);
+  put(record, parts_.keyframes, std::move(stored));
+}
+
+void MapReader::read_keyframe_state(MapRecord& record) {
+  const auto at = find_row(parts_.keyframes, KeyframeId{static_cast<std::uint32_t>(id_)});
+  if (at == parts_.keyframes.end()) record.fail("expected the id of a keyframe");
+  const std::size_t num_cameras = at->keyframe.rig->cameras.size();
+  read_state(record, at->keyframe);
+  if (at->keyframe.rig->cameras.size() < num_cameras) {
+    record.fail("has a rig of fewer cameras, expected those that its features are of");
+  }
+  read_landmarks_of(record, at->keyframe);
+}
+
+/// What the mapper may change.
+void MapReader::read_state(MapRecord& record, Keyframe& keyframe) {
   keyframe.rig = rigs_[record.whole("rig", rigs_.size() - 1)];
   keyframe.submap = record.id<SubmapId>("submap", parts_.submaps.size());
   keyframe.parent = record.id<KeyframeId>("parent", parts_.end_keyframe.value);
   keyframe.rig_from_world = record.transform("rig_from_world");
   keyframe.applied_scale = record.number("applied_scale", kScaleRange);
-  keyframe.features = read_features(record, *keyframe.rig);
-  keyframe.landmarks = record.array<LandmarkId>("landmark", keyframe.features->size());
-  // Earlier maps have those of camera 1, too.
-  const auto begin_of_camera1 =
-      keyframe.landmarks.begin() + static_cast<std::ptrdiff_t>(keyframe.features->num_primary);
-  std::fill(begin_of_camera1, keyframe.landmarks.end(), LandmarkId{});
-  keyframe.markers = read_markers(record, *keyframe.rig);
-  parts_.keyframes.push_back(std::move(stored));
 }
 
 /// Ids of landmarks, ascending within the record and after those of the records before.
-template <class Stored>
-std::vector<LandmarkId> MapReader::read_landmark_ids(MapRecord& record,
-                                                     const std::vector<Stored>& before) {
+std::vector<LandmarkId> MapReader::read_landmark_ids(MapRecord& record, LandmarkId& last) {
   const auto ids = record.array<LandmarkId>("landmark", std::nullopt);
   if (ids.empty() || ids.size() > kLandmarksPerRecord) {
     record.fail(fmt::format("has {} landmarks, expected 1 to {}", ids.size(), kLandmarksPerRecord));
   }
-  for (std::size_t i = 0; i < ids.size(); ++i) {
-    const bool is_first = i == 0 && before.empty();
-    const LandmarkId last = i > 0 ? ids[i - 1] : (is_first ? LandmarkId{} : before.back().id);
-    if (ids[i] >= parts_.end_landmark || (!is_first && ids[i] <= last)) {
+  for (const LandmarkId id : ids) {
+    if (id >= parts_.end_landmark || (last.is_valid() && id <= last)) {
       record.fail(fmt::format("has landmark {} after {}, expected ids that ascend below {}",
-                              ids[i].value,
-                              is_first ? "none" : fmt::format("{}", last.value),
+                              id.value,
+                              last.is_valid() ? fmt::format("{}", last.value) : "none",
                               parts_.end_landmark.value));
     }
+    last = id;
   }
   return ids;
 }
 
 void MapReader::read_landmarks(MapRecord& record) {
-  const std::vector<LandmarkId> ids = read_landmark_ids(record, parts_.landmarks);
+  const std::vector<LandmarkId> ids = read_landmark_ids(record, last_landmark_);
   const std::size_t count = ids.size();
   const auto submaps = record.array<SubmapId>("submap", count);
   const auto positions = record.array<Eigen::Vector3d>("position_in_world", count, kLengthRange);
@@ -185,8 +276,13 @@ void MapReader::read_landmarks(MapRecord& record) {
     stored.landmark.num_visible = num_visible[i];
     stored.landmark.num_found = num_found[i];
     stored.landmark.appearance = {descriptors[i], directions[i], sizes_m[i], across[i]};
-    parts_.landmarks.push_back(std::move(stored));
+    put(record, parts_.landmarks, std::move(stored));
   }
+}
+
+void MapReader::read_erased_landmarks(MapRecord& record) {
+  const std::vector<LandmarkId> ids = read_landmark_ids(record, last_erased_);
+  erased_landmarks_.insert(erased_landmarks_.end(), ids.begin(), ids.end());
 }
 
 void MapReader::read_erased_keyframe(MapRecord& record) {
@@ -195,11 +291,13 @@ void MapReader::read_erased_keyframe(MapRecord& record) {
   forwarding.rig_from_heir = record.transform("rig_from_heir");
   forwarding.heir_scale = record.number("heir_scale", kScaleRange);
   forwarding.scale = record.number("scale", kScaleRange);
-  parts_.erased_keyframes.push_back({KeyframeId{static_cast<std::uint32_t>(id_)}, forwarding});
+  const KeyframeId id{static_cast<std::uint32_t>(id_)};
+  parts_.erased_keyframes.push_back({id, forwarding});
+  if (has_changes_) erased_keyframes_.push_back(id);
 }
 
 void MapReader::read_merged_landmarks(MapRecord& record) {
-  const std::vector<LandmarkId> ids = read_landmark_ids(record, parts_.merged_landmarks);
+  const std::vector<LandmarkId> ids = read_landmark_ids(record, last_merged_);
   const auto survivors = record.array<LandmarkId>("survivor", ids.size());
   for (std::size_t i = 0; i < ids.size(); ++i) {
     parts_.merged_landmarks.push_back({ids[i], survivors[i]});
@@ -245,13 +343,18 @@ void MapReader::read_image(MapRecord& record) {
                             size->height_px,
                             kMaxMegapixels));
   }
-  stored_.images.emplace(keyframe, std::move(jpeg));
+  stored_.images.insert_or_assign(keyframe, std::move(jpeg));
 }
 
 /// What Map::restore() asks for.
 void MapReader::check_ids() const {
+  KeyframeId last;
   for (const MapParts::ErasedKeyframe& erased : parts_.erased_keyframes) {
-    if (erased.id < parts_.end_keyframe && !is_among(parts_.keyframes, erased.id)) continue;
+    const bool is_new = !last.is_valid() || erased.id > last;
+    last = erased.id;
+    if (is_new && erased.id < parts_.end_keyframe && !is_among(parts_.keyframes, erased.id)) {
+      continue;
+    }
     throw InputError(
         fmt::format("{}: erased_keyframe {}", name_, erased.id.value),
         fmt::format("expected an id below {} that no keyframe has", parts_.end_keyframe.value));
@@ -271,19 +374,17 @@ void MapReader::check_ids() const {
   }
 }
 
-StoredMap MapReader::finish(MapRecord& record) {
-  const auto stated = record.counts("counts");
-  if (!std::equal(stated.begin(),
-                  stated.end(),
-                  counts_.begin(),
-                  counts_.end(),
-                  [](const auto& a, const auto& b) {
-                    return a.first == b.first && a.second == b.second;
-                  })) {
-    record.fail("has other counts than there are records, expected all that were written");
-  }
-  record.expect_no_more();
-  if (counts_.empty()) record.fail("comes first, expected a record of the kind map");
+/// What changes say to be gone: rows of it may have come in between.
+void MapReader::drop_erased() {
+  for (const KeyframeId id : erased_keyframes_) stored_.images.erase(id);
+  drop(parts_.keyframes, std::move(erased_keyframes_));
+  drop(parts_.landmarks, std::move(erased_landmarks_));
+  const auto by_id = [](const auto& a, const auto& b) { return a.id < b.id; };
+  std::stable_sort(parts_.erased_keyframes.begin(), parts_.erased_keyframes.end(), by_id);
+}
+
+StoredMap MapReader::finish() {
+  drop_erased();
   check_ids();
   stored_.map = Map::restore(std::move(parts_)).freeze();
   return std::move(stored_);

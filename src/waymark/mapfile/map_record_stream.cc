@@ -125,7 +125,7 @@ std::string_view MapRecordStream::read_next() {
   return record;
 }
 
-void MapRecordStream::check_checksum(std::string_view record) const {
+void MapRecordStream::check_checksum(std::string_view record) {
   if (num_records_ == 0 && find_value(record, "format").kind == Kind::kNone) {
     throw InputError(name_, "is no map file, expected one written by waymark");
   }
@@ -142,6 +142,7 @@ void MapRecordStream::check_checksum(std::string_view record) const {
         place(),
         fmt::format("is damaged: its checksum is {:08x}, expected {:08x}", computed, stated.whole));
   }
+  checksum_ = crc32c(record.substr(size + 1), checksum_);
 }
 
 }  // namespace waymark

@@ -21,6 +21,8 @@ class MapRecordStream {
 
   /// The next record, which lives until the next call. InputError at the end of the file.
   MapRecord next();
+  /// Of all records so far: the CRC-32C of their checksums.
+  std::uint32_t checksum() const { return checksum_; }
   /// Whether the file ends here.
   bool is_at_end();
   /// The kind of the last record; empty for the header, which has none.
@@ -30,7 +32,7 @@ class MapRecordStream {
   bool read_more();
   bool measure(std::size_t& end) const;
   std::string_view read_next();
-  void check_checksum(std::string_view record) const;
+  void check_checksum(std::string_view record);
   std::string where() const;
   std::string place() const;
 
@@ -40,6 +42,7 @@ class MapRecordStream {
   std::size_t begin_ = 0;        // Of what was not unpacked yet.
   std::uint64_t num_bytes_ = 0;  // Of the file before the buffer.
   std::uint64_t num_records_ = 0;
+  std::uint32_t checksum_ = 0;
   std::string kind_;
   std::uint64_t id_ = 0;  // 0 where it has none.
 };

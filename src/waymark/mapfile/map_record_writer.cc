@@ -21,6 +21,16 @@ void MapRecordWriter::write_header(int version, std::string_view producer) {
   end();
 }
 
+void MapRecordWriter::write_journal_header(int version,
+                                           std::string_view producer,
+                                           std::uint32_t map_checksum) {
+  add_text("format", "waymark-map-journal");
+  add("version", static_cast<std::uint64_t>(version));
+  add_text("producer", producer);
+  add("map_checksum", map_checksum);
+  end();
+}
+
 void MapRecordWriter::begin(std::string_view kind, std::uint64_t id) {
   record_ = fmt::format("{} {}", kind, id);
   add_text("kind", kind);
@@ -61,8 +71,9 @@ void MapRecordWriter::end() {
   pack_map_size(start, num_keys_);
   const std::uint32_t checksum = crc32c(body_, crc32c(start));
   pack_uint32(body_, checksum);
-  file_.write(start);
-  file_.write(body_);
+  checksum_ = crc32c(std::string_view(body_).substr(body_.size() - sizeof checksum), checksum_);
+  write_(start);
+  write_(body_);
   body_.clear();
   num_keys_ = 0;
 }
@@ -76,6 +87,7 @@ void MapRecordWriter::write_counts() {
     pack_unsigned(body_, count);
   }
   end();
+  counts_.clear();
 }
 
 std::string& MapRecordWriter::add_key(std::string_view key) {

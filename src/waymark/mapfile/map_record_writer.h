@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <map>
 #include <span>
 #include <string>
@@ -10,7 +11,6 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/base/atomic_file.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/msgpack.h"
@@ -18,15 +18,20 @@
 namespace waymark {
 
 /// Writes the records of a map file one after the other, each a MessagePack map that ends with its
-/// checksum. Holds one record at a time. The file is borrowed. Numbers that readers would refuse
-/// are an OutputError.
+/// checksum. Holds one record at a time. Numbers that readers would refuse are an OutputError.
 class MapRecordWriter {
  public:
-  /// `name` begins error messages: the file.
-  MapRecordWriter(AtomicFile& file, std::string name) : file_(file), name_(std::move(name)) {}
+  /// Takes the bytes of the file one after the other.
+  using Write = std::function<void(std::string_view bytes)>;
 
-  /// The first record, which has no kind.
+  /// `name` begins error messages: the file.
+  MapRecordWriter(Write write, std::string name)
+      : write_(std::move(write)), name_(std::move(name)) {}
+
+  /// The first record of a map, which has no kind.
   void write_header(int version, std::string_view producer);
+  /// The first record of a journal of changes to the map file of that checksum.
+  void write_journal_header(int version, std::string_view producer, std::uint32_t map_checksum);
 
   void begin(std::string_view kind, std::uint64_t id);
   void add(std::string_view key, std::uint64_t value) { pack_unsigned(add_key(key), value); }
@@ -56,8 +61,11 @@ class MapRecordWriter {
   }
   void end();
 
-  /// The last record: how many there are of each kind.
+  /// The last record, of a map or of a change: how many there are of each kind.
   void write_counts();
+
+  /// Of all records so far: the CRC-32C of their checksums.
+  std::uint32_t checksum() const { return checksum_; }
 
   /// OutputError: what the current record would hold cannot be read again.
   [[noreturn]] void fail(const std::string& what) const;
@@ -71,11 +79,12 @@ class MapRecordWriter {
                      std::size_t count,
                      std::string_view bytes);
 
-  AtomicFile& file_;
+  const Write write_;
   const std::string name_;
   std::string record_;  // For errors: its kind and id.
   std::string body_;
   std::uint32_t num_keys_ = 0;
+  std::uint32_t checksum_ = 0;
   std::map<std::string, std::uint64_t, std::less<>> counts_;
 };
 

@@ -17,7 +17,8 @@ Autosave::Autosave(std::filesystem::path path,
       interval_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_s))),
       settings_(std::move(settings)),
-      images_(images) {}
+      images_(images),
+      journal_(path_) {}
 
 std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& map) {
   using namespace std::chrono_literals;
@@ -34,8 +35,10 @@ std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& ma
   served_ = std::exchange(wanted_, {});
   try {
     // The map never changes, the rest is fixed: nothing is shared that anyone writes.
-    under_way_ =
-        std::async(std::launch::async, [this, stored = prepare(map)] { save_map(path_, stored); });
+    const bool is_wanted = !served_.empty();
+    under_way_ = std::async(std::launch::async, [this, is_wanted, stored = prepare(map)] {
+      is_wanted ? journal_.save_whole(stored) : journal_.save(stored);
+    });
   } catch (const std::exception&) {
     return describe_failure(std::current_exception());  // No memory or no thread is left, now.
   }
@@ -59,7 +62,7 @@ std::string Autosave::finish_save() {
 
 void Autosave::save(const std::shared_ptr<const Map>& map) {
   if (under_way_.valid()) finish_save();
-  save_map(path_, prepare(map));
+  journal_.save_whole(prepare(map));
   for (const auto& on_done : std::exchange(wanted_, {})) on_done("");
 }
 

@@ -13,13 +13,15 @@
 
 #include "waymark/map/map.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/mapfile/map_journal.h"
 #include "waymark/session/image_keeper.h"
 
 namespace waymark {
 
 /// Saves the newest map of a running session every so often, in a thread of its own: neither
-/// tracking nor mapping waits. Whenever the program is killed, the file holds the last map that was
-/// saved as a whole.
+/// tracking nor mapping waits. Of a large map only what changed is written, to a journal beside the
+/// file, up to the end of the session. Whenever the program is killed, the file and its journal
+/// hold the last map that was saved as a whole.
 class Autosave {
  public:
   /// update() never saves if interval_s is 0. `settings` are those of the session, as YAML; the
@@ -34,11 +36,11 @@ class Autosave {
   /// To be called often: saves the map when it is time, unless it is empty or the last save is
   /// still under way. Gives what went wrong with an earlier one; the next one will be tried.
   std::optional<std::string> update(const std::shared_ptr<const Map>& map);
-  /// The next update() saves the map as soon as it can, in the same way; on_done hears, from a
+  /// The next update() saves the map as soon as it can, the file by itself; on_done hears, from a
   /// later update() or the last save(), what went wrong, or nothing.
   void save_soon(std::function<void(const std::string& error)> on_done);
   const std::filesystem::path& path() const { return path_; }
-  /// Waits for the save under way and saves the map. Throws OutputError.
+  /// Waits for the save under way and saves the map, the file by itself. Throws OutputError.
   void save(const std::shared_ptr<const Map>& map);
 
  private:
@@ -53,6 +55,7 @@ class Autosave {
   const std::string settings_;
   const ImageKeeper& images_;
   Clock::time_point last_start_ = Clock::now();
+  MapJournal journal_;  // Of the save under way as long as there is one.
   std::future<void> under_way_;
   using Waiting = std::vector<std::function<void(const std::string& error)>>;
   Waiting wanted_;  ///< For the next save.

@@ -33,6 +33,13 @@ class RandomMap {
 
   Map& map() { return map_; }
 
+  /// More edits of every kind.
+  void go_on(int num_steps) {
+    for (int step = 0; step < num_steps; ++step) edit();
+    erase_and_merge();
+    describe_landmarks();
+  }
+
  private:
   static std::shared_ptr<const Rig> make_rig_of(int num_cameras, const std::string& model) {
     CameraChain chain;
