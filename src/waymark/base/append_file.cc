@@ -15,7 +15,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
+constexpr std::size_t kFlushBytes = std::size_t{1} << 16;
 
 }  // namespace
 
@@ -32,7 +32,7 @@ AppendFile::~AppendFile() {
 
 void AppendFile::write(std::string_view bytes) {
   buffer_.append(bytes);
-  if (buffer_.size() >= kBufferBytes) flush();
+  if (buffer_.size() >= kFlushBytes) flush();
 }
 
 void AppendFile::commit() {
