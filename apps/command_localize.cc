@@ -2,16 +2,20 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
 
 #include "commands.h"
 #include "input_command.h"
+#include "waymark/atlas/atlas_localizer.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/report/advice.h"
+#include "waymark/session/localize_atlas.h"
 #include "waymark/session/session.h"
 
 namespace waymark {
@@ -75,20 +79,30 @@ SessionResults localize_all(const LocalizeOptions& options,
   return results;
 }
 
-int localize(LocalizeOptions options, Reporter& reporter) {
-  const StoredMap stored = load_map(options.map);
-  options.session.calibrate = reported(options.calibrate, reporter);
-  PreparedInput prepared = prepare_input(options.session);
-  for (const std::string& line : prepared.description) reporter.info(line);
-  warn_unless_sure(reporter, prepared, "the map may tell");
-  reporter.info(describe(*stored.map, options.map));
-  const bool has_range = prepared.input->info().setup != Setup::kMono;
-  if (has_range && !is_metric(*stored.map)) {
-    reporter.info("the map has no scale in metres: only camera 0 is used, without depth");
-  }
-  prepare_results(options.report.out);
+/// In an atlas the calibration is taken as it is stated.
+SessionResults localize_tiles(const LocalizeOptions& options,
+                              const Atlas& atlas,
+                              PreparedInput& prepared,
+                              Reporter& reporter) {
+  AtlasLocalizer localizer(prepared.rig, prepared.settings, atlas);
+  const ImageOrder order = options.is_unordered ? ImageOrder::kUnordered : ImageOrder::kStream;
+  SessionResults results = localize_in_atlas(*prepared.input,
+                                             localizer,
+                                             order,
+                                             is_interrupted,
+                                             report_frames(reporter, prepared.input->info()));
+  reporter.finish_progress();
+  reporter.info(fmt::format("{} of {} tiles opened, {} times",
+                            localizer.num_tiles_seen(),
+                            atlas.contents().tiles.size(),
+                            localizer.num_opened()));
+  return results;
+}
 
-  SessionResults results = localize_all(options, stored.map, prepared, reporter);
+void write_all(const LocalizeOptions& options,
+               PreparedInput& prepared,
+               SessionResults& results,
+               Reporter& reporter) {
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(Timing::kInline);
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
@@ -103,6 +117,49 @@ int localize(LocalizeOptions options, Reporter& reporter) {
          report_calibration(reporter, results.summary);
          check_finished(results);
        }});
+}
+
+/// A map, or an atlas.
+struct SearchedMap {
+  std::optional<Atlas> atlas;
+  std::shared_ptr<const Map> map;
+  std::string description;
+
+  explicit SearchedMap(const std::filesystem::path& path) {
+    if (is_atlas(path)) {
+      atlas = Atlas::open(path);
+      description = fmt::format("{}: {} tiles of {} recordings",
+                                path.string(),
+                                atlas->contents().tiles.size(),
+                                atlas->contents().recordings.size());
+    } else {
+      map = load_map(path).map;
+      description = describe(*map, path);
+    }
+  }
+
+  bool has_scale() const {
+    return atlas ? std::ranges::all_of(atlas->contents().tiles, &AtlasTile::is_metric)
+                 : is_metric(*map);
+  }
+};
+
+int localize(LocalizeOptions options, Reporter& reporter) {
+  const SearchedMap searched(options.map);
+  options.session.calibrate = reported(options.calibrate, reporter);
+  PreparedInput prepared = prepare_input(options.session);
+  for (const std::string& line : prepared.description) reporter.info(line);
+  warn_unless_sure(reporter, prepared, "the map may tell");
+  reporter.info(searched.description);
+  const bool has_range = prepared.input->info().setup != Setup::kMono;
+  if (has_range && !searched.has_scale()) {
+    reporter.info("the map has no scale in metres: only camera 0 is used, without depth");
+  }
+  prepare_results(options.report.out);
+  SessionResults results = searched.atlas
+                               ? localize_tiles(options, *searched.atlas, prepared, reporter)
+                               : localize_all(options, searched.map, prepared, reporter);
+  write_all(options, prepared, results, reporter);
   return *results.summary.localized == 0 ? kNoPose : kDone;
 }
 
@@ -111,8 +168,9 @@ int localize(LocalizeOptions options, Reporter& reporter) {
 void add_localize_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<LocalizeOptions>();
   CLI::App& localize_command = *program.add_subcommand(
-      "localize", "Find the images of INPUT in a saved map, which stays as it is");
-  localize_command.add_option("MAP", options->map, "Map file (.wmap)")->required();
+      "localize", "Find the images of INPUT in a saved map or an atlas, which stays as it is");
+  localize_command.add_option("MAP", options->map, "Map file (.wmap), or folder of an atlas")
+      ->required();
   add_input_options(localize_command, options->session);
   add_selection_options(localize_command, options->session.reading);
   add_fov_option(localize_command, options->calibrate);

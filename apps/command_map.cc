@@ -5,11 +5,13 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "commands.h"
 #include "terminal.h"
+#include "waymark/atlas/add.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/mapfile/map_file.h"
@@ -158,16 +160,45 @@ void add_merge_task(CLI::App& maps, Command& command) {
   merge.callback([options, &command] { command = [options] { return merge_files(*options); }; });
 }
 
+struct TileOptions {
+  std::filesystem::path map;
+  std::filesystem::path out;
+  std::size_t num_keyframes = kKeyframesPerTile;
+};
+
+int tile_map(const TileOptions& options) {
+  const std::string checksum = checksum_of_map(options.map);
+  Atlas atlas = Atlas::open_or_create(options.out);
+  for (const AtlasRecording& recording : atlas.contents().recordings) {
+    if (recording.checksum == checksum) continue;
+    throw InputError(options.out.string(),
+                     "holds another map; waymark atlas add finds what they share");
+  }
+  add_maps(atlas, std::span(&options.map, 1), options.num_keyframes, /*seed=*/0);
+  print_result("{}: {} tiles\n", options.out.string(), atlas.contents().tiles.size());
+  return kDone;
+}
+
+void add_tile_task(CLI::App& maps, Command& command) {
+  const auto options = std::make_shared<TileOptions>();
+  CLI::App& tile = *maps.add_subcommand("tile", "Cut a map into the tiles of an atlas");
+  tile.add_option("MAP", options->map, "Map file (.wmap)")->required();
+  tile.add_option("-o,--out", options->out, "Folder for the atlas")->required();
+  add_tile_size_option(tile, options->num_keyframes);
+  tile.callback([options, &command] { command = [options] { return tile_map(*options); }; });
+}
+
 }  // namespace
 
 void add_map_command(CLI::App& program, Command& command) {
   CLI::App& maps =
-      *program.add_subcommand("map", "Look at, verify, join, or scale and level saved maps");
+      *program.add_subcommand("map", "Look at, verify, join, scale and level, or cut saved maps");
   maps.require_subcommand(1);
   add_task(maps, "info", "Print what a map holds", print_info, command);
   add_task(maps, "check", "Name everything that is wrong with a map", check_map, command);
   add_merge_task(maps, command);
   add_align_task(maps, command);
+  add_tile_task(maps, command);
 }
 
 }  // namespace waymark

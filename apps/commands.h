@@ -21,6 +21,7 @@ using Program = std::function<int(const std::vector<std::string>&)>;
 void add_run_command(CLI::App& program, Command& command);
 void add_localize_command(CLI::App& program, Command& command);
 void add_map_command(CLI::App& program, Command& command);
+void add_atlas_command(CLI::App& program, Command& command);
 void add_markers_command(CLI::App& program, Command& command);
 void add_calibrate_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);
@@ -41,6 +42,9 @@ inline constexpr int kNoPose = 3;          ///< Ran, but found no pose at all.
 
 /// What `map` has besides; adds one subcommand to it.
 void add_align_task(CLI::App& maps, Command& command);
+
+/// How many keyframes a tile has at most.
+void add_tile_size_option(CLI::App& command, std::size_t& num_keyframes);
 
 /// Adds an option that takes one of a few names, each standing for a value.
 template <class Value>

@@ -2,6 +2,11 @@
 # everything else in src/ may change at any time. `cmake -P` on this file lists them.
 cmake_minimum_required(VERSION 3.25)
 set(roots
+  atlas/add.h
+  atlas/atlas.h
+  atlas/atlas_localizer.h
+  atlas/export_atlas.h
+  atlas/optimize_atlas.h
   base/check.h # InputError, which every reader throws
   base/config.h # settings files
   calibrate/calibrate.h # cameras that nobody knows

@@ -1,0 +1,13 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include "waymark/atlas/atlas.h"
+
+namespace waymark {
+
+/// All of an atlas as one map: a sub-map per part, the tiles of which lie where their anchors say
+/// and share what links tie. Its settings are those of the first tile.
+StoredMap export_atlas(const Atlas& atlas);
+
+}  // namespace waymark

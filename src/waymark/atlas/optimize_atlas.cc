@@ -1,0 +1,37 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/atlas/optimize_atlas.h"
+
+#include <fmt/format.h>
+
+#include <cstdint>
+#include <vector>
+
+#include "waymark/atlas/adjust_tiles.h"
+#include "waymark/atlas/anchors.h"
+
+namespace waymark {
+
+OptimizedAtlas optimize_atlas(Atlas& atlas, const std::function<void(const std::string&)>& say) {
+  AtlasContents contents = atlas.contents();
+  const ReadShared read_shared = [&](const AtlasLink& link) { return atlas.read_shared(link); };
+  OptimizedAtlas result;
+  solve_anchors(contents);
+  for (const std::vector<std::uint32_t>& group : schedule_adjustment(contents)) {
+    for (const std::uint32_t tile : group) {
+      contents.tiles[tile].checksum = adjust_stored_tile(atlas, contents, tile, read_shared);
+    }
+    result.num_adjusted += group.size();
+    if (say) say(fmt::format("{} tiles adjusted", result.num_adjusted));
+  }
+  if (result.num_adjusted > 0) {
+    for (AtlasLink& link : contents.links) {
+      link.b_from_a = refit_link(atlas, contents, link, read_shared(link));
+    }
+    solve_anchors(contents);
+  }
+  atlas.commit(contents, {});
+  return result;
+}
+
+}  // namespace waymark
