@@ -165,6 +165,7 @@ void start_viewer(const RunOptions& options,
   info.setup = to_string(input.setup);
   info.timing = to_string(options.session.timing);
   info.can_save = !options.map_out.empty();
+  info.keeps_images = options.session.reading.has_jpeg;
   live.emplace(parse_viewer_address(options.viewer, "--viewer"),
                std::move(info),
                *session.system,
@@ -342,7 +343,7 @@ void add_map_options(CLI::App& command, RunOptions& options) {
   command
       .add_flag("--keep-images",
                 options.session.reading.has_jpeg,
-                "Keep the images of keyframes in the map, for export [off]")
+                "Keep the images of keyframes in the map, for export and the viewer [off]")
       ->needs(&map_out);
 }
 

@@ -85,7 +85,18 @@ void LiveControl::answer(const ViewRequest& request) {
     case ViewRequest::Kind::kStop:
       is_stopped_ = true;
       break;
+    case ViewRequest::Kind::kImage:
+      send_image(request);
+      break;
+    case ViewRequest::Kind::kScale:  // Of a saved map only.
+      break;
   }
+}
+
+void LiveControl::send_image(const ViewRequest& request) {
+  const Keyframe* keyframe = system_.map()->keyframes().find(request.keyframe);
+  viewer_.reply(
+      {request, "", "", keyframe ? parts_.images.image_of(request.keyframe, *keyframe) : nullptr});
 }
 
 void LiveControl::save(const ViewRequest& request) {

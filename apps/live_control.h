@@ -52,6 +52,7 @@ class LiveControl {
   void tell_problem();
   void answer(const ViewRequest& request);
   void save(const ViewRequest& request);
+  void send_image(const ViewRequest& request);
 
   System& system_;
   const ControlledParts parts_;

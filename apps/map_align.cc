@@ -1,5 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
+
+#include <charconv>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -18,16 +21,33 @@ namespace {
 struct AlignOptions {
   std::filesystem::path map;
   std::filesystem::path out;
-  std::vector<std::tuple<std::uint32_t, std::uint32_t, double>> distances;
+  std::vector<std::tuple<std::string, std::string, double>> distances;
   std::filesystem::path trajectory;
   std::vector<double> up;
 };
+
+/// 12: keyframe 12; L12: landmark 12.
+MapPlace parse_place(const std::string& text) {
+  const bool is_landmark = text.starts_with('L');
+  const char* const begin = text.data() + is_landmark;
+  const char* const end = text.data() + text.size();
+  std::uint32_t id = 0;
+  const auto [stop, error] = std::from_chars(begin, end, id);
+  if (error != std::errc() || stop != end) {
+    throw InputError(
+        "--distance",
+        fmt::format("'{}' is no place, expected the id of a keyframe, or L and that of a landmark",
+                    text));
+  }
+  if (is_landmark) return LandmarkId{id};
+  return KeyframeId{id};
+}
 
 AlignedMap align_as_asked(const Map& map, const AlignOptions& options) {
   if (!options.distances.empty()) {
     std::vector<KnownDistance> known;
     for (const auto& [a, b, metres] : options.distances) {
-      known.push_back({KeyframeId{a}, KeyframeId{b}, metres});
+      known.push_back({parse_place(a), parse_place(b), metres});
     }
     return align_to_distances(map, known, "--distance");
   }
@@ -64,7 +84,8 @@ void add_align_task(CLI::App& maps, Command& command) {
   added
       .add_option("--distance",
                   options->distances,
-                  "ID_A ID_B METRES: how far apart two keyframes are; may be repeated")
+                  "ID_A ID_B METRES: how far apart two keyframes are, or landmarks (L and the id); "
+                  "may be repeated")
       ->type_size(3);
   added.add_option(
       "--trajectory", options->trajectory, "Poses of camera 0 (TUM, EuRoC csv, KITTI)");

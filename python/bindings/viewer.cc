@@ -30,6 +30,10 @@ std::string name_of(ViewRequest::Kind kind) {
       return "mapping_off";
     case ViewRequest::Kind::kStop:
       return "stop";
+    case ViewRequest::Kind::kImage:
+      return "image";
+    case ViewRequest::Kind::kScale:
+      return "scale";
   }
   return "";
 }
@@ -46,6 +50,7 @@ SessionInfo session_info() {
 PythonViewer::PythonViewer(const ViewerOptions& address, const StoredMap& stored) {
   SessionInfo info = session_info();
   info.is_live = false;
+  info.keeps_images = !stored.images.empty();
   viewer_ = std::make_unique<Viewer>(address, std::move(info));
   ViewUpdate update = show_saved_map(stored);
   viewer_->try_push(update);

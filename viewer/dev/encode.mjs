@@ -63,3 +63,14 @@ export function frame({ frame, time_s, width_px, height_px, pixels, states }) {
   ]);
 }
 export const submaps = (items) => message(14, items.length, [["u32", each(items, "joined_into")], ["u32", each(items, "is_metric")]]);
+export const markers = (items) => message(15, items.length, [
+  ["u32", each(items, "id")], ["f32", flat(items, "corners")], ["u32", each(items, "is_surveyed")], ["u16", each(items, "submap")],
+], 4);
+export const edgePoints = (items) => message(16, items.length, [["u32", each(items, "id")], ["f32", flat(items, "half")]]);
+export function keyframeImage({ request, keyframe, width_px, height_px, pixels, states, jpeg }) {
+  const padding = new Array((4 - (states.length % 4)) % 4).fill(0);
+  const head = message(17, states.length, [
+    ["u32", [request, 0, keyframe, width_px, height_px, jpeg.length]], ["f32", pixels.flat()], ["u8", [...states, ...padding]],
+  ]);
+  return Buffer.concat([head, jpeg]);
+}

@@ -25,8 +25,33 @@ const TYPES = { ".html": "text/html", ".js": "text/javascript", ".css": "text/cs
 const POLICY = "default-src 'self'; object-src 'none'; base-uri 'none'; form-action 'none'; frame-ancestors 'none'";
 const DIST = fileURLToPath(new URL("../dist/", import.meta.url));
 
+/** A picture of a corridor, 188 x 120 px. */
+const JPEG = Buffer.from(
+  "/9j/4AAQSkZJRgABAQAAAQABAAD/2wBDABQODxIPDRQSEBIXFRQYHjIhHhwcHj0sLiQySUBMS0dARkVQWnNiUFVtVkVGZIhlbXd7gYKBTmCNl4x9lnN+gXz/2wBDAR" +
+  "UXFx4aHjshITt8U0ZTfHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHx8fHz/wAARCAB4ALwDASIAAhEBAxEB/8QAHwAAAQUBAQEB" +
+  "AQEAAAAAAAAAAAECAwQFBgcICQoL/8QAtRAAAgEDAwIEAwUFBAQAAAF9AQIDAAQRBRIhMUEGE1FhByJxFDKBkaEII0KxwRVS0fAkM2JyggkKFhcYGRolJicoKSo0NT" +
+  "Y3ODk6Q0RFRkdISUpTVFVWV1hZWmNkZWZnaGlqc3R1dnd4eXqDhIWGh4iJipKTlJWWl5iZmqKjpKWmp6ipqrKztLW2t7i5usLDxMXGx8jJytLT1NXW19jZ2uHi4+Tl" +
+  "5ufo6erx8vP09fb3+Pn6/8QAHwEAAwEBAQEBAQEBAQAAAAAAAAECAwQFBgcICQoL/8QAtREAAgECBAQDBAcFBAQAAQJ3AAECAxEEBSExBhJBUQdhcRMiMoEIFEKRob" +
+  "HBCSMzUvAVYnLRChYkNOEl8RcYGRomJygpKjU2Nzg5OkNERUZHSElKU1RVVldYWVpjZGVmZ2hpanN0dXZ3eHl6goOEhYaHiImKkpOUlZaXmJmaoqOkpaanqKmqsrO0" +
+  "tba3uLm6wsPExcbHyMnK0tPU1dbX2Nna4uPk5ebn6Onq8vP09fb3+Pn6/9oADAMBAAIRAxEAPwDZooooAKKKKACiiigAooooAKKKKACiiigAooooAKKKKACiiigAoo" +
+  "ooAKKKKACiiigAooooAKKKKACiiigAooooAKKQkAEnoKg+3W//AD0/8dNAFiiq/wBut/8Anp/46aPt1v8A89P/AB00AWKKr/brf/np/wCOmj7db/8APT/x00AWKKii" +
+  "uIpmIjbcQM9DUtABRRRQAUUUUAFFFFABRRRQAUUUUAFFFFABRRRQAUUUUANk/wBW30NYFb8n+rb6GsCmhMKKKKoQUUUUAXdL/wBc/wDu/wBa1Ky9L/1z/wC7/WtSpY" +
+  "0FFFFIYUUUUAFFFFABRRRQAUVX+1f7H60fav8AY/WgCxRVf7V/sfrR9q/2P1oAsUVX+1f7H60fav8AY/WgCxRVf7V/sfrR9q/2P1oAmk/1bfQ1gVrvc5Rhs7etZFNC" +
+  "YUUU0uB05piHUUA5HFFMC7pf+uf/AHf61qVkWEnlyscZytX/ALV/sfrUsaLFFV/tX+x+tH2r/Y/WkMsUVX+1f7H60fav9j9aALFFV/tX+x+tH2r/AGP1oAsUVX+1f7" +
+  "H60fav9j9aAK9FFFABRRRQAUUUUAFFFITgZPAoAG+6fpWfmrrMSpI4XHU1R/lTQmIeaMUvvR2FMQnSnA0nf60Y7flQBYtfvn6VaqpaH94QeuKt0mNBRRRSGFFFFABR" +
+  "RRQAUUUUAFFFFABRRRQAUUhIAyTgU35n9VX9TQApbBwBlvSmkAfNIc+gpSQgwo5PQDvSqvO5uW/lQAm0vy/4D0qJbdHOedvb3qVvnO0dP4j/AEp9AFc26FwOeBk80P" +
+  "boMdeo71MnILf3uaH6D/eFFwImtk2nGc9uaBbxsoIzzU9NXhiv4igCKOJRkHO4df8AEVIGKnD/AIN60rqTgr94dKAQ69OD1BoAdRTMmPryvr6U+gAooooAKKKKACii" +
+  "igAoopGYKOaAFppbnCjJ/QUmGfr8o9O9OAAGAMCgBAvOWOT/ACoZudq8t/KkLFjhPxPpTlUKMCgBFXbz1J6mh2PCr94/p70rNtGfyHrSKuOTyx60AKqhRgUj8jb/AH" +
+  "uKdTRy5PpwKAHU1+g/3hTqa/Qf7woAdTX4Ib04P0p1IRkEHoaAFpjfKd46fxD+tKhyvPUcGnUAHUcUzBTlRlfT0+lA+Rsfwnp7Gn0AICGGQcilphUg7k69x605WDDj" +
+  "8R6UALRRRQAUUUUAM3FuE59+1KqgHPU+poooAdTMmTpwvr60UUAOAAGAMCgnAyelFFADVBY7z+A9KfRRQAjHapPpQo2qB370UUALTX6D/eFFFADqKKKAG9H9m/n/AJ" +
+  "/lTqKKAEIBBB6GmqSDtbr2PqKKKAH01lycg4b1oooAFbPBGGHUU6iigAooooA//9k=",
+  "base64",
+);
+
 export class MockServer {
-  constructor({ world = "walk", skip = 0, token = "" } = {}) {
+  /** isFree: the scale of the map is; out: where a scaled map may be written; images: of keyframes, "off", "some" or "none". */
+  constructor({ world = "walk", skip = 0, token = "", isFree = false, out = "", images = "some" } = {}) {
+    Object.assign(this, { isFree, out, images });
     this.token = token;
     this.kind = world;
     this.generation = 0;
@@ -43,7 +68,8 @@ export class MockServer {
 
   reset() {
     ++this.generation;
-    this.world = this.kind === "large" ? largeMap() : new Walk({ isSphere: this.kind === "sphere" });
+    this.world = this.kind === "large" ? largeMap() : new Walk({ isSphere: this.kind === "sphere", isFree: this.isFree });
+    if (this.kind === "empty" || this.kind === "loading") this.world.markers = [];
   }
 
   listen(port) {
@@ -98,8 +124,8 @@ export class MockServer {
     const isLive = this.kind !== "map" && this.kind !== "loading";
     return {
       type: "hello", protocol: 1, program: "waymark mock", mode: isLive ? "live" : "map", input: isLive ? "courtyard" : "courtyard.wmap",
-      setup: "stereo", timing: "realtime", controls: isLive ? ["pause", "resume", "reset", "save", "mapping", "stop"] : [],
-      stages: STAGES, states: STATES, reasons: REASONS,
+      setup: "stereo", timing: "realtime", controls: isLive ? ["pause", "resume", "reset", "save", "mapping", "stop"] : this.out ? ["scale"] : [],
+      keyframe_images: this.images !== "off", stages: STAGES, states: STATES, reasons: REASONS,
     };
   }
 
@@ -128,6 +154,9 @@ export class MockServer {
     yield encode.loops(world.loops);
     for (let i = 0; i < world.frames.length; i += CHUNK) yield encode.trajectory(world.frames.slice(i, i + CHUNK));
     for (let i = 0; i < landmarks.length; i += CHUNK) yield encode.landmarks(landmarks.slice(i, i + CHUNK));
+    const onEdges = landmarks.filter((each) => each.half);
+    for (let i = 0; i < onEdges.length; i += CHUNK) yield encode.edgePoints(onEdges.slice(i, i + CHUNK));
+    if (world.markers.length) yield encode.markers(world.markers);
     yield encode.end(this.generation);
   }
 
@@ -166,6 +195,8 @@ export class MockServer {
     if (covisibility.length) this.broadcast(encode.covisibility(covisibility));
     if (loops) this.broadcast(encode.loops(this.world.loops));
     if (landmarks.length) this.broadcast(encode.landmarks([...new Set(landmarks)].sort((a, b) => a.id - b.id)));
+    const onEdges = [...new Set(landmarks)].filter((each) => each.half).sort((a, b) => a.id - b.id);
+    if (onEdges.length) this.broadcast(encode.edgePoints(onEdges));
     if (erased.length) this.broadcast(encode.landmarksErased(erased));
     this.broadcast(encode.trajectory(frames));
   }
@@ -188,10 +219,15 @@ export class MockServer {
         for (const bytes of this.snapshot()) this.broadcast(bytes);
       },
       save: () => ({ path: "courtyard.wmap" }),
+      scale: () => ({ path: this.out }),
     };
     if (acts[request.do]) {
       const more = acts[request.do]();
       return reply(typeof more === "object" ? more : {});
+    }
+    if (request.do === "image") {
+      const image = this.image(request);
+      return image ? client.send(image) : reply({ ok: false, error: "its image was not kept" });
     }
     const element = request.do === "keyframe" ? this.keyframe(request.id) : request.do === "landmark" ? this.landmark(request.id) : null;
     if (element) client.send(JSON.stringify({ type: request.do, request: request.request, ...element }));
@@ -206,6 +242,13 @@ export class MockServer {
       id, frame: keyframe.frame, timestamp_ns: "1403636579763555584", submap: 0, position: keyframe.position, rotation: keyframe.rotation,
       parent: id > 0 ? id - 1 : null, features: 1000, camera: "pinhole, 752x480 px", covisible: this.world.covisibility[id].edges, landmarks,
     };
+  }
+
+  image({ request, id }) {
+    if (!this.world.keyframes[id] || this.images !== "some") return null;
+    const pixels = Array.from({ length: 300 }, () => [752 * this.dots(), 480 * this.dots()]);
+    const states = pixels.map((_, i) => i % 4);
+    return encode.keyframeImage({ request, keyframe: id, width_px: 752, height_px: 480, pixels, states, jpeg: JPEG });
   }
 
   landmark(id) {

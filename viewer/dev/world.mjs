@@ -56,9 +56,20 @@ export function pyramid(horizontal = 0.75, vertical = 0.5, rig = 0, x = 0) {
 
 export const sphere = { shape: 1, rig: 0, position: [0, 0, 0], corners: new Array(12).fill(0) };
 
+/** A marker on the wall beside the way, its print towards it. */
+function markerAt(id, time_s, side, is_surveyed) {
+  const { position: [x, , z], yaw } = poseAt(time_s);
+  const [s, c] = [Math.sin(yaw), Math.cos(yaw)];
+  const corners = [[-1, -1], [1, -1], [1, 1], [-1, 1]].flatMap(([along, down]) => {
+    const ahead = 2 + (along * side) / 2;
+    return [x + s * ahead + c * 2.1, -0.6 + (down * side) / 2, z + c * ahead - s * 2.1];
+  });
+  return { id, corners, is_surveyed, submap: 0 };
+}
+
 /** A session that grows frame by frame. */
 export class Walk {
-  constructor({ isSphere = false } = {}) {
+  constructor({ isSphere = false, isFree = false } = {}) {
     this.cameras = isSphere ? [sphere] : [pyramid(), pyramid(0.75, 0.5, 0, 0.11)];
     this.next = random(7);
     this.frames = [];
@@ -66,7 +77,8 @@ export class Walk {
     this.landmarks = new Map();
     this.covisibility = [];
     this.loops = [];
-    this.submaps = [{ joined_into: NONE, is_metric: 1 }];
+    this.submaps = [{ joined_into: NONE, is_metric: isFree ? 0 : 1 }];
+    this.markers = [0, 7, 23, 586].map((id, i) => markerAt(id, 2 + 14 * i, 1.6, i % 2));
     this.nextLandmark = 0;
     this.isMapping = true;
   }
@@ -98,6 +110,7 @@ export class Walk {
         id: this.nextLandmark, position: pointNear(pose, this.next), frame: entry.frame, observations: 2, submap: 0,
         colour: [grey, grey, grey, 255], seen: [id],
       };
+      if (i % 10 === 0) landmark.half = [0, 0.12, 0];
       this.nextLandmark += 1 + Math.floor(3 * this.next());
       this.landmarks.set(landmark.id, landmark);
       changes.landmarks.push(landmark);

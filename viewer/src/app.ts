@@ -13,6 +13,7 @@ import { Controls } from "./ui/controls";
 import { byId, Choice, setIcon, setText } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { Legend } from "./ui/legend";
+import { Measure } from "./ui/measure";
 import { Notice } from "./ui/notice";
 import { SessionPanel } from "./ui/session_panel";
 import { Timeline } from "./ui/timeline";
@@ -27,6 +28,7 @@ export class App implements Listener {
   readonly connection = new Connection(this);
   readonly scene = new Scene(this.store, byId<HTMLCanvasElement>("scene"));
   readonly inspector = new Inspector(this.scene, this.store, this.connection);
+  readonly measure = new Measure(this.scene, this.store, this.connection);
   readonly timeline = new Timeline(this.store, () => (this.panelsAt_ms = 0));
   readonly report = publish(this);
   connectionState: ConnectionState = "connecting";
@@ -83,6 +85,8 @@ export class App implements Listener {
     this.session.setHello(hello);
     this.controls.setHello(hello);
     this.timeline.setHello(hello);
+    this.measure.setHello(hello);
+    this.inspector.hasImages = hello.keyframe_images === true;
     this.camera.clear();
   }
 
@@ -102,6 +106,7 @@ export class App implements Listener {
       if (message.kind === Kind.Begin) this.begin(start);
       else if (message.kind === Kind.End) this.end();
       else if (message.kind === Kind.Frame) void this.camera.show(message);
+      else if (message.kind === Kind.KeyframeImage) this.connection.takeImage(message);
     }
     this.report.messageTaken(performance.now() - start);
   }
@@ -110,6 +115,7 @@ export class App implements Listener {
     this.beganAt_ms = now_ms;
     this.isFitted = false;
     void this.inspector.select(null);
+    this.measure.clear();
     this.timeline.moveTo(-1);
     this.scene.parts.clear();
   }
@@ -159,14 +165,21 @@ export class App implements Listener {
     this.notice.show({ connection: this.connectionState, retryIn_s, hello, status, canDraw: scene.canDraw }, this.store);
     this.legend.update();
     this.timeline.draw();
-    const { view, ground } = scene;
-    const perPixel = scene.unitsPerPixel;
-    const unit = this.store.submaps?.is_metric[0] === 0 ? "units" : "m";
-    byId("scale").hidden = this.store.keyframes.count === 0 || !scene.canDraw;
+    this.measure.update();
+    this.drawScale();
+    this.viewChoice.set(scene.view.name);
+  }
+
+  /** A length of the ground's grid, by the first part of the map. */
+  private drawScale(): void {
+    const { ground, unitsPerPixel: perPixel, canDraw } = this.scene;
+    const factor = this.measure.factorOf(this.store.rootOf(0));
+    byId("scale").hidden = this.store.keyframes.count === 0 || !canDraw;
     const length = ground.spacing * (ground.spacing / perPixel < 24 ? 10 : 1);
     byId("scale").style.setProperty("--length", `${Math.min(400, length / perPixel).toFixed(0)}px`);
-    setText(byId("scale"), `${length >= 1 ? length : length.toPrecision(1)} ${unit}`);
-    this.viewChoice.set(view.name);
+    const shown = factor * length;
+    const text = factor !== 1 ? shown.toPrecision(3) : String(shown >= 1 ? shown : shown.toPrecision(1));
+    setText(byId("scale"), `${text} ${this.measure.unitOf(this.store.rootOf(0))}`);
   }
 
   private resize(): void {
@@ -206,11 +219,12 @@ export class App implements Listener {
     const keys: Record<string, () => void> = {
       f: () => byId("fit").click(), s: () => void this.saveScreenshot(), d: () => this.toggleTheme(),
       " ": () => this.timeline.togglePlay(), "1": () => this.setView("follow", true), "2": () => this.setView("orbit", true),
-      "3": () => this.setView("top", true), Escape: () => void this.inspector.select(null),
+      "3": () => this.setView("top", true), m: () => this.measure.toggle(), Escape: () => this.closePanels(),
     };
     addEventListener("keydown", (event) => {
       const isPress = event.key === " " && event.target instanceof HTMLButtonElement;
-      if (isPress || event.ctrlKey || event.metaKey || event.altKey) return;
+      const isText = event.target instanceof HTMLInputElement && event.key !== "Escape";
+      if (isPress || isText || event.ctrlKey || event.metaKey || event.altKey) return;
       const act = keys[event.key];
       if (!act) return;
       event.preventDefault();
@@ -230,8 +244,15 @@ export class App implements Listener {
     canvas.addEventListener("pointerdown", (event) => (down = { x: event.offsetX, y: event.offsetY }));
     canvas.addEventListener("pointerup", (event) => {
       if (event.button !== 0 || Math.hypot(event.offsetX - down.x, event.offsetY - down.y) > 5) return;
-      void this.inspector.select(this.scene.pickAt(event.offsetX, event.offsetY));
+      const picked = this.scene.pickAt(event.offsetX, event.offsetY);
+      if (this.measure.isOn) this.measure.take(picked);
+      else void this.inspector.select(picked);
     });
+  }
+
+  private closePanels(): void {
+    this.measure.toggle(false);
+    void this.inspector.select(null);
   }
 
   private async saveScreenshot(): Promise<void> {

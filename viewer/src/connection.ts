@@ -1,5 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+import type { KeyframeImage } from "./protocol";
 import type { Answer, Hello, Status, TextMessage } from "./text_messages";
 
 export type ConnectionState = "connecting" | "open" | "waiting" | "refused";
@@ -55,9 +56,18 @@ export class Connection {
     } else if (message.type === "status") {
       this.listener.onStatus(message);
     } else if (message.request !== null) {
-      this.pending.get(message.request)?.(message);
-      this.pending.delete(message.request);
+      this.settle(message.request, message);
     }
+  }
+
+  /** An answer that came as a binary message. */
+  takeImage(image: KeyframeImage): void {
+    this.settle(image.request, { type: "image", ...image });
+  }
+
+  private settle(request: number, answer: Answer): void {
+    this.pending.get(request)?.(answer);
+    this.pending.delete(request);
   }
 
   private closed(): void {

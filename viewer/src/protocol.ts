@@ -22,6 +22,9 @@ export const Kind = {
   Trajectory: 12,
   Frame: 13,
   Submaps: 14,
+  Markers: 15,
+  EdgePoints: 16,
+  KeyframeImage: 17,
 } as const;
 
 export interface Begin {
@@ -121,9 +124,33 @@ export interface Submaps {
   is_metric: Uint32Array;
 }
 
+export interface Markers {
+  kind: typeof Kind.Markers;
+  id: Uint32Array;
+  corners: Float32Array;
+  is_surveyed: Uint32Array;
+  submap: Uint16Array;
+}
+export interface EdgePoints {
+  kind: typeof Kind.EdgePoints;
+  id: Uint32Array;
+  half: Float32Array;
+}
+export interface KeyframeImage {
+  kind: typeof Kind.KeyframeImage;
+  request: number;
+  keyframe: number;
+  width_px: number;
+  height_px: number;
+  pixel: Float32Array;
+  state: Uint8Array;
+  jpeg: Uint8Array;
+}
+
 export type Message =
   | Begin | End | Landmarks | LandmarkPositions | LandmarksErased | Cameras | Keyframes
-  | KeyframePoses | KeyframesErased | Covisibility | Loops | Trajectory | Frame | Submaps;
+  | KeyframePoses | KeyframesErased | Covisibility | Loops | Trajectory | Frame | Submaps
+  | Markers | EdgePoints | KeyframeImage;
 
 /** Takes one array after the other off a message; throws RangeError where the message is too short. */
 class Reader {
@@ -207,6 +234,22 @@ const decoders: Record<number, Decoder> = {
     };
   },
   [Kind.Submaps]: (r, n) => ({ kind: Kind.Submaps, joined_into: r.u32(n), is_metric: r.u32(n) }),
+  [Kind.Markers](r, n) {
+    const message: Markers = { kind: Kind.Markers, id: r.u32(n), corners: r.f32(12 * n), is_surveyed: r.u32(n), submap: r.u16(n) };
+    r.pad();
+    return message;
+  },
+  [Kind.EdgePoints]: (r, n) => ({ kind: Kind.EdgePoints, id: r.u32(n), half: r.f32(3 * n) }),
+  [Kind.KeyframeImage](r, n) {
+    const [low, high, keyframe, width_px, height_px, bytes] = r.u32(6);
+    const pixel = r.f32(2 * n);
+    const state = r.u8(n);
+    r.pad();
+    return {
+      kind: Kind.KeyframeImage, request: low! + high! * 2 ** 32, keyframe: keyframe!, width_px: width_px!, height_px: height_px!, pixel,
+      state, jpeg: r.u8(bytes!),
+    };
+  },
 };
 
 /**

@@ -22,6 +22,10 @@ export interface Report {
   readonly view: string;
   readonly colouring: string;
   readonly selected: { kind: string; id: number } | null;
+  readonly markers: number;
+  readonly edgePoints: number;
+  /** Between the two places that were clicked, if two were. */
+  readonly measured: { value: number; unit: string } | null;
   /** How often the counts of a status were those of the page when it came, and how often not. */
   readonly agreement: { equal: number; different: number };
   readonly performance: Performance;
@@ -55,6 +59,9 @@ export function publish(app: App): Recorder {
     get view() { return app.scene.view.name; },
     get colouring() { return app.colouring; },
     get selected() { return app.inspector.selected; },
+    get markers() { return store.markers?.id.length ?? 0; },
+    get edgePoints() { return store.landmarks.numEdges; },
+    get measured() { return app.measure.measured; },
     get agreement() { return { ...recorder.agreement }; },
     get performance() { return { script_ms: recorder.times(), drawCalls: app.scene.drawCalls, snapshot_ms: recorder.snapshot_ms }; },
     resetPerformance: () => recorder.reset(),

@@ -1,9 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 
+import type { KeyframeImage } from "./protocol";
+
 /** Text messages of docs/viewer-protocol.md. */
 
-export type Control = "pause" | "resume" | "reset" | "save" | "mapping" | "stop";
+export type Control = "pause" | "resume" | "reset" | "save" | "mapping" | "stop" | "scale";
 export type Phase = "starting" | "running" | "paused" | "finishing" | "done" | "map";
 
 export interface Hello {
@@ -15,6 +17,8 @@ export interface Hello {
   setup: string;
   timing: string;
   controls: Control[];
+  /** Whether images of keyframes can be asked for. */
+  keyframe_images?: boolean;
   stages: string[];
   states: string[];
   reasons: string[];
@@ -94,4 +98,4 @@ export interface LandmarkData {
 }
 
 export type TextMessage = Hello | Status | Reply | KeyframeData | LandmarkData;
-export type Answer = Reply | KeyframeData | LandmarkData;
+export type Answer = Reply | KeyframeData | LandmarkData | ({ type: "image" } & KeyframeImage);

@@ -248,6 +248,128 @@ async function followsItsScreen(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** Presses landmarks or keyframes until two are measured between. */
+async function measureSomething(page) {
+  const box = await page.locator("#scene").boundingBox();
+  for (let i = 0; i < 120; ++i) {
+    const [x, y] = [0.3 + (0.4 * ((7 * i) % 11)) / 11, 0.25 + (0.3 * ((5 * i) % 13)) / 13];
+    await page.mouse.click(box.x + x * box.width, box.y + y * box.height);
+    const measured = await page.evaluate(() => window.waymark.measured);
+    if (measured) return measured;
+  }
+  throw new Error("nothing was hit");
+}
+
+/** A length that somebody knows gives all others metres, and a saved map is written with them where a file was named. */
+async function measuresAndScales(context) {
+  for (const isPhone of [false, true]) {
+    const options = { world: "map", skip: 700, isFree: true, out: "scaled.wmap" };
+    const { mock, page } = await serve(context, options, { isPhone });
+    await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+    await page.waitForTimeout(1500);
+    await page.click("#measure");
+    assert.match(await page.innerText("#measure-panel"), /Click two places/);
+    const { value, unit } = await measureSomething(page);
+    assert.ok(unit === "units" && value > 0);
+    assert.equal(await page.evaluate(() => window.waymark.selected), null, "it is not selected, too");
+    await page.fill("#measure-panel input", "none");
+    await page.click("#measure-panel form button");
+    assert.match(await page.innerText("#measure-panel"), /Expected a number/);
+    await page.fill("#measure-panel input", "2,5");
+    await page.click("#measure-panel form button");
+    await until(page, (w) => w.measured.unit === "m" && Math.abs(w.measured.value - 2.5) < 1e-9);
+    await page.waitForFunction(() => document.querySelector("#scale").textContent.endsWith(" m"));
+    await page.click("[data-control=scale]");
+    await page.waitForFunction(() => document.querySelector("#measure-panel").textContent.includes("Written to scaled.wmap"));
+    const asked = mock.requests.at(-1);
+    assert.deepEqual([asked.do, asked.metres, Object.keys(asked.a).length, Object.keys(asked.b).length], ["scale", 2.5, 1, 1]);
+    await picture(page, `${context.pictures}/${isPhone ? "phone" : "desktop"}_measure.png`);
+    const fits = await page.$eval("#measure-panel", (panel) => panel.scrollWidth <= panel.clientWidth && panel.getBoundingClientRect().left >= 0);
+    assert.ok(fits, "it is no wider than its place");
+    await page.keyboard.press("Escape");
+    assert.ok(await page.isHidden("#measure-panel"));
+    assert.deepEqual(page.problems, []);
+  }
+}
+
+/** Of maps in metres and of those that nobody may write. */
+async function measuresOnly(context) {
+  const metric = await serve(context, { world: "walk", skip: 700 });
+  await until(metric.page, isOpen);
+  metric.mock.hold();
+  await metric.page.click("#view-choice [data-value=orbit]");
+  await metric.page.waitForTimeout(1500);
+  await metric.page.keyboard.press("m");
+  assert.equal((await measureSomething(metric.page)).unit, "m");
+  assert.ok(await metric.page.isHidden("#measure-panel form"));
+  const free = await serve(context, { world: "map", skip: 700, isFree: true });
+  await until(free.page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  await free.page.waitForTimeout(1500);
+  await free.page.keyboard.press("m");
+  await measureSomething(free.page);
+  await free.page.fill("#measure-panel input", "4");
+  await free.page.keyboard.press("Enter");
+  const command = await free.page.innerText("#measure-panel code");
+  assert.match(command, /^waymark map align courtyard.wmap --distance L?\d+ L?\d+ 4 -o scaled.wmap$/);
+  assert.ok(!free.mock.requests.some((request) => request.do === "scale"));
+  assert.deepEqual([...metric.page.problems, ...free.page.problems], []);
+}
+
+/** A keyframe's image with its features, large on request; or why there is none. */
+async function showsKeyframeImages(context) {
+  for (const isPhone of [false, true]) {
+    const { page } = await serve(context, { world: "map", skip: 700 }, { isPhone });
+    await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+    await page.waitForTimeout(1500);
+    await pickSomething(page);
+    await page.waitForSelector("#inspector .link");
+    if ((await report(page)).selected.kind === "landmark") await page.click("#inspector .link");
+    await page.waitForSelector("#inspector .keyframe-image[data-shown]");
+    assert.match(await page.innerText("#inspector figcaption"), /^150 features see a landmark, 150 are free; 150 of all lie on edges$/);
+    const colours = await page.$eval("#inspector canvas", (canvas) => {
+      const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
+      return new Set(Array.from({ length: data.length / 400 }, (_, i) => data[400 * i])).size;
+    });
+    assert.ok(colours > 5, "there is a picture");
+    await picture(page, `${context.pictures}/${isPhone ? "phone" : "desktop"}_keyframe_image.png`);
+    const before = (await page.locator("#inspector").boundingBox()).width;
+    await page.click("#inspector .picture");
+    const large = await page.locator("#inspector").boundingBox();
+    assert.ok(isPhone ? large.width >= before : large.width > 1.5 * before);
+    const shown = await page.locator("#inspector canvas").boundingBox();
+    assert.ok(shown.width > 0.85 * large.width && Math.abs(shown.width / shown.height - 752 / 480) < 0.02, "as wide as high as it was taken");
+    assert.deepEqual(page.problems, []);
+  }
+  const { page } = await serve(context, { world: "map", skip: 700, images: "none" });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  await page.waitForTimeout(1500);
+  await pickSomething(page);
+  await page.waitForSelector("#inspector .link");
+  if ((await report(page)).selected.kind === "landmark") await page.click("#inspector .link");
+  await page.waitForFunction(() => document.querySelector("#inspector").textContent.includes("No image: its image was not kept"));
+  assert.deepEqual(page.problems, []);
+}
+
+/** Markers are squares with their numbers, which can be left out; maps without markers have no switch for them. */
+async function showsMarkersAndEdges(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 700 });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.markers === 4 && w.edgePoints > 100);
+  mock.hold();
+  await page.click("#view-choice [data-value=orbit]");
+  await picture(page, `${context.pictures}/desktop_markers.png`);
+  const calls = () => page.evaluate(() => window.waymark.performance.drawCalls);
+  const before = await calls();
+  await page.click("[data-layer=markers]");
+  await page.waitForTimeout(500);
+  assert.equal(await calls(), before - 2, "squares and signs are a draw call each");
+  const large = await serve(context, { world: "empty" });
+  await large.page.waitForFunction(() => document.querySelector("[data-layer=markers]").hidden);
+  const phone = await serve(context, { world: "map", skip: 700 }, { isPhone: true, isDark: true });
+  await until(phone.page, (w) => !w.isLoading && w.markers === 4);
+  await picture(phone.page, `${context.pictures}/phone_markers.png`);
+  assert.deepEqual([...page.problems, ...phone.page.problems], []);
+}
+
 /** Half a million landmarks and five thousand keyframes. Times are told, not judged: they depend on the machine. */
 async function drawsLargeMaps(context) {
   const { page } = await serve(context, { world: "large" }, { isDark: true, size: { width: 800, height: 500 } });
@@ -265,6 +387,6 @@ async function drawsLargeMaps(context) {
 
 export const mockCases = [
   growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
-  saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, followsItsWindow, followsItsScreen,
+  measuresAndScales, measuresOnly, showsKeyframeImages, showsMarkersAndEdges, saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, followsItsWindow, followsItsScreen,
   drawsLargeMaps,
 ];

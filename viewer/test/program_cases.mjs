@@ -1,7 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 import assert from "node:assert/strict";
-import { spawn } from "node:child_process";
+import { execFileSync, spawn } from "node:child_process";
 import { existsSync, mkdtempSync, rmSync } from "node:fs";
 import { createServer as createHttpServer } from "node:http";
 import { createServer } from "node:net";
@@ -156,5 +156,61 @@ async function outlivesARestart(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** A saved map of one camera: images of its keyframes, and a length that makes metres of it, which the program writes. */
+async function scalesASavedMap(context) {
+  const out = folder(context);
+  const [map, scaled] = [join(out, "mono.wmap"), join(out, "scaled.wmap")];
+  const port = await freePort();
+  const args = ["run", context.input, "--setup", "mono", "--viewer", String(port), "--pace", "0.15", "--keep-images", "-o", out, "--map-out", map];
+  const run = await start(context, port, ...args);
+  // At once: while the session draws, the page may be too slow for a mouse that waits for it to rest.
+  const press = (page, selector) => page.$eval(selector, (element) => element.click());
+  const size = { width: 820, height: 520 };
+  const live = await open(context.browser, `http://127.0.0.1:${port}/`, { size });
+  await until(live, (w) => w.connection === "open" && w.landmarks > 0 && w.keyframes > 1);
+  await press(live, "[data-control=pause]");
+  await until(live, (w) => w.session.phase === "paused");
+  await press(live, "#view-choice [data-value=orbit]");
+  await live.waitForTimeout(1500);
+  await showsAnImage(live);
+  await press(live, "[data-control=stop]");
+  await press(live, "[data-control=stop]");
+  assert.equal(await run.ended, 0, run.output());
+  await live.context().close();
+
+  const view = await freePort();
+  const program = await start(context, view, "view", map, "--port", String(view), "-o", scaled);
+  const page = await open(context.browser, `http://127.0.0.1:${view}/`, { size });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.landmarks > 0 && w.trajectory === w.keyframes);
+  await page.waitForTimeout(1500);
+  await showsAnImage(page);
+  await picture(page, `${context.pictures}/program_keyframe_image.png`);
+  await page.keyboard.press("Escape");
+  await page.keyboard.press("m");
+  const box = await page.locator("#scene").boundingBox();
+  for (let i = 0; i < 120 && !(await page.evaluate(() => window.waymark.measured)); ++i) {
+    await page.mouse.click(box.x + (0.35 + 0.3 * ((7 * i) % 11) / 11) * box.width, box.y + (0.35 + 0.3 * ((5 * i) % 13) / 13) * box.height);
+  }
+  assert.equal((await page.evaluate(() => window.waymark.measured)).unit, "units");
+  await page.fill("#measure-panel input", "3.5");
+  await page.keyboard.press("Enter");
+  await press(page, "[data-control=scale]");
+  await page.waitForFunction(() => document.querySelector("#measure-panel").textContent.includes("Written to"));
+  assert.ok(existsSync(scaled));
+  assert.equal(await program.end(), 0, program.output());
+  const info = execFileSync(context.waymark, ["map", "info", scaled], { encoding: "utf8" });
+  assert.match(info, /in metres/);
+  assert.deepEqual(page.problems, []);
+}
+
+/** Selects a keyframe and waits for its image. */
+async function showsAnImage(page) {
+  await pickSomething(page);
+  await page.waitForSelector("#inspector .link");
+  if ((await report(page)).selected.kind === "landmark") await page.click("#inspector .link");
+  await page.waitForSelector("#inspector .keyframe-image[data-shown]");
+  assert.match(await page.innerText("#inspector figcaption"), /^[1-9]\d* features see a landmark/);
+}
+
 /** Need the program (`context.waymark`) and a sequence for it (`context.input`). */
-export const programCases = [showsARun, refusesToBeFramed, outlivesARestart];
+export const programCases = [showsARun, refusesToBeFramed, outlivesARestart, scalesASavedMap];

@@ -77,6 +77,22 @@ describe("the worked examples of the document", () => {
   });
 });
 
+describe("the later kinds", () => {
+  it("markers", () => {
+    const m = decoded(Kind.Markers);
+    expect([[...m.id], [...m.corners], [...m.is_surveyed], [...m.submap]]).toEqual([[7], [0, 0, 2, 1, 0, 2, 1, 1, 2, 0, 1, 2], [1], [0]]);
+  });
+  it("points on edges", () => {
+    const m = decoded(Kind.EdgePoints);
+    expect([[...m.id], [...m.half]]).toEqual([[7], [0, 0.5, 0]]);
+  });
+  it("the image of a keyframe", () => {
+    const m = decoded(Kind.KeyframeImage);
+    expect([m.request, m.keyframe, m.width_px, m.height_px, ...m.pixel, ...m.state]).toEqual([6, 2, 640, 480, 100, 50, 1]);
+    expect([...m.jpeg]).toEqual([0xff, 0xd8, 0xff, 0xd9]);
+  });
+});
+
 describe("anything else", () => {
   it("ignores kinds it does not know", () => {
     expect(decode(Uint8Array.from([99, 1, 0, 0, 0, 0, 0, 0]).buffer)).toBeNull();

@@ -67,6 +67,24 @@ describe("landmarks", () => {
   });
 });
 
+describe("points on edges", () => {
+  it("are landmarks until they go or become points again", () => {
+    const store = new Store();
+    store.apply(landmarks([3, 9]));
+    const edges = (id: number[], half: number[]) => store.apply({ kind: Kind.EdgePoints, id: Uint32Array.from(id), half: Float32Array.from(half) });
+    edges([3, 9, 77], [0, 1, 0, 0, 0, 2, 5, 5, 5]);
+    expect(store.landmarks.numEdges).toBe(2);
+    edges([9], [0, 0, 0]);
+    expect([store.landmarks.isOnEdge(0), store.landmarks.isOnEdge(1), store.landmarks.numEdges]).toEqual([true, false, 1]);
+    store.apply({ kind: Kind.LandmarksErased, id: Uint32Array.of(3) });
+    store.apply(landmarks([4]));
+    expect([store.landmarks.slots.find(4), store.landmarks.isOnEdge(0), store.landmarks.numEdges]).toEqual([0, false, 0]);
+    store.apply(landmarks(Array.from({ length: 9000 }, (_, i) => 100 + i)));
+    edges([9099], [1, 0, 0]);
+    expect(store.landmarks.isOnEdge(store.landmarks.slots.find(9099))).toBe(true);
+  });
+});
+
 describe("trajectory", () => {
   it("keeps frames in order, whenever their pose comes", () => {
     const { trajectory: table } = Object.assign(new Store());

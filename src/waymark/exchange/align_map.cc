@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <cmath>
+#include <string_view>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -14,20 +15,26 @@ namespace waymark {
 namespace {
 
 constexpr std::int64_t kMaxAlignDifferenceNs = 20'000'000;
-constexpr double kMaxKnownDistanceM = 1e6;  // Of keyframes whose distance is known.
+constexpr double kMaxKnownDistanceM = 1e6;  // Of places whose distance is known.
 constexpr double kMaxAlignFactor = 1e6;
 constexpr double kMaxAlignPositionM = 1e9;  // Of poses of a trajectory: on Earth, in any frame.
 
-SubmapId submap_of_keyframe(const Map& map, KeyframeId id, const std::string& where) {
-  const Keyframe* keyframe = map.keyframes().find(id);
-  if (!keyframe) {
-    throw InputError(where,
-                     fmt::format("names keyframe {}, which is not there, expected the id of one "
-                                 "of the map's {}",
-                                 id.value,
-                                 map.keyframes().size()));
-  }
-  return keyframe->submap;
+template <class Table, class Id>
+SubmapId submap_in(const Table& table, Id id, std::string_view name, const std::string& where) {
+  const auto* element = table.find(id);
+  if (element) return element->submap;
+  throw InputError(where,
+                   fmt::format("names {} {}, which is not there, expected the id of one of the "
+                               "map's {}",
+                               name,
+                               id.value,
+                               table.size()));
+}
+
+SubmapId submap_of_place(const Map& map, const MapPlace& place, const std::string& where) {
+  const auto* keyframe = std::get_if<KeyframeId>(&place);
+  if (keyframe) return submap_in(map.keyframes(), *keyframe, "keyframe", where);
+  return submap_in(map.landmarks(), std::get<LandmarkId>(place), "landmark", where);
 }
 
 /// Beyond this the numbers of maps, or their meaning, would suffer.
@@ -46,12 +53,12 @@ SubmapId submap_of_distances(const Map& map,
                              const std::string& where) {
   std::optional<SubmapId> submap;
   for (const KnownDistance& known : distances) {
-    for (const KeyframeId id : {known.a, known.b}) {
-      if (submap.value_or(submap_of_keyframe(map, id, where)) !=
-          submap_of_keyframe(map, id, where)) {
-        throw InputError(where, "names keyframes of several sub-maps, expected one sub-map");
+    for (const MapPlace& place : {known.a, known.b}) {
+      const SubmapId of_place = submap_of_place(map, place, where);
+      if (submap.value_or(of_place) != of_place) {
+        throw InputError(where, "names places of several sub-maps, expected one sub-map");
       }
-      submap = submap_of_keyframe(map, id, where);
+      submap = of_place;
     }
     if (!(known.metres > 0.0 && known.metres <= kMaxKnownDistanceM)) {
       throw InputError(where,
@@ -95,7 +102,7 @@ AlignedMap align_to_distances(const Map& map,
                                  submap.value));
   }
   const std::optional<double> factor = scale_by_distances(map, distances);
-  if (!factor) throw InputError(where, "is between keyframes at the same place, expected two");
+  if (!factor) throw InputError(where, "is between two at the same place, expected some distance");
   check_factor(where, *factor);
   const Sim3 scale{Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor};
   return {put_into_metres(Map::thaw(map), submap, scale),

@@ -20,9 +20,9 @@ struct AlignedMap {
   std::vector<std::string> report;
 };
 
-/// Scales the sub-map of some keyframes, whose scale must be free, by how far apart they are.
-/// InputError, which names `where`, for keyframes that are not there or not of one sub-map and for
-/// distances or factors beyond what is possible (1 000 km; 1e-6 to 1e6).
+/// Scales the sub-map of some keyframes or landmarks, whose scale must be free, by how far apart
+/// they are. InputError, which names `where`, for those that are not there or not of one sub-map
+/// and for distances or factors beyond what is possible (1 000 km; 1e-6 to 1e6).
 AlignedMap align_to_distances(const Map& map,
                               std::span<const KnownDistance> distances,
                               const std::string& where);

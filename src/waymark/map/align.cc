@@ -53,13 +53,21 @@ Eigen::Vector3d camera_position(const Keyframe& keyframe) {
   return (keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world).origin_in_source();
 }
 
+namespace {
+
+Eigen::Vector3d position_of(const Map& map, const MapPlace& place) {
+  const auto* keyframe = std::get_if<KeyframeId>(&place);
+  if (keyframe) return camera_position(map.keyframes().at(*keyframe));
+  return map.landmarks().at(std::get<LandmarkId>(place)).position_in_world;
+}
+
+}  // namespace
+
 std::optional<double> scale_by_distances(const Map& map, std::span<const KnownDistance> known) {
   double sum = 0.0;
   double sum_squares = 0.0;
   for (const KnownDistance& distance : known) {
-    const double length = (camera_position(map.keyframes().at(distance.a)) -
-                           camera_position(map.keyframes().at(distance.b)))
-                              .norm();
+    const double length = (position_of(map, distance.a) - position_of(map, distance.b)).norm();
     sum += distance.metres * length;
     sum_squares += length * length;
   }

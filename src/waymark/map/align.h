@@ -6,6 +6,7 @@
 #include <optional>
 #include <span>
 #include <utility>
+#include <variant>
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
@@ -30,15 +31,18 @@ Map put_into_metres(Map map, SubmapId submap, const Sim3& new_from_old);
 /// Where camera 0 of a keyframe is, in the world.
 Eigen::Vector3d camera_position(const Keyframe& keyframe);
 
-/// How far apart camera 0 of two keyframes really is.
+/// A place in the map: camera 0 of a keyframe, or a landmark.
+using MapPlace = std::variant<KeyframeId, LandmarkId>;
+
+/// How far apart two places really are.
 struct KnownDistance {
-  KeyframeId a;
-  KeyframeId b;
+  MapPlace a;
+  MapPlace b;
   double metres;
 };
 
 /// Metres per unit of the map, such that the squared errors in metres are least in sum. Nothing if
-/// all are where the map has no distance.
+/// all are where the map has no distance. The places must be there.
 std::optional<double> scale_by_distances(const Map& map, std::span<const KnownDistance> known);
 
 /// The shortest turn after which a direction is +z.

@@ -48,15 +48,19 @@ void ImageKeeper::forget_others() {
   num_at_last_check_ = images_.size();
 }
 
+SharedJpeg ImageKeeper::image_of(KeyframeId id, const Keyframe& keyframe) const {
+  if (id < first_new_) {
+    const auto image = earlier_.find(id);
+    return image == earlier_.end() ? nullptr : image->second;
+  }
+  const auto image = images_.find(keyframe.timestamp_ns);
+  return image == images_.end() ? nullptr : image->second;
+}
+
 KeyframeImages ImageKeeper::images_of(const Map& map) const {
   KeyframeImages result;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (id < first_new_) {
-      const auto image = earlier_.find(id);
-      if (image != earlier_.end()) result.insert(*image);
-    } else if (const auto image = images_.find(keyframe.timestamp_ns); image != images_.end()) {
-      result.emplace(id, image->second);
-    }
+    if (SharedJpeg image = image_of(id, keyframe)) result.emplace(id, std::move(image));
   });
   return result;
 }

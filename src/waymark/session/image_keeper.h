@@ -30,6 +30,9 @@ class ImageKeeper : public Input {
   /// From now on there are no earlier sessions: the map was emptied.
   void begin_anew();
 
+  /// That of a keyframe of this session; null where it was not kept.
+  SharedJpeg image_of(KeyframeId id, const Keyframe& keyframe) const;
+
   /// Images of the keyframes of a map of this session.
   KeyframeImages images_of(const Map& map) const;
 

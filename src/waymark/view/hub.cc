@@ -30,6 +30,7 @@ void merge(ViewUpdate later, ViewUpdate& update) {
   std::move(later.colors.begin(), later.colors.end(), std::back_inserter(update.colors));
   if (later.image) update.image = std::move(later.image);
   update.status = later.status;
+  if (!later.keyframe_images.empty()) update.keyframe_images = std::move(later.keyframe_images);
 }
 
 constexpr int kMaxWidth = 640;
@@ -56,18 +57,18 @@ void Outbox::add(const Message& message) {
   status_.reset();  // It tells of what will not be sent.
 }
 
-bool Outbox::add_answer(Message text) {
-  num_answer_bytes_ += text->size();
-  answers_.push_back(std::move(text));
+bool Outbox::add_answer(Outgoing answer) {
+  num_answer_bytes_ += answer.message->size();
+  answers_.push_back(std::move(answer));
   return num_answer_bytes_ <= max_bytes_;
 }
 
 std::optional<Outbox::Outgoing> Outbox::take() {
   if (!answers_.empty()) {
-    Message answer = std::move(answers_.front());
+    Outgoing answer = std::move(answers_.front());
     answers_.pop_front();
-    num_answer_bytes_ -= answer->size();
-    return Outgoing{std::move(answer), true};
+    num_answer_bytes_ -= answer.message->size();
+    return answer;
   }
   if (!scene_.empty()) {
     Message message = std::move(scene_.front());
@@ -120,6 +121,7 @@ bool ViewHub::take_updates() {
     }
   }
   if (update->is_reset) image_.reset();
+  if (!update->keyframe_images.empty()) keyframe_images_ = std::move(update->keyframe_images);
   if (update->image) {
     image_ = std::move(update->image);
     last_frame_.reset();
@@ -130,8 +132,12 @@ bool ViewHub::take_updates() {
 
 void ViewHub::take_replies() {
   while (const std::optional<ViewReply> reply = channel_.replies.try_pop()) {
-    answer(reply->request.client,
-           text(format_reply(reply->request.number, reply->error, reply->path)));
+    const ViewRequest& request = reply->request;
+    if (request.kind == ViewRequest::Kind::kImage) {
+      send_image(request, reply->jpeg);
+    } else {
+      answer(request.client, {text(format_reply(request.number, reply->error, reply->path)), true});
+    }
   }
 }
 
@@ -183,10 +189,10 @@ void ViewHub::receive(std::uint64_t number, std::string_view message, Clock::tim
   }
   const ClientRequest request = parse_request(message);
   if (const auto* rate = std::get_if<SetRate>(&request.content)) client.max_rate_hz = rate->hz;
-  if (Message reply = answer_to(number, request)) answer(number, std::move(reply));
+  if (Message reply = answer_to(number, request)) answer(number, {std::move(reply), true});
 }
 
-void ViewHub::answer(std::uint64_t number, Message message) {
+void ViewHub::answer(std::uint64_t number, Outbox::Outgoing message) {
   const auto found = clients_.find(number);
   if (found == clients_.end()) return;
   const std::shared_ptr<ViewClient> client = found->second;
@@ -208,24 +214,57 @@ Message ViewHub::answer_to(std::uint64_t number, const ClientRequest& request) {
     return text(format_landmark(scene_.map(), *id, *request.number));
   }
   if (const auto* kind = std::get_if<ViewRequest::Kind>(&request.content)) {
-    return pass_on(number, request, *kind);
+    return pass_on({*kind, number, *request.number});
+  }
+  if (const auto* image = std::get_if<GetImage>(&request.content)) {
+    return get_image({ViewRequest::Kind::kImage, number, *request.number, image->keyframe});
+  }
+  if (const auto* distance = std::get_if<KnownDistance>(&request.content)) {
+    return pass_on({ViewRequest::Kind::kScale, number, *request.number, {}, *distance});
   }
   return text(format_reply(request.number, ""));
 }
 
-Message ViewHub::pass_on(std::uint64_t number,
-                         const ClientRequest& request,
-                         ViewRequest::Kind kind) {
-  const bool is_save = kind == ViewRequest::Kind::kSave;
-  if (!info_.is_live) return text(format_reply(request.number, "this is a saved map"));
+Message ViewHub::get_image(ViewRequest request) {
+  if (!info_.keeps_images) {
+    return text(format_reply(request.number, "images are not kept, expected --keep-images"));
+  }
+  if (info_.is_live) return pass_on(std::move(request));
+  const auto found = keyframe_images_.find(request.keyframe);
+  send_image(request, found == keyframe_images_.end() ? nullptr : found->second);
+  return nullptr;
+}
+
+void ViewHub::send_image(const ViewRequest& request, const SharedJpeg& jpeg) {
+  const auto client = clients_.find(request.client);
+  if (client == clients_.end()) return;
+  const Keyframe* keyframe = scene_.map().keyframes().find(request.keyframe);
+  if (!keyframe || !jpeg) {
+    const char* error = keyframe ? "its image was not kept" : "no such keyframe";
+    answer(request.client, {text(format_reply(request.number, error)), true});
+  } else if (!client->second->outbox.has_room_for(jpeg->size())) {
+    answer(request.client, {text(format_reply(request.number, "too many images wait")), true});
+  } else {
+    answer(request.client,
+           {encode_keyframe_image(*keyframe, request.keyframe, request.number, *jpeg), false});
+  }
+}
+
+Message ViewHub::pass_on(ViewRequest request) {
+  const bool is_save = request.kind == ViewRequest::Kind::kSave;
+  const bool is_scale = request.kind == ViewRequest::Kind::kScale;
+  if (is_scale && !info_.can_scale) {
+    return text(format_reply(request.number, "no file was named, expected waymark view MAP -o"));
+  }
+  if (!info_.is_live && !is_scale) return text(format_reply(request.number, "this is a saved map"));
   if (is_save && !info_.can_save) {
     return text(format_reply(request.number, "no file was named, expected --map-out"));
   }
-  ViewRequest passed{kind, number, *request.number};
-  if (!channel_.requests.try_push(passed)) {
+  if (!channel_.requests.try_push(request)) {
     return text(format_reply(request.number, "too many requests wait"));
   }
-  return is_save ? nullptr : text(format_reply(request.number, ""));
+  const bool is_answered_later = is_save || is_scale || request.kind == ViewRequest::Kind::kImage;
+  return is_answered_later ? nullptr : text(format_reply(request.number, ""));
 }
 
 bool ViewHub::is_idle() const {

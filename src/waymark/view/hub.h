@@ -49,7 +49,12 @@ class Outbox {
   /// A difference.
   void add(const Message& message);
   /// False if too many answers wait: whoever asks and never reads is not served.
-  bool add_answer(Message text);
+  bool add_answer(Message text) { return add_answer(Outgoing{std::move(text), true}); }
+  bool add_answer(Outgoing answer);
+  /// Whether an answer of so many bytes may wait, too.
+  bool has_room_for(std::size_t num_bytes) const {
+    return num_answer_bytes_ + num_bytes <= max_bytes_;
+  }
   /// Only the newest is kept.
   void set_status(Message text) { status_ = std::move(text); }
   /// Only the newest is kept.
@@ -65,7 +70,7 @@ class Outbox {
 
  private:
   std::size_t max_bytes_;
-  std::deque<Message> answers_;
+  std::deque<Outgoing> answers_;
   std::size_t num_answer_bytes_ = 0;
   std::deque<Message> scene_;
   std::size_t num_snapshot_messages_ = 0;  ///< The first of scene_.
@@ -127,9 +132,12 @@ class ViewHub {
   void send_frames(Clock::time_point now);
   /// The message of image_.
   Message last_frame();
-  void answer(std::uint64_t number, Message message);
+  void answer(std::uint64_t number, Outbox::Outgoing message);
   Message answer_to(std::uint64_t number, const ClientRequest& request);
-  Message pass_on(std::uint64_t number, const ClientRequest& request, ViewRequest::Kind kind);
+  Message pass_on(ViewRequest request);
+  Message get_image(ViewRequest request);
+  /// Answers with an image; null: there is none.
+  void send_image(const ViewRequest& request, const SharedJpeg& jpeg);
 
   ViewChannel& channel_;
   const SessionInfo info_;
@@ -140,6 +148,7 @@ class ViewHub {
   std::uint64_t next_client_ = 1;
   std::vector<Message> snapshot_;            ///< Of now, once somebody needed it.
   std::shared_ptr<const DrawnFrame> image_;  ///< The newest; null if none.
+  KeyframeImages keyframe_images_;           ///< Of a saved map.
   bool is_frame_new_ = false;                ///< Whether clients have to be told of it.
   Message last_frame_;                       ///< Of it, once somebody needed it.
   Clock::time_point last_status_;

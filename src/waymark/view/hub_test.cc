@@ -7,51 +7,11 @@
 #include <nlohmann/json.hpp>
 
 #include "waymark/map/testing/random_map.h"
+#include "waymark/view/test_hub_clients.h"
 #include "waymark/view/test_messages.h"
 
 namespace waymark {
 namespace {
-
-using nlohmann::json;
-
-/// Has everything sent at once.
-class Reader : public ViewClient {
- public:
-  void send() override {
-    while (const auto outgoing = outbox.take()) {
-      (outgoing->is_text ? texts : messages).push_back(outgoing->message);
-    }
-  }
-  void close() override { is_closed = true; }
-
-  std::size_t count(MessageKind kind) const {
-    std::size_t num_found = 0;
-    for (const Message& message : messages)
-      num_found += MessageReader(*message).kind == static_cast<std::uint8_t>(kind);
-    return num_found;
-  }
-
-  /// The texts of a type.
-  std::vector<json> of_type(const std::string& type) const {
-    std::vector<json> found;
-    for (const Message& message : texts) {
-      if (json object = json::parse(*message); object["type"] == type) found.push_back(object);
-    }
-    return found;
-  }
-
-  std::vector<Message> messages;
-  std::vector<Message> texts;
-  bool is_closed = false;
-};
-
-/// Never takes anything.
-class Sleeper : public ViewClient {
- public:
-  void send() override {}
-  void close() override { is_closed = true; }
-  bool is_closed = false;
-};
 
 ViewUpdate frame_update(std::uint32_t frame) {
   DrawnFrame image;
@@ -312,7 +272,7 @@ TEST_F(Hub, ForgetsWhoLeft) {
   EXPECT_TRUE(hub_.is_idle());
 }
 
-TEST(SavedMapHub, TakesNoOrders) {
+TEST(ClosedMapHub, TakesNoOrders) {
   ViewChannel channel;
   SessionInfo info;
   info.is_live = false;
@@ -322,6 +282,11 @@ TEST(SavedMapHub, TakesNoOrders) {
   EXPECT_TRUE(reader->of_type("hello")[0]["controls"].empty());
   hub.receive(number, R"({"request": 1, "do": "stop"})", ViewHub::Clock::now());
   EXPECT_EQ(reader->of_type("reply")[0]["ok"], false);
+  hub.receive(
+      number,
+      R"({"request": 1, "do": "scale", "a": {"keyframe": 1}, "b": {"keyframe": 2}, "metres": 3})",
+      ViewHub::Clock::now());
+  EXPECT_EQ(reader->of_type("reply")[1]["ok"], false);
   EXPECT_FALSE(channel.requests.try_pop());
 }
 

@@ -115,6 +115,28 @@ Content read_rate(const json& object) {
   return SetRate{value};
 }
 
+/// {"keyframe": 7} or {"landmark": 7}.
+std::optional<MapPlace> read_place(const json& object, const char* key) {
+  const auto found = object.find(key);
+  if (found == object.end() || !found->is_object() || found->size() != 1) return std::nullopt;
+  const auto keyframe = read_number(*found, "keyframe", UINT32_MAX);
+  if (keyframe) return KeyframeId{static_cast<std::uint32_t>(*keyframe)};
+  const auto landmark = read_number(*found, "landmark", UINT32_MAX);
+  if (landmark) return LandmarkId{static_cast<std::uint32_t>(*landmark)};
+  return std::nullopt;
+}
+
+Content read_distance(const json& object) {
+  const auto a = read_place(object, "a");
+  const auto b = read_place(object, "b");
+  if (!a || !b) return std::string("a, b: expected {\"keyframe\": ID} or {\"landmark\": ID}");
+  const auto metres = object.find("metres");
+  if (metres == object.end() || !metres->is_number()) {
+    return std::string("metres: expected a number");
+  }
+  return KnownDistance{*a, *b, metres->get<double>()};
+}
+
 Content read_content(const json& object) {
   const auto found = object.find("do");
   if (found == object.end() || !found->is_string()) return std::string("do: expected a string");
@@ -128,6 +150,12 @@ Content read_content(const json& object) {
   if (name == "keyframe") return read_id<KeyframeId>(object);
   if (name == "landmark") return read_id<LandmarkId>(object);
   if (name == "rate") return read_rate(object);
+  if (name == "scale") return read_distance(object);
+  if (name == "image") {
+    const Content id = read_id<KeyframeId>(object);
+    const auto* keyframe = std::get_if<KeyframeId>(&id);
+    return keyframe ? Content(GetImage{*keyframe}) : id;
+  }
   return std::string("do: not known");
 }
 
@@ -172,6 +200,7 @@ std::string format_hello(const SessionInfo& info) {
   json controls = json::array();
   if (info.is_live) controls = {"pause", "resume", "reset", "mapping", "stop"};
   if (info.can_save) controls.push_back("save");
+  if (info.can_scale) controls.push_back("scale");
   json stages = json::array();
   for (const char* name : kStageNames) stages.push_back(name);
   return dump({{"type", "hello"},
@@ -182,6 +211,7 @@ std::string format_hello(const SessionInfo& info) {
                {"setup", info.setup},
                {"timing", info.timing},
                {"controls", controls},
+               {"keyframe_images", info.keeps_images},
                {"stages", stages},
                {"states", names<FrameState>(kNumStates)},
                {"reasons", names<FrameReason>(kNumReasons)}});
@@ -261,6 +291,34 @@ std::string format_keyframe(const Map& map, KeyframeId id, std::uint64_t number)
                {"camera", describe_camera(*keyframe->rig)},
                {"covisible", covisible},
                {"landmarks", landmarks}});
+}
+
+Message encode_keyframe_image(const Keyframe& keyframe,
+                              KeyframeId id,
+                              std::uint64_t number,
+                              std::string_view jpeg) {
+  const Features& features = *keyframe.features;
+  const Camera& camera = *keyframe.rig->cameras.at(0).camera;
+  const auto num_features = static_cast<std::uint32_t>(features.num_primary);
+  MessageWriter writer(MessageKind::kKeyframeImage, num_features);
+  writer.add(static_cast<std::uint32_t>(number));
+  writer.add(static_cast<std::uint32_t>(number >> 32));
+  writer.add(id.value);
+  writer.add(static_cast<std::uint32_t>(camera.width_px()));
+  writer.add(static_cast<std::uint32_t>(camera.height_px()));
+  writer.add(static_cast<std::uint32_t>(jpeg.size()));
+  for (std::size_t i = 0; i < num_features; ++i) {
+    writer.add(features.keypoints[i].x_px);
+    writer.add(features.keypoints[i].y_px);
+  }
+  for (std::size_t i = 0; i < num_features; ++i) {
+    const bool sees = i < keyframe.landmarks.size() && keyframe.landmarks[i].is_valid();
+    const bool is_on_edge = i >= features.num_corners();
+    writer.add(static_cast<std::uint8_t>(sees + 2 * is_on_edge));
+  }
+  writer.pad_to(4);
+  writer.add_bytes(jpeg);
+  return writer.finish();
 }
 
 std::string format_landmark(const Map& map, LandmarkId id, std::uint64_t number) {

@@ -34,6 +34,9 @@ enum class MessageKind : std::uint8_t {
   kTrajectory = 12,
   kFrame = 13,
   kSubmaps = 14,
+  kMarkers = 15,
+  kEdgePoints = 16,
+  kKeyframeImage = 17,
 };
 
 inline constexpr std::uint8_t kProtocolVersion = 1;
@@ -104,15 +107,33 @@ std::string format_reply(std::optional<std::uint64_t> number,
 std::string format_keyframe(const Map& map, KeyframeId id, std::uint64_t number);
 std::string format_landmark(const Map& map, LandmarkId id, std::uint64_t number);
 
+/// The `keyframe image` message, an answer to a request: the JPEG file with the keyframe's features
+/// in camera 0.
+Message encode_keyframe_image(const Keyframe& keyframe,
+                              KeyframeId id,
+                              std::uint64_t number,
+                              std::string_view jpeg);
+
 struct SetRate {
   double hz = 0.0;
+};
+
+struct GetImage {
+  KeyframeId keyframe;
 };
 
 /// What a client wants.
 struct ClientRequest {
   std::optional<std::uint64_t> number;  ///< Nothing where it could not be read.
   /// The string says what is wrong, an id whose data are wanted.
-  std::variant<std::string, ViewRequest::Kind, KeyframeId, LandmarkId, SetRate> content;
+  std::variant<std::string,
+               ViewRequest::Kind,
+               KeyframeId,
+               LandmarkId,
+               SetRate,
+               GetImage,
+               KnownDistance>
+      content;
 };
 
 /// Reads what a client sent, whatever it is.

@@ -39,10 +39,10 @@ std::map<int, std::string> documented_examples() {
 
 TEST(Protocol, TheDocumentedExamplesAreMessages) {
   const std::map<int, std::string> examples = documented_examples();
-  ASSERT_EQ(examples.size(), 14u);
+  ASSERT_EQ(examples.size(), 17u);
   Page page;
   for (const auto& [kind, bytes] : examples) {
-    if (kind == 13) continue;
+    if (kind == 13 || kind == 17) continue;
     if (kind == 4) page.landmarks[7].resize(10);
     if (kind == 8) page.keyframes[2].resize(13);
     page.apply(std::make_shared<const std::string>(bytes));
@@ -64,6 +64,25 @@ TEST(Protocol, AFrameIsWhatTheDocumentSays) {
   frame.features = features;
   frame.landmarks = {LandmarkId{3}};
   EXPECT_EQ(*encode_frame(frame, 1'000'000'000), documented_examples().at(13));
+}
+
+TEST(Protocol, AnImageOfAKeyframeIsWhatTheDocumentSays) {
+  auto features = std::make_shared<Features>();
+  features->num_primary = 1;
+  features->keypoints.push_back({.x_px = 100.0f, .y_px = 50.0f});
+  CameraChain chain;
+  chain.cameras.emplace_back();
+  CameraDescription& camera = chain.cameras[0].description;
+  camera.camera_model = "pinhole";
+  camera.intrinsics = {300.0, 300.0, 320.0, 240.0};
+  camera.width_px = 640;
+  camera.height_px = 480;
+  Keyframe keyframe;
+  keyframe.rig = std::make_shared<const Rig>(make_rig(chain));
+  keyframe.features = features;
+  keyframe.landmarks = {LandmarkId{3}};
+  EXPECT_EQ(*encode_keyframe_image(keyframe, KeyframeId{2}, 6, "\xff\xd8\xff\xd9"),
+            documented_examples().at(17));
 }
 
 TEST(Protocol, PreviewsAreSmallJpegFiles) {
@@ -91,6 +110,22 @@ TEST(Protocol, ReadsRequests) {
   EXPECT_EQ(
       std::get<SetRate>(parse_request(R"({"request": 1, "do": "rate", "hz": 2.5})").content).hz,
       2.5);
+}
+
+TEST(Protocol, ReadsADistanceOfAnyTwoPlaces) {
+  const ClientRequest scale = parse_request(
+      R"({"request": 1, "do": "scale", "a": {"keyframe": 3}, "b": {"landmark": 9}, "metres": 2.5})");
+  const auto& distance = std::get<KnownDistance>(scale.content);
+  EXPECT_EQ(std::get<KeyframeId>(distance.a), KeyframeId{3});
+  EXPECT_EQ(std::get<LandmarkId>(distance.b), LandmarkId{9});
+  EXPECT_EQ(distance.metres, 2.5);
+  for (const char* more : {R"("a": {"keyframe": 3})",
+                           R"("a": 3, "b": 4, "metres": 1)",
+                           R"("a": {"keyframe": -3}, "b": {"keyframe": 4}, "metres": 1)",
+                           R"("a": {"keyframe": 3}, "b": {"keyframe": 4}, "metres": "1")"}) {
+    const auto text = std::string(R"({"request": 1, "do": "scale", )") + more + "}";
+    EXPECT_TRUE(std::holds_alternative<std::string>(parse_request(text).content)) << text;
+  }
 }
 
 TEST(Protocol, NamesWhatIsWrongWithARequest) {

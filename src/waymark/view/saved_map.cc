@@ -54,6 +54,7 @@ ViewUpdate show_saved_map(const StoredMap& stored) {
   update.map = stored.map;
   update.frames = note_keyframes(*stored.map);
   update.colors = sample_images(stored);
+  update.keyframe_images = stored.images;
   SessionStatus& status = update.status;
   status.phase = SessionPhase::kMap;
   status.is_mapping = false;

@@ -8,7 +8,7 @@
 namespace waymark {
 
 /// What a viewer is told of a map without a session: its keyframes stand for the trajectory, and
-/// its images give the landmarks their colours.
+/// its images give the landmarks their colours and are there to be seen.
 ViewUpdate show_saved_map(const StoredMap& stored);
 
 }  // namespace waymark

@@ -12,6 +12,8 @@ namespace {
 
 /// A frame may become a keyframe long after it came: the first one of a monocular start.
 constexpr std::uint32_t kMaxFrames = 1000;
+/// Of the piece of an edge that is drawn, in pixels of the image that it was seen in.
+constexpr double kHalfEdgePx = 5.0;
 
 bool is_same_place(const Landmark& a, const Landmark& b) {
   return a.position_in_world.cast<float>() == b.position_in_world.cast<float>();
@@ -26,6 +28,13 @@ Message encode_positions(const Map& map, std::span<const LandmarkId> ids) {
   MessageWriter writer(MessageKind::kLandmarkPositions, ids.size());
   for (const LandmarkId id : ids) writer.add(id.value);
   for (const LandmarkId id : ids) writer.add(map.landmarks().at(id).position_in_world);
+  return writer.finish();
+}
+
+Message encode_edges(const Map& map, std::span<const LandmarkId> ids) {
+  MessageWriter writer(MessageKind::kEdgePoints, ids.size());
+  for (const LandmarkId id : ids) writer.add(id.value);
+  for (const LandmarkId id : ids) writer.add(half_of_edge(map.landmarks().at(id)));
   return writer.finish();
 }
 
@@ -58,6 +67,15 @@ bool moves_frames(const Keyframe& before, const Keyframe& after) {
 }
 
 }  // namespace
+
+Eigen::Vector3d half_of_edge(const Landmark& landmark) {
+  const Appearance& appearance = landmark.appearance;
+  // Along the edge as its observers see it: its direction in depth was not measured.
+  const Eigen::Vector3d along = appearance.direction.cross(appearance.across);
+  const double length = along.norm();
+  if (!(length > 0.0)) return Eigen::Vector3d::Zero();
+  return kHalfEdgePx * appearance.size_m / length * along;
+}
 
 void LandmarkLayer::add_colors(FeatureColors colors) {
   const std::uint32_t frame = colors.frame.value;
@@ -102,6 +120,14 @@ void LandmarkLayer::differences(const Map& before,
       erased, messages, [&](auto ids) { return encode_ids(MessageKind::kLandmarksErased, ids); });
   add_chunks(changed, messages, [&](auto ids) { return encode(after, ids); });
   add_chunks(moved, messages, [&](auto ids) { return encode_positions(after, ids); });
+  std::vector<LandmarkId> turned;
+  after.landmarks().for_each_difference(
+      before.landmarks(), [&](LandmarkId id, const Landmark* old, const Landmark* now) {
+        if (now && half_of_edge(*now) != (old ? half_of_edge(*old) : Eigen::Vector3d::Zero())) {
+          turned.push_back(id);
+        }
+      });
+  add_chunks(turned, messages, [&](auto ids) { return encode_edges(after, ids); });
 }
 
 void LandmarkLayer::snapshot(const Map& map, std::vector<Message>& messages) const {
@@ -109,6 +135,8 @@ void LandmarkLayer::snapshot(const Map& map, std::vector<Message>& messages) con
   all.reserve(map.landmarks().size());
   map.landmarks().for_each([&](LandmarkId id, const Landmark&) { all.push_back(id); });
   add_chunks(all, messages, [&](auto ids) { return encode(map, ids); });
+  std::erase_if(all, [&](LandmarkId id) { return half_of_edge(map.landmarks().at(id)).isZero(0); });
+  add_chunks(all, messages, [&](auto ids) { return encode_edges(map, ids); });
 }
 
 Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) const {
@@ -236,6 +264,7 @@ std::vector<Message> Scene::advance(ViewUpdate& update, bool is_watched) {
   if (map_ == before) return messages;
   keyframes_.differences(*before, *map_, start_ns(), messages);
   landmarks_.differences(*before, *map_, messages);
+  markers_.differences(*map_, messages);
   return messages;
 }
 
@@ -251,6 +280,7 @@ std::vector<Message> Scene::snapshot() {
   keyframes_.snapshot(*map_, start_ns(), messages);
   trajectory_.snapshot(*map_, messages);
   landmarks_.snapshot(*map_, messages);
+  markers_.snapshot(*map_, messages);
   MessageWriter end(MessageKind::kEnd, 0);
   end.add(generation_);
   messages.push_back(end.finish());

@@ -86,6 +86,20 @@ class LandmarkLayer {
   std::unordered_map<std::uint32_t, Rgb> colors_;  ///< By living landmark; only looked up.
 };
 
+/// Tells of the markers of a map: all of them, whenever one is another than before.
+class MarkerLayer {
+ public:
+  void differences(const Map& map, std::vector<Message>& messages);
+  void snapshot(const Map& map, std::vector<Message>& messages);
+
+ private:
+  Message told_;  ///< Null: none were ever told.
+};
+
+/// Half of the piece of its edge that a landmark is drawn as: from its place to either end, in the
+/// world; zero for a landmark that is no point on an edge.
+Eigen::Vector3d half_of_edge(const Landmark& landmark);
+
 /// Tells of the frames of a session: their poses, which move with the map, and what became of them.
 class TrajectoryLayer {
  public:
@@ -131,6 +145,7 @@ class Scene {
   std::shared_ptr<const Map> map_ = std::make_shared<const Map>();
   LandmarkLayer landmarks_;
   KeyframeLayer keyframes_;
+  MarkerLayer markers_;
   TrajectoryLayer trajectory_;
   std::uint32_t generation_ = 0;
 };

@@ -57,7 +57,7 @@ class ChangingSession {
     const KeyframeId keyframe = pick(keyframes);
     const Keyframe& chosen = map_.keyframes().at(keyframe);
     const Eigen::Vector3d point(rng_.normal(), rng_.normal(), rng_.normal());
-    switch (rng_.below(8)) {
+    switch (rng_.below(10)) {
       case 0:
         map_.move_keyframe(keyframe, Rigid3(chosen.rig_from_world.rotation, point));
         break;
@@ -81,9 +81,33 @@ class ChangingSession {
         map_.add_keyframe(std::move(added));
         break;
       }
+      case 6: {
+        const LandmarkId landmark = pick(landmarks);
+        Appearance appearance = map_.landmarks().at(landmark).appearance;
+        appearance.across = rng_.below(3) == 0 ? Eigen::Vector3d::Zero() : point.normalized();
+        map_.set_appearance(landmark, appearance);
+        break;
+      }
+      case 7:
+        if (chosen.parent.is_valid()) hang(static_cast<int>(rng_.below(5)), keyframe);
+        break;
       default:
         observe(keyframe, point);
     }
+  }
+
+  /// A marker before a keyframe, in place of another one of this number.
+  void hang(int id, KeyframeId keyframe) {
+    std::vector<MapMarker> markers = map_.markers();
+    std::erase_if(markers, [id](const MapMarker& marker) { return marker.id == id; });
+    MapMarker marker;
+    marker.id = id;
+    marker.side_m = 0.2;
+    marker.reference = keyframe;
+    marker.reference_scale = map_.keyframes().at(keyframe).applied_scale;
+    marker.marker_from_reference = Rigid3({1, 0, 0, 0}, {0.1, 0.2, -1.0});
+    markers.push_back(marker);
+    map_.set_markers(std::move(markers));
   }
 
   /// Many new landmarks that two keyframes share, so that they get an edge.
@@ -195,6 +219,57 @@ TEST(Scene, TellsTheMapAsItIs) {
   });
   EXPECT_EQ(page.loops.size(), 2 * map.measured_loop_edges().size());
   EXPECT_EQ(page.submaps.size(), 2 * map.submaps().size());
+}
+
+TEST(Scene, TellsMarkersAndPointsOnEdges) {
+  testing::RandomMap random(7);
+  Map& map = random.map();
+  const KeyframeId keyframe = ids_of(map.keyframes()).front();
+  const LandmarkId landmark = ids_of(map.landmarks()).front();
+  Appearance appearance;
+  appearance.direction = {0.0, 0.0, -1.0};
+  appearance.across = {1.0, 0.0, 0.0};
+  appearance.size_m = 0.01;
+  map.set_appearance(landmark, appearance);
+  MapMarker marker;
+  marker.id = 17;
+  marker.side_m = 0.5;
+  marker.reference = keyframe;
+  const Keyframe& reference = map.keyframes().at(keyframe);
+  marker.reference_scale = reference.applied_scale;
+  // At the origin of the world, upright.
+  marker.marker_from_reference = reference.rig_from_world.inverse();
+  marker.surveyed_world_from_marker = Rigid3();
+  map.set_markers({marker});
+  Scene scene;
+  ViewUpdate update;
+  update.map = map.freeze();
+  scene.advance(update, false);
+  Page page;
+  apply_all(scene.snapshot(), page);
+  const Page::Values expected = {17,
+                                 -.25,
+                                 .25,
+                                 0,
+                                 .25,
+                                 .25,
+                                 0,
+                                 .25,
+                                 -.25,
+                                 0,
+                                 -.25,
+                                 -.25,
+                                 0,
+                                 1,
+                                 double(reference.submap.value)};
+  ASSERT_EQ(page.markers.size(), expected.size());
+  for (std::size_t i = 0; i < expected.size(); ++i) {
+    EXPECT_NEAR(page.markers[i], expected[i], 1e-6) << i;
+  }
+  const Page::Values& half = page.on_edges.at(landmark.value);
+  EXPECT_NEAR(std::abs(half[1]), 0.05, 1e-6);  // Five pixels, along y.
+  EXPECT_NEAR(half[0], 0.0, 1e-6);
+  EXPECT_NEAR(half[2], 0.0, 1e-6);
 }
 
 TEST(Scene, GivesLandmarksTheColorOfTheirFeature) {

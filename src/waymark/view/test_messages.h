@@ -66,6 +66,8 @@ struct Page {
   Values cameras;
   Values loops;
   Values submaps;
+  Values markers;
+  std::map<std::uint32_t, Values> on_edges;  ///< Half of the edge, of living landmarks.
   bool is_complete = false;
 
   void apply(const Message& message);
@@ -84,11 +86,21 @@ struct Page {
       for (std::size_t i = 0; i < per_row; ++i) row.push_back(plain(reader.take<T>()));
     }
   }
+  void forget_landmark(std::uint32_t id) {
+    landmarks.erase(id);
+    on_edges.erase(id);
+  }
+  void forget_keyframe(std::uint32_t id) {
+    keyframes.erase(id);
+    edges.erase(id);
+  }
   void take_landmarks(MessageReader& reader);
   void take_keyframes(MessageReader& reader);
   void take_moved(MessageReader& reader, std::map<std::uint32_t, Values>& elements, std::size_t n);
   void take_edges(MessageReader& reader);
   void take_frames(MessageReader& reader);
+  void take_edge_points(MessageReader& reader);
+  void take_markers(MessageReader& reader);
 };
 
 inline void Page::take_landmarks(MessageReader& reader) {
@@ -158,6 +170,29 @@ inline void Page::take_frames(MessageReader& reader) {
   for (std::size_t i = 0; i < ids.size(); ++i) frames[ids[i]] = rows[i];
 }
 
+inline void Page::take_edge_points(MessageReader& reader) {
+  const auto ids = reader.take_all<std::uint32_t>(reader.count);
+  std::vector<Values> rows(ids.size());
+  append<float>(reader, rows, 3);
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    const bool is_point = rows[i] == Values(3, 0.0);
+    if (is_point) on_edges.erase(ids[i]);
+    if (!is_point) on_edges[ids[i]] = rows[i];
+  }
+}
+
+inline void Page::take_markers(MessageReader& reader) {
+  std::vector<Values> row(1);
+  append<std::uint32_t>(reader, row, reader.count);
+  append<float>(reader, row, 12 * reader.count);
+  append<std::uint32_t>(reader, row, reader.count);
+  append<std::uint16_t>(reader, row, reader.count);
+  if (reader.count % 2 == 1) {
+    EXPECT_EQ(reader.take<std::uint16_t>(), 0);
+  }
+  markers = row[0];
+}
+
 inline void Page::apply(const Message& message) {
   MessageReader reader(*message);
   std::vector<Values> row(1);
@@ -177,7 +212,7 @@ inline void Page::apply(const Message& message) {
       take_moved(reader, landmarks, 3);
       break;
     case 5:
-      for (const auto id : reader.take_all<std::uint32_t>(reader.count)) landmarks.erase(id);
+      for (const auto id : reader.take_all<std::uint32_t>(reader.count)) forget_landmark(id);
       break;
     case 6:
       append<std::uint32_t>(reader, row, 2 * reader.count);
@@ -191,10 +226,7 @@ inline void Page::apply(const Message& message) {
       take_moved(reader, keyframes, 7);
       break;
     case 9:
-      for (const auto id : reader.take_all<std::uint32_t>(reader.count)) {
-        keyframes.erase(id);
-        edges.erase(id);
-      }
+      for (const auto id : reader.take_all<std::uint32_t>(reader.count)) forget_keyframe(id);
       break;
     case 10:
       take_edges(reader);
@@ -209,6 +241,12 @@ inline void Page::apply(const Message& message) {
     case 14:
       append<std::uint32_t>(reader, row, 2 * reader.count);
       submaps = row[0];
+      break;
+    case 15:
+      take_markers(reader);
+      break;
+    case 16:
+      take_edge_points(reader);
       break;
     default:
       FAIL() << "kind " << int{reader.kind};

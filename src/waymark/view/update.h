@@ -14,7 +14,9 @@
 #include "waymark/camera/calibration.h"
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
+#include "waymark/map/align.h"
 #include "waymark/map/map.h"
+#include "waymark/mapfile/map_file.h"
 #include "waymark/track/messages.h"
 #include "waymark/track/stage_times.h"
 
@@ -78,15 +80,29 @@ struct ViewUpdate {
   std::vector<FeatureColors> colors;        ///< Of new frames.
   std::shared_ptr<const DrawnFrame> image;  ///< Null: none this time.
   SessionStatus status;                     ///< As of now.
+  KeyframeImages keyframe_images = {};      ///< Of a saved map.
 };
 
 /// What a viewer asks of the session.
 struct ViewRequest {
-  /// Stop ends the session, save writes the map.
-  enum class Kind { kPause, kResume, kReset, kSave, kMappingOn, kMappingOff, kStop };
-  Kind kind = Kind::kPause;  ///< What is asked for.
-  std::uint64_t client = 0;  ///< Whom to answer.
-  std::uint64_t number = 0;  ///< The client's.
+  /// Stop ends the session, save writes the map; image wants that of a keyframe, scale wants a
+  /// saved map written with the lengths that a distance gives it.
+  enum class Kind {
+    kPause,
+    kResume,
+    kReset,
+    kSave,
+    kMappingOn,
+    kMappingOff,
+    kStop,
+    kImage,
+    kScale
+  };
+  Kind kind = Kind::kPause;                    ///< What is asked for.
+  std::uint64_t client = 0;                    ///< Whom to answer.
+  std::uint64_t number = 0;                    ///< The client's.
+  KeyframeId keyframe = {};                    ///< Whose image.
+  std::optional<KnownDistance> distance = {};  ///< To scale by.
 };
 
 /// The answer to a request that takes time.
@@ -94,6 +110,8 @@ struct ViewReply {
   ViewRequest request;  ///< What is answered.
   std::string path;     ///< Of what was saved.
   std::string error;    ///< Empty if all went well.
+  /// The image that was asked for; null where there is none.
+  std::shared_ptr<const std::string> jpeg = nullptr;
 };
 
 /// What does not change during a session.
@@ -104,6 +122,9 @@ struct SessionInfo {
   std::string setup;      ///< "mono", "stereo" or "rgbd".
   std::string timing;     ///< "inline", "lockstep" or "realtime".
   bool can_save = false;  ///< Whether there is where to save the map.
+  /// Whether a saved map may be written with other lengths.
+  bool can_scale = false;
+  bool keeps_images = false;  ///< Whether images of keyframes are there to be seen.
 };
 
 }  // namespace waymark

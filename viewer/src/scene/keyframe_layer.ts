@@ -1,22 +1,17 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 import {
-  BufferAttribute, BufferGeometry, InstancedBufferAttribute, InstancedBufferGeometry, LineSegments, ShaderMaterial,
-  DynamicDrawUsage, type Texture, type TypedArray,
+  BufferAttribute, BufferGeometry, InstancedBufferGeometry, LineSegments, ShaderMaterial, DynamicDrawUsage, type Texture,
 } from "three";
 import type { KeyframeTable } from "../store/keyframe_table";
 import { grown } from "../store/slots";
 import type { CameraShapes } from "./camera_shapes";
 import type { Palette } from "./palette";
 import { edgeVertex, glyphFragment, glyphVertex, plainFragment } from "./shaders";
-import { Uploads } from "./upload";
+import { instanced, Uploads } from "./upload";
 
 /** Edges are listed anew at most so often. */
 const EDGES_EVERY_MS = 300;
-
-function instanced(array: TypedArray, width: number): BufferAttribute {
-  return new InstancedBufferAttribute(array, width).setUsage(DynamicDrawUsage);
-}
 
 /** Outlines of the cameras of many poses: pyramids in one draw call, spheres in another. */
 export class Glyphs {

@@ -1,11 +1,13 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-import { BufferGeometry, Points, ShaderMaterial, Vector2, type Texture } from "three";
+import {
+  BufferAttribute, BufferGeometry, InstancedBufferGeometry, LineSegments, Points, ShaderMaterial, Vector2, type IUniform, type Texture,
+} from "three";
 import type { LandmarkTable } from "../store/landmark_table";
 import { NO_SUBMAP } from "../protocol";
 import type { Palette } from "./palette";
-import { pointFragment, pointVertex } from "./shaders";
-import { normalized, Uploads } from "./upload";
+import { edgePointFragment, edgePointVertex, pointFragment, pointVertex } from "./shaders";
+import { instanced, instancedNormalized, normalized, Uploads } from "./upload";
 
 export const COLOURINGS = ["image", "height", "age", "observations", "part"] as const;
 export type Colouring = (typeof COLOURINGS)[number];
@@ -26,13 +28,16 @@ export interface LandmarkView {
   fog: { from: number; to: number };
 }
 
-/** All landmarks: one buffer, one draw call. */
+/** All landmarks: one buffer, one draw call; one more for those on edges, if there are some. */
 export class LandmarkLayer {
   readonly points: Points<BufferGeometry, ShaderMaterial>;
+  readonly edges: LineSegments<InstancedBufferGeometry, ShaderMaterial>;
   /** Between which values the ramp runs: height in map units, frame, or observations. */
   readonly low_high = { height: new Vector2(0, 1), age: new Vector2(0, 1), observations: new Vector2(0, 1) };
   private readonly positions: Uploads;
   private readonly others: Uploads;
+  private readonly ofEdges: Uploads;
+  private readonly uniforms: Record<string, IUniform>;
   private readonly samples = new Float32Array(NUM_SAMPLES);
 
   constructor(private readonly table: LandmarkTable, partPlaces: Texture) {
@@ -42,21 +47,28 @@ export class LandmarkLayer {
       .bind("frame", 1, () => table.frame)
       .bind("facts", 2, () => table.facts)
       .bind("colour", 4, () => table.colour, normalized);
-    const material = new ShaderMaterial({
-      vertexShader: pointVertex,
-      fragmentShader: pointFragment,
-      uniforms: {
-        partPlaces: { value: partPlaces }, mode: { value: 1 }, range: { value: this.low_high.height },
-        pointSize: { value: new Vector2() }, worldSize: { value: 0.02 }, viewHeight: { value: 1 }, fog: { value: new Vector2() },
-        ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, ground: { value: null }, dim: { value: 1 },
-      },
-    });
-    this.points = new Points(geometry, material);
-    this.points.frustumCulled = false;
+    const edgeGeometry = new InstancedBufferGeometry();
+    edgeGeometry.setAttribute("position", new BufferAttribute(Float32Array.of(-1, 0, 0, 1, 0, 0), 3));
+    this.ofEdges = new Uploads([edgeGeometry])
+      .bind("place", 3, () => table.position, instanced)
+      .bind("half_", 3, () => table.half, instanced)
+      .bind("frame", 1, () => table.frame, instanced)
+      .bind("facts", 2, () => table.facts, instanced)
+      .bind("colour", 4, () => table.colour, instancedNormalized);
+    const uniforms: Record<string, IUniform> = {
+      partPlaces: { value: partPlaces }, mode: { value: 1 }, range: { value: this.low_high.height },
+      pointSize: { value: new Vector2() }, worldSize: { value: 0.02 }, viewHeight: { value: 1 }, fog: { value: new Vector2() },
+      ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, ground: { value: null }, dim: { value: 1 },
+    };
+    this.uniforms = uniforms;
+    this.points = new Points(geometry, new ShaderMaterial({ vertexShader: pointVertex, fragmentShader: pointFragment, uniforms }));
+    const ofEdges = new ShaderMaterial({ vertexShader: edgePointVertex, fragmentShader: edgePointFragment, uniforms });
+    this.edges = new LineSegments(edgeGeometry, ofEdges);
+    this.points.frustumCulled = this.edges.frustumCulled = false;
   }
 
   setPalette(palette: Palette): void {
-    const { uniforms } = this.points.material;
+    const { uniforms } = this;
     uniforms["ramp"]!.value = palette.ramp;
     uniforms["parts"]!.value = palette.parts;
     uniforms["ink"]!.value = palette.ink;
@@ -64,7 +76,7 @@ export class LandmarkLayer {
   }
 
   setColouring(colouring: Colouring): void {
-    const { uniforms } = this.points.material;
+    const { uniforms } = this;
     uniforms["mode"]!.value = COLOURINGS.indexOf(colouring);
     if (colouring === "height" || colouring === "age" || colouring === "observations") {
       uniforms["range"]!.value = this.low_high[colouring];
@@ -73,14 +85,15 @@ export class LandmarkLayer {
 
   /** Lets other things stand out. */
   setDim(isDim: boolean): void {
-    const { material } = this.points;
-    material.uniforms["dim"]!.value = isDim ? 0.22 : 1;
-    material.transparent = isDim;
-    material.depthWrite = !isDim;
+    this.uniforms["dim"]!.value = isDim ? 0.22 : 1;
+    for (const { material } of [this.points, this.edges]) {
+      material.transparent = isDim;
+      material.depthWrite = !isDim;
+    }
   }
 
   setView({ pixelRatio, height_px, worldSize, fog }: LandmarkView): void {
-    const { uniforms } = this.points.material;
+    const { uniforms } = this;
     (uniforms["pointSize"]!.value as Vector2).set(SIZE_PX.least * pixelRatio, SIZE_PX.most * pixelRatio);
     uniforms["viewHeight"]!.value = 0.5 * height_px;
     uniforms["worldSize"]!.value = worldSize;
@@ -90,8 +103,16 @@ export class LandmarkLayer {
   sync(): boolean {
     const { table } = this;
     this.points.geometry.setDrawRange(0, table.slots.end);
-    const moved = this.positions.sync(table.movedSlots, table.slots.end);
-    return this.others.sync(table.changedSlots, table.slots.end) || moved;
+    this.edges.geometry.instanceCount = table.slots.end;
+    for (const uploads of [this.positions, this.others]) uploads.follow();
+    const hasEdges = table.half.length > 0;
+    if (hasEdges) this.ofEdges.follow();
+    const upload = (uploads: Uploads) => (first: number, last: number) => {
+      uploads.upload(first, last);
+      if (hasEdges) this.ofEdges.upload(first, last);
+    };
+    const moved = table.movedSlots.take(table.slots.end, upload(this.positions));
+    return table.changedSlots.take(table.slots.end, upload(this.others)) || moved;
   }
 
   /** Measures again what the ramps run between, on a sample. */

@@ -8,6 +8,8 @@ import { Extent } from "./extent";
 import { Ground } from "./ground";
 import { KeyframeLayer } from "./keyframe_layer";
 import { LandmarkLayer, type Colouring } from "./landmark_layer";
+import { MarkerLayer } from "./marker_layer";
+import { MeasureLayer } from "./measure_layer";
 import { readPalette, type Palette } from "./palette";
 import { Parts } from "./parts";
 import { pick, type Picked } from "./picking";
@@ -15,7 +17,7 @@ import { SelectionLayer } from "./selection_layer";
 import { TrailLayer } from "./trail_layer";
 import { View, type ViewName } from "./view";
 
-export const LAYERS = ["landmarks", "keyframes", "covisibility", "tree", "loops", "trajectory", "grid"] as const;
+export const LAYERS = ["landmarks", "keyframes", "markers", "covisibility", "tree", "loops", "trajectory", "grid"] as const;
 export type LayerName = (typeof LAYERS)[number];
 
 const MEASURE_EVERY_MS = 700;
@@ -28,7 +30,7 @@ export class Scene {
   readonly landmarks: LandmarkLayer;
   readonly parts = new Parts();
   readonly shown: Record<LayerName, boolean> = {
-    landmarks: true, keyframes: true, covisibility: false, tree: false, loops: true, trajectory: true, grid: true,
+    landmarks: true, keyframes: true, markers: true, covisibility: false, tree: false, loops: true, trajectory: true, grid: true,
   };
   palette!: Palette;
   needsRender = true;
@@ -41,6 +43,8 @@ export class Scene {
   private readonly trail: TrailLayer;
   private readonly current: CurrentCamera;
   private readonly selection = new SelectionLayer();
+  private readonly measurement = new MeasureLayer();
+  readonly markers: MarkerLayer;
   private readonly subject = new Vector3();
   private readonly heading = new Vector3();
   private readonly rotation = new Quaternion();
@@ -58,11 +62,13 @@ export class Scene {
     this.view = new View(canvas);
     this.landmarks = new LandmarkLayer(store.landmarks, this.parts.texture);
     this.keyframes = new KeyframeLayer(store.keyframes, this.shapes, this.parts.texture);
+    this.markers = new MarkerLayer(store, this.parts);
     this.trail = new TrailLayer(store.trajectory, this.parts.texture);
     this.current = new CurrentCamera(this.shapes, this.parts.texture);
     const { covisibility, tree, loops } = this.keyframes.edges;
     this.world.rotation.x = Math.PI;
-    this.world.add(this.landmarks.points, covisibility, tree, this.trail.mesh, loops, ...this.keyframes.glyphs.meshes);
+    this.world.add(this.markers.squares, this.markers.signs, this.measurement.line, this.measurement.dots);
+    this.world.add(this.landmarks.points, this.landmarks.edges, covisibility, tree, this.trail.mesh, loops, ...this.keyframes.glyphs.meshes);
     this.world.add(this.selection.lines, this.selection.dots, ...this.current.glyphs.meshes);
     this.world.updateMatrixWorld();
     this.scene.add(this.ground.mesh, this.world);
@@ -87,7 +93,7 @@ export class Scene {
   setPalette(): void {
     this.palette = readPalette();
     this.renderer?.setClearColor(this.palette.ground);
-    for (const layer of [this.landmarks, this.keyframes, this.trail, this.current, this.selection, this.ground]) {
+    for (const layer of [this.landmarks, this.keyframes, this.trail, this.current, this.selection, this.ground, this.markers, this.measurement]) {
       layer.setPalette(this.palette);
     }
     this.needsRender = true;
@@ -156,7 +162,7 @@ export class Scene {
   measure(now_ms = performance.now()): void {
     this.measuredAt_ms = now_ms;
     this.measuredVersion = this.store.version;
-    this.parts.arrange(this.store);
+    if (this.parts.arrange(this.store)) this.markers.rebuild();
     this.landmarks.measure();
     this.extent.measure(this.store, this.parts, this.world, this.landmarks.low_high.height.x);
     this.needsRender = true;
@@ -177,7 +183,8 @@ export class Scene {
     }
     const landmarks = this.landmarks.sync();
     const keyframes = this.keyframes.sync(now_ms);
-    return this.trail.sync() || landmarks || keyframes || camerasChanged;
+    const markers = this.markers.sync();
+    return this.trail.sync() || landmarks || keyframes || markers || camerasChanged;
   }
 
   private draw(renderer: WebGLRenderer, cursor: number): void {
@@ -188,6 +195,10 @@ export class Scene {
     const fog = { from, to: from + 1.2 * extent.radius };
     this.landmarks.setView({ pixelRatio: ratio, height_px: canvas.height, worldSize: 0.035 * extent.step, fog });
     this.landmarks.points.visible = shown.landmarks && this.store.landmarks.count > 0;
+    this.landmarks.edges.visible = this.landmarks.points.visible && this.store.landmarks.numEdges > 0;
+    this.markers.setView(ratio, canvas.height);
+    this.markers.squares.visible = this.markers.signs.visible = shown.markers && this.markers.count > 0;
+    this.measurement.setPixelRatio(ratio);
     this.trail.setView(canvas.width, canvas.height, ratio);
     this.trail.setCursor(cursor);
     this.trail.mesh.visible = shown.trajectory && this.store.trajectory.count > 1;
@@ -247,8 +258,13 @@ export class Scene {
     this.selection.finish();
   }
 
+  /** Shows what is measured: one place, or two and the line between them. */
+  showMeasured(places: Vector3[]): void {
+    if (this.measurement.set(places)) this.needsRender = true;
+  }
+
   /** Where an element is drawn, in the frame of `world`. */
-  private placeOf({ kind, id }: Picked, out: Vector3): boolean {
+  placeOf({ kind, id }: Picked, out: Vector3): boolean {
     const table = kind === "keyframe" ? this.store.keyframes : this.store.landmarks;
     const slot = table.slots.find(id);
     if (slot < 0) return false;

@@ -11,38 +11,111 @@ const partOffset = /* glsl */ `
   }`;
 const nowhere = "vec4(2.0, 2.0, 2.0, 1.0)";
 
-export const pointVertex = /* glsl */ `
+/** The colour of a landmark at a height and a distance from who looks. */
+const landmarkTint = /* glsl */ `
   attribute float frame;
   attribute vec2 facts;
   attribute vec4 colour;
   uniform int mode;
   uniform vec2 range;
-  uniform vec2 pointSize;
-  uniform float worldSize;
-  uniform float viewHeight;
   uniform vec2 fog;
   uniform vec3 ground;
   uniform vec3 ramp[${NUM_RAMP}];
   uniform vec3 parts[${NUM_PARTS}];
   uniform vec3 ink;
   varying vec3 tint;
-  ${partOffset}
   vec3 ramped(float value) {
     float x = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0) * ${NUM_RAMP - 1}.0;
     int i = min(int(x), ${NUM_RAMP - 2});
     return mix(ramp[i], ramp[i + 1], x - float(i));
   }
+  vec3 tint_at(float height, float distance) {
+    vec3 own = parts[int(mod(facts.y, ${NUM_PARTS}.0))];
+    if (mode == 0) own = colour.a > 0.5 ? mix(ink, colour.rgb, 0.85) : mix(ink, ramp[2], 0.5);
+    else if (mode == 1) own = ramped(height);
+    else if (mode == 2) own = ramped(frame);
+    else if (mode == 3) own = ramped(log2(facts.x));
+    return mix(own, ground, 0.6 * smoothstep(fog.x, fog.y, distance));
+  }`;
+
+export const pointVertex = /* glsl */ `
+  uniform vec2 pointSize;
+  uniform float worldSize;
+  uniform float viewHeight;
+  ${landmarkTint}
+  ${partOffset}
   void main() {
     if (facts.x < 0.5) { gl_Position = ${nowhere}; gl_PointSize = 0.0; return; }
     vec4 view = modelViewMatrix * vec4(position + part_offset(facts.y), 1.0);
     gl_Position = projectionMatrix * view;
     gl_PointSize = clamp(worldSize * projectionMatrix[1][1] * viewHeight / max(1e-6, -view.z), pointSize.x, pointSize.y);
-    if (mode == 0) tint = colour.a > 0.5 ? mix(ink, colour.rgb, 0.85) : mix(ink, ramp[2], 0.5);
-    else if (mode == 1) tint = ramped(-position.y);
-    else if (mode == 2) tint = ramped(frame);
-    else if (mode == 3) tint = ramped(log2(facts.x));
-    else tint = parts[int(mod(facts.y, ${NUM_PARTS}.0))];
-    tint = mix(tint, ground, 0.6 * smoothstep(fog.x, fog.y, -view.z));
+    tint = tint_at(-position.y, -view.z);
+  }`;
+
+/** A piece of the edge that a landmark lies on: each instance is a landmark, `position.x` the end of it (-1 or 1). */
+export const edgePointVertex = /* glsl */ `
+  attribute vec3 place;
+  attribute vec3 half_;
+  ${landmarkTint}
+  ${partOffset}
+  void main() {
+    if (facts.x < 0.5 || half_ == vec3(0.0)) { gl_Position = ${nowhere}; return; }
+    vec4 view = modelViewMatrix * vec4(place + position.x * half_ + part_offset(facts.y), 1.0);
+    gl_Position = projectionMatrix * view;
+    tint = tint_at(-place.y, -view.z);
+  }`;
+
+export const edgePointFragment = /* glsl */ `
+  uniform float dim;
+  varying vec3 tint;
+  void main() { gl_FragColor = vec4(tint, dim); }`;
+
+/** Squares of markers with their numbers, out of one texture of many cells. */
+export const markerVertex = /* glsl */ `
+  attribute vec2 cell;
+  attribute vec2 corner;
+  varying vec2 cell_;
+  varying vec2 inside_;
+  void main() {
+    cell_ = cell;
+    inside_ = corner;
+    gl_Position = projectionMatrix * modelViewMatrix * vec4(position, 1.0);
+  }`;
+
+export const markerFragment = /* glsl */ `
+  uniform sampler2D numbers;
+  uniform float cells;
+  varying vec2 cell_;
+  varying vec2 inside_;
+  void main() {
+    vec2 inside = clamp(inside_, 0.02, 0.98);
+    // From behind the number still reads from left to right.
+    if (!gl_FrontFacing) inside.x = 1.0 - inside.x;
+    gl_FragColor = texture2D(numbers, (floor(cell_ + 0.5) + inside) / cells);
+  }`;
+
+/** What stands for a marker that is too far away to be seen: its number, always as large. */
+export const markerSignVertex = /* glsl */ `
+  attribute vec2 cell;
+  attribute float side;
+  uniform float signSize;
+  uniform float viewHeight;
+  varying vec2 cell_;
+  void main() {
+    cell_ = cell;
+    vec4 view = modelViewMatrix * vec4(position, 1.0);
+    float shown = side * projectionMatrix[1][1] * viewHeight / max(1e-6, -view.z);
+    gl_Position = shown < signSize ? projectionMatrix * view : ${nowhere};
+    gl_PointSize = signSize;
+  }`;
+
+export const markerSignFragment = /* glsl */ `
+  uniform sampler2D numbers;
+  uniform float cells;
+  varying vec2 cell_;
+  void main() {
+    vec2 inside = clamp(vec2(gl_PointCoord.x, 1.0 - gl_PointCoord.y), 0.02, 0.98);
+    gl_FragColor = texture2D(numbers, (floor(cell_ + 0.5) + inside) / cells);
   }`;
 
 export const pointFragment = /* glsl */ `

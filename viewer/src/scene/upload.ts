@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-import { BufferAttribute, DynamicDrawUsage, type BufferGeometry, type TypedArray } from "three";
+import { BufferAttribute, DynamicDrawUsage, InstancedBufferAttribute, type BufferGeometry, type TypedArray } from "three";
 import type { Dirty } from "../store/dirty";
 
 /** Attributes of geometries that show arrays of a table: they follow when the array grows, and upload only what changed. */
@@ -50,4 +50,12 @@ export function plain(array: TypedArray, width: number): BufferAttribute {
 
 export function normalized(array: TypedArray, width: number): BufferAttribute {
   return new BufferAttribute(array, width, true).setUsage(DynamicDrawUsage);
+}
+
+export function instanced(array: TypedArray, width: number): BufferAttribute {
+  return new InstancedBufferAttribute(array, width).setUsage(DynamicDrawUsage);
+}
+
+export function instancedNormalized(array: TypedArray, width: number): BufferAttribute {
+  return new InstancedBufferAttribute(array, width, true).setUsage(DynamicDrawUsage);
 }

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-import type { Landmarks, LandmarkPositions, LandmarksErased } from "../protocol";
+import type { EdgePoints, Landmarks, LandmarkPositions, LandmarksErased } from "../protocol";
 import { Dirty } from "./dirty";
 import { grown, Slots } from "./slots";
 
@@ -16,6 +16,9 @@ export class LandmarkTable {
   /** Observations and sub-map of each. */
   facts = new Uint16Array(2 * 4096);
   colour = new Uint8Array(4 * 4096);
+  /** Of points on edges: from the point to an end of what is drawn of its edge; 0 of others. Empty as long as there are none. */
+  half = new Float32Array(0);
+  numEdges = 0;
 
   get count(): number {
     return this.slots.count;
@@ -25,6 +28,8 @@ export class LandmarkTable {
     this.slots.clear();
     this.movedSlots.clear();
     this.changedSlots.clear();
+    this.half.fill(0);
+    this.numEdges = 0;
   }
 
   reserve(count: number): void {
@@ -33,6 +38,7 @@ export class LandmarkTable {
     this.frame = grown(this.frame, count);
     this.facts = grown(this.facts, 2 * count);
     this.colour = grown(this.colour, 4 * count);
+    if (this.half.length > 0) this.half = grown(this.half, 3 * count);
   }
 
   upsert(m: Landmarks): void {
@@ -65,11 +71,33 @@ export class LandmarkTable {
       if (slot < 0) continue;
       this.facts[2 * slot] = 0;
       this.changedSlots.mark(slot);
+      if (this.isOnEdge(slot)) this.setHalf(slot, 0, 0, 0);
     }
+  }
+
+  setEdges(m: EdgePoints): void {
+    if (m.id.length > 0) this.half = grown(this.half, this.position.length);
+    for (let i = 0; i < m.id.length; ++i) {
+      const slot = this.slots.find(m.id[i]!);
+      if (slot >= 0) this.setHalf(slot, m.half[3 * i]!, m.half[3 * i + 1]!, m.half[3 * i + 2]!);
+    }
+  }
+
+  isOnEdge(slot: number): boolean {
+    return 3 * slot < this.half.length && (this.half[3 * slot] !== 0 || this.half[3 * slot + 1] !== 0 || this.half[3 * slot + 2] !== 0);
   }
 
   isAlive(slot: number): boolean {
     return this.facts[2 * slot]! > 0;
+  }
+
+  private setHalf(slot: number, x: number, y: number, z: number): void {
+    this.numEdges -= Number(this.isOnEdge(slot));
+    this.half[3 * slot] = x;
+    this.half[3 * slot + 1] = y;
+    this.half[3 * slot + 2] = z;
+    this.numEdges += Number(this.isOnEdge(slot));
+    this.changedSlots.mark(slot);
   }
 
   private move(slot: number, position: Float32Array, i: number): void {

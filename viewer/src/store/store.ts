@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-import { Kind, NONE, type Cameras, type Frame, type Message, type Submaps } from "../protocol";
+import { Kind, NONE, type Cameras, type Frame, type Markers, type Message, type Submaps } from "../protocol";
 import { KeyframeTable } from "./keyframe_table";
 import { LandmarkTable } from "./landmark_table";
 import { TrajectoryTable } from "./trajectory_table";
@@ -13,6 +13,7 @@ export class Store {
   cameras: Cameras | null = null;
   camerasVersion = 0;
   submaps: Submaps | null = null;
+  markers: Markers | null = null;
   frame: Frame | null = null;
   generation = 0;
   /** True between `begin` and `end`. */
@@ -42,6 +43,9 @@ export class Store {
       case Kind.Trajectory: return this.trajectory.upsert(m);
       case Kind.Frame: this.frame = m; return;
       case Kind.Submaps: this.submaps = m; return;
+      case Kind.Markers: this.markers = m; return;
+      case Kind.EdgePoints: return this.landmarks.setEdges(m);
+      case Kind.KeyframeImage: return; // An answer, no part of the map.
     }
   }
 
@@ -60,6 +64,7 @@ export class Store {
     this.cameras = null;
     ++this.camerasVersion;
     this.submaps = null;
+    this.markers = null;
     this.landmarks.reserve(Math.min(landmarks, 1 << 24));
     this.keyframes.reserve(Math.min(keyframes, 1 << 20));
     this.trajectory.reserve(Math.min(frames, 1 << 22));

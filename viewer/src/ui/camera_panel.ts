@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import type { Frame } from "../protocol";
 import { byId, make, setText } from "./dom";
+import { drawDots, FEATURE_LOOKS } from "./features";
 
 /** The newest image with its features: those that see a landmark, and free ones. */
 export class CameraPanel {
@@ -59,28 +60,11 @@ export class CameraPanel {
     context.fillStyle = style.getPropertyValue("--hover");
     context.fillRect(0, 0, width, height);
     if (this.image) context.drawImage(this.image, 0, 0, width, height);
-    const numSeen = this.dots(frame, 1, scale, "#5fe0b5", 2.1);
-    const numFree = this.dots(frame, 0, scale, "rgba(240, 190, 80, 0.65)", 1.3);
+    const { seen, free } = FEATURE_LOOKS;
+    const size = canvas.width / 272;
+    const numSeen = drawDots(context, frame, (state) => state === 1, scale, seen.colour, seen.radius * size);
+    const numFree = drawDots(context, frame, (state) => state === 0, scale, free.colour, free.radius * size);
     setText(this.seen, `${numSeen} in the map`);
     setText(this.free, `${numFree} free`);
-  }
-
-  /** Dots on the features of one state; how many there are. */
-  private dots(frame: Frame, state: number, scale: number, colour: string, radius: number): number {
-    const { context } = this;
-    const size = radius * (this.canvas.width / 272);
-    let count = 0;
-    context.fillStyle = colour;
-    context.beginPath();
-    for (let i = 0; i < frame.state.length; ++i) {
-      if (frame.state[i] !== state) continue;
-      const x = (frame.pixel[2 * i]! + 0.5) * scale;
-      const y = (frame.pixel[2 * i + 1]! + 0.5) * scale;
-      context.moveTo(x + size, y);
-      context.arc(x, y, size, 0, 2 * Math.PI);
-      ++count;
-    }
-    context.fill();
-    return count;
   }
 }

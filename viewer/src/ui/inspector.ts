@@ -5,6 +5,7 @@ import type { Picked } from "../scene/picking";
 import type { Scene } from "../scene/scene";
 import type { KeyframeData, LandmarkData } from "../text_messages";
 import { byId, clock, grouped, make, setIcon } from "./dom";
+import { KeyframePicture } from "./keyframe_picture";
 import type { Store } from "../store/store";
 
 const MOST_ROWS = 60;
@@ -12,6 +13,8 @@ const MOST_ROWS = 60;
 /** All about the keyframe or landmark that was clicked. */
 export class Inspector {
   selected: Picked | null = null;
+  /** Whether the program has images of keyframes. */
+  hasImages = false;
   private readonly host = byId("inspector");
 
   constructor(private readonly scene: Scene, private readonly store: Store, private readonly connection: Connection) {}
@@ -22,18 +25,30 @@ export class Inspector {
     this.host.hidden = picked === null;
     if (!picked) return;
     if (goThere) this.scene.goTo(picked);
+    this.host.removeAttribute("data-large");
     this.fill(picked, make("p", {}, "…"));
+    const picture = picked.kind === "keyframe" && this.hasImages ? this.pictureOf(picked) : null;
     const answer = await this.connection.request(picked.kind, { id: picked.id });
     if (this.selected !== picked) return;
     if (answer?.type === "keyframe") {
       this.scene.select(picked, answer.landmarks);
-      this.fill(picked, ...this.keyframe(answer));
+      this.fill(picked, ...(picture ? [picture.element] : []), ...this.keyframe(answer));
     } else if (answer?.type === "landmark") {
       this.scene.select(picked, answer.observations.map((each) => each.keyframe));
       this.fill(picked, ...this.landmark(answer));
     } else {
       this.fill(picked, make("p", {}, answer?.type === "reply" ? (answer.error ?? "") : "No connection"));
     }
+  }
+
+  private pictureOf(picked: Picked): KeyframePicture {
+    const picture = new KeyframePicture();
+    void this.connection.request("image", { id: picked.id }).then((answer) => {
+      if (this.selected !== picked) return;
+      if (answer?.type === "image") void picture.show(answer);
+      else picture.say(answer?.type === "reply" ? `No image: ${answer.error ?? ""}` : "No connection");
+    });
+    return picture;
   }
 
   private fill(picked: Picked, ...content: Node[]): void {

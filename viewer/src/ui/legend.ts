@@ -10,6 +10,7 @@ const COLOURING_WORDS: [Colouring, string][] = [
 const LAYER_LOOKS: Record<LayerName, { word: string; key: string; weight: string }> = {
   landmarks: { word: "Landmarks", key: "--ramp-2", weight: "dot" },
   keyframes: { word: "Keyframes", key: "--keyframe", weight: "2px" },
+  markers: { word: "Markers", key: "--ink", weight: "dot" },
   covisibility: { word: "Covisibility", key: "--covisibility", weight: "1px" },
   tree: { word: "Tree", key: "--covisibility", weight: "2px" },
   loops: { word: "Loops", key: "--loop", weight: "2px" },
@@ -21,10 +22,12 @@ const LAYER_LOOKS: Record<LayerName, { word: string; key: string; weight: string
 export class Legend {
   colouring: Colouring = "height";
   private readonly choice: Choice<Colouring>;
+  private readonly markers: HTMLElement;
 
   constructor(private readonly scene: Scene) {
     this.choice = new Choice(byId("colouring-choice"), COLOURING_WORDS, (value) => this.setColouring(value));
     for (const name of LAYERS) this.addSwitch(name);
+    this.markers = byId("layer-list").querySelector<HTMLElement>("[data-layer=markers]")!;
     this.setColouring(this.colouring);
   }
 
@@ -47,6 +50,8 @@ export class Legend {
     byId("ramp").hidden = !shown;
     setText(byId("ramp-low"), shown?.[0] ?? "");
     setText(byId("ramp-high"), shown?.[1] ?? "");
+    // Most maps have none.
+    this.markers.hidden = this.scene.markers.count === 0;
   }
 
   private addSwitch(name: LayerName): void {
