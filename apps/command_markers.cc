@@ -80,8 +80,14 @@ std::filesystem::path page_path(const std::filesystem::path& path, std::size_t p
 int print_markers(const MarkersOptions& options) {
   if (options.print.empty()) return print_families();
   const MarkerFamily family(options.family, "--family");
-  const std::vector<std::string> pages =
-      marker_sheets(family, options.size_m, parse_ids(options.ids, family), options.paper);
+  const std::vector<int> ids = parse_ids(options.ids, family);
+  if (options.print.extension() == ".pdf") {
+    write_file_atomically(options.print,
+                          marker_sheets_pdf(family, options.size_m, ids, options.paper));
+    print_result("{}\n", options.print.string());
+    return kDone;
+  }
+  const std::vector<std::string> pages = marker_sheets(family, options.size_m, ids, options.paper);
   for (std::size_t i = 0; i < pages.size(); ++i) {
     write_file_atomically(page_path(options.print, i), pages[i]);
     print_result("{}\n", page_path(options.print, i).string());
@@ -95,8 +101,9 @@ void add_markers_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<MarkersOptions>();
   CLI::App& markers =
       *program.add_subcommand("markers", "Square markers: the families there are, sheets to print");
-  markers.add_option(
-      "--print", options->print, "SVG file for a sheet, further ones FILE-2.svg ...");
+  markers.add_option("--print",
+                     options->print,
+                     "PDF file of sheets, or SVG file for one, further ones FILE-2.svg ...");
   markers.add_option("--family", options->family, "Which markers")->capture_default_str();
   markers.add_option("--size", options->size_m, "Side of the black square in metres")
       ->check(number_between(0.001, 10.0))

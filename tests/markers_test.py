@@ -141,6 +141,10 @@ class Sheets(CliTest):
         pages = [pathlib.Path(line) for line in done.stdout.split()]
         self.assertEqual([page.name for page in pages], ["sheet.svg", "sheet-2.svg", "sheet-3.svg"])
         self.assertIn('width="160.0000" height="160.0000"', pages[2].read_text())
+        pdf = self.folder / "sheet.pdf"
+        done = waymark("markers", "--print", pdf, "--size", "0.16", "--ids", "0-2")
+        self.assertEqual((done.returncode, done.stdout.strip()), (0, str(pdf)), done.stderr)
+        self.assertIn(b"/Count 3 ", pdf.read_bytes())
         for options, words in ((("--size", "0.3"), "expected at most 0.168"), (("--ids", "5-x"), "'x' is no number"),
                                (("--ids", "580-600"), "expected 0 to 586"), (("--family", "tag1"), "expected one of")):
             done = waymark("markers", "--print", self.folder / "none.svg", *options)

@@ -27,6 +27,14 @@ struct LandmarkTable {
   py::array ids, positions_in_world, submaps, num_observers, num_visible, num_found;
 };
 
+struct MarkerTable {
+  py::array ids, sides_m, world_from_marker, submaps, is_surveyed;
+};
+
+struct SightingTable {
+  py::array keyframes, ids, cameras, pixels;
+};
+
 KeyframeTable keyframes(const PythonMap& self) {
   std::vector<std::uint32_t> ids, frames, submaps, parents;
   std::vector<std::int64_t> timestamps_ns;
@@ -67,6 +75,47 @@ LandmarkTable landmarks(const PythonMap& self) {
           array_of(std::move(observers)),
           array_of(std::move(visible)),
           array_of(std::move(found))};
+}
+
+MarkerTable markers(const PythonMap& self) {
+  std::vector<std::uint32_t> ids, submaps;
+  std::vector<double> sides, poses;
+  std::vector<std::uint8_t> is_surveyed;
+  for (const MapMarker& marker : self.map().markers()) {
+    ids.push_back(static_cast<std::uint32_t>(marker.id));
+    sides.push_back(marker.side_m);
+    append_matrix(self.map().world_from_marker(marker), poses);
+    submaps.push_back(self.map().submap_of(marker).value);
+    is_surveyed.push_back(marker.surveyed_world_from_marker.has_value());
+  }
+  const auto count = static_cast<py::ssize_t>(ids.size());
+  return {array_of(std::move(ids)),
+          array_of(std::move(sides)),
+          array_of(std::move(poses), {count, 4, 4}),
+          array_of(std::move(submaps)),
+          array_of(std::move(is_surveyed))};
+}
+
+SightingTable marker_sightings(const PythonMap& self) {
+  std::vector<std::uint32_t> keyframes, ids;
+  std::vector<std::uint8_t> cameras;
+  std::vector<float> pixels;
+  self.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (!keyframe.markers) return;
+    for (const MarkerSighting& sighting : *keyframe.markers) {
+      keyframes.push_back(id.value);
+      ids.push_back(static_cast<std::uint32_t>(sighting.id));
+      cameras.push_back(sighting.camera);
+      for (const Eigen::Vector2f& pixel : sighting.pixels) {
+        pixels.insert(pixels.end(), pixel.begin(), pixel.end());
+      }
+    }
+  });
+  const auto count = static_cast<py::ssize_t>(ids.size());
+  return {array_of(std::move(keyframes)),
+          array_of(std::move(ids)),
+          array_of(std::move(cameras)),
+          array_of(std::move(pixels), {count, 4, 2})};
 }
 
 py::array covisibility(const PythonMap& self) {
@@ -143,13 +192,44 @@ void bind_landmarks(py::module_& module) {
       .get("num_found", "uint32 array (M,): frames in which it was.", &LandmarkTable::num_found);
 }
 
+void bind_markers(py::module_& module) {
+  Class<MarkerTable>(
+      module, "Markers", "All markers that are known in a map, as arrays of the same length N.")
+      .def("__len__", [](const MarkerTable& self) { return self.ids.size(); })
+      .get("ids", "uint32 array (N,): numbers within the family.", &MarkerTable::ids)
+      .get("sides_m", "float64 array (N,): of the black squares.", &MarkerTable::sides_m)
+      .get("world_from_marker",
+           "float64 array (N, 4, 4): the middle is the origin, x right, y up, z out of the print.",
+           &MarkerTable::world_from_marker)
+      .get("submaps", "uint32 array (N,): whose frame the pose is in.", &MarkerTable::submaps)
+      .get("is_surveyed",
+           "uint8 array (N,): 1 where it was said to be there and holds the map.",
+           &MarkerTable::is_surveyed);
+  Class<SightingTable>(
+      module, "MarkerSightings", "What keyframes see of markers, as arrays of the same length N.")
+      .def("__len__", [](const SightingTable& self) { return self.ids.size(); })
+      .get("keyframes", "uint32 array (N,): ids, ascending.", &SightingTable::keyframes)
+      .get("ids", "uint32 array (N,): numbers of the markers.", &SightingTable::ids)
+      .get("cameras", "uint8 array (N,): index in the rig.", &SightingTable::cameras)
+      .get("pixels",
+           "float32 array (N, 4, 2): corners, top left, top right, bottom right, bottom left of "
+           "the upright print.",
+           &SightingTable::pixels);
+}
+
 }  // namespace
 
 void bind_map_tables(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module) {
   bind_keyframes(module);
   bind_landmarks(module);
+  bind_markers(module);
   map.def("keyframes", &keyframes, "keyframes(self)\n--\n\nAll keyframes: Keyframes (copies).")
       .def("landmarks", &landmarks, "landmarks(self)\n--\n\nAll landmarks: Landmarks (copies).")
+      .def("markers", &markers, "markers(self)\n--\n\nMarkers that are known: Markers (copies).")
+      .def("marker_sightings", &marker_sightings, R"(marker_sightings(self)
+--
+
+Markers as the keyframes see them, known or not: MarkerSightings (copies).)")
       .def("covisibility", &covisibility, R"(covisibility(self)
 --
 

@@ -19,15 +19,16 @@ out are read-only.
 """
 from ._waymark import (NO_ID, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
                        Features, FocalCheck, FrameDetails, Input, InputError, InputFrame, Keyframe,
-                       Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, MergedMap,
-                       OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
+                       Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
+                       MarkerSightings, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
                        __version__, calibrate, import_map, import_settings, info, open_input,
                        read_depth_image, read_grey_image)
 
 __all__ = [
     "NO_ID", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
     "FocalCheck", "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
-    "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "MergedMap", "OutputError",
+    "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "Markers",
+    "MarkerSightings", "MergedMap", "OutputError",
     "Statistics", "Submap", "System", "TrackingResult", "Trajectory", "Viewer", "__version__",
     "calibrate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
     "read_grey_image",

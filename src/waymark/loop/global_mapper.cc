@@ -8,6 +8,7 @@
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
+#include "waymark/loop/join_by_markers.h"
 #include "waymark/map/align.h"
 #include "waymark/map/parts.h"
 
@@ -235,6 +236,15 @@ void GlobalMapper::place_rest_by_markers() {
   }
 }
 
+bool GlobalMapper::join_what_knows_the_same_markers() {
+  int num_joined = 0;
+  mapper_.change([&](Map& map, DirtyLandmarks&) { num_joined = join_by_markers(map, places_); });
+  if (num_joined == 0) return false;
+  num_closures_ += static_cast<std::uint32_t>(num_joined);
+  unconsolidated_ = all_keyframes();
+  return true;
+}
+
 void GlobalMapper::finish() {
   const std::uint32_t end = mapper_.map().keyframes().end_id().value;
   if (!settings_.enabled || end == 0) {
@@ -246,6 +256,7 @@ void GlobalMapper::finish() {
   if (num_closures_ == 0) unconsolidated_ = all_keyframes();
   consolidate();
   place_rest_by_markers();
+  if (join_what_knows_the_same_markers()) consolidate();
 }
 
 void GlobalMapper::consolidate() {
@@ -274,6 +285,7 @@ MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
     for (const KeyframeId query : of_b) mapper.close_alike(query);
     if (mapper.num_joins() == num_joins_before) break;
   }
+  mapper.join_what_knows_the_same_markers();
   if (mapper.num_joins() > 0) mapper.consolidate();
   return {mapper.snapshot().map, mapper.num_joins(), mapper.num_loops()};
 }

@@ -64,6 +64,8 @@ class GlobalMapper {
 
   /// Finds what looks like a keyframe, verifies and closes it; whether there was something.
   bool close_alike(KeyframeId query);
+  /// See join_by_markers(); whether there was something to join.
+  bool join_what_knows_the_same_markers();
   /// A closure brings parts of the map together that may touch elsewhere, too: adjusts every
   /// sub-map, closes what lies beside each other, fuses overlaps and adjusts again.
   void consolidate();
@@ -114,7 +116,8 @@ struct MergedMaps {
 };
 
 /// Puts b behind a (see unite()), and where keyframes of b show places of a, joins their sub-maps
-/// and closes the loops that this makes, then links and adjusts all of it. Frame and units
+/// and closes the loops that this makes, joins those that know the same markers, then links and
+/// adjusts all of it. Frame and units
 /// are those of the older sub-map, of which a has all. Sub-maps in metres are not compared with
 /// those whose scale is free. The same maps and seed give the same bits.
 MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed);

@@ -11,12 +11,20 @@
 
 #include "waymark/camera/tangent.h"
 #include "waymark/marker/outline.h"
+#include "waymark/marker/pattern_fit.h"
 
 namespace waymark {
 namespace {
 
 /// Smaller squares hold no number that could be read.
 constexpr double kLeastSidePx = 5.0;
+/// Of markers that are only confirmed.
+constexpr double kLeastConfirmedPx = 4.0;
+constexpr double kLeastFacing = 0.17;  ///< 80 degrees aside.
+constexpr double kMostOffPx = 2.5;
+constexpr double kMostOffShare = 0.1;
+
+using Corners = std::array<Eigen::Vector2d, 4>;
 
 cv::Ptr<cv::aruco::DetectorParameters> parameters_for(ImageView image) {
   auto parameters = cv::aruco::DetectorParameters::create();
@@ -27,14 +35,14 @@ cv::Ptr<cv::aruco::DetectorParameters> parameters_for(ImageView image) {
 }
 
 /// Clockwise in the image, as y points down: mirrored squares are none.
-bool is_clockwise(const std::array<Eigen::Vector2d, 4>& corners) {
+bool is_clockwise(const Corners& corners) {
   const Eigen::Vector2d a = corners[2] - corners[0];
   const Eigen::Vector2d b = corners[3] - corners[1];
   return a.x() * b.y() - a.y() * b.x() > 0.0;
 }
 
 std::optional<MarkerSighting> sighting_of(int id,
-                                          const std::array<Eigen::Vector2d, 4>& corners,
+                                          const Corners& corners,
                                           const Camera& camera,
                                           std::uint8_t camera_index) {
   constexpr std::array<float, 4> kLevelScales = {1.0f, 1.0f, 1.0f, 1.0f};
@@ -50,6 +58,43 @@ std::optional<MarkerSighting> sighting_of(int id,
     sighting.pixel_from_bearing[i] = tangents.level_pixel_from_bearing[i];
   }
   return sighting;
+}
+
+/// lengths by the side.
+std::optional<Corners> project_corners(const Camera& camera, const Rigid3& cam_from_marker) {
+  std::array<Eigen::Vector3d, 4> points;
+  for (std::size_t i = 0; i < 4; ++i) points[i] = cam_from_marker * marker_corner(i, 1.0);
+  Corners pixels;
+  std::array<std::uint8_t, 4> is_visible;
+  camera.project(points, pixels, is_visible);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if (!is_visible[i] || !pixels[i].allFinite()) return std::nullopt;
+  }
+  return pixels;
+}
+
+double longest_side_px(const Corners& corners) {
+  double longest = 0.0;
+  for (std::size_t i = 0; i < 4; ++i) {
+    longest = std::max(longest, (corners[(i + 1) % 4] - corners[i]).norm());
+  }
+  return longest;
+}
+
+/// From before it, not too far aside, and large enough.
+bool may_be_seen(const Rigid3& cam_from_marker, const Corners& corners) {
+  const Eigen::Vector3d normal = cam_from_marker.rotation * Eigen::Vector3d::UnitZ();
+  const double cosine = -normal.dot(cam_from_marker.translation.normalized());
+  return cosine >= kLeastFacing && longest_side_px(corners) >= kLeastConfirmedPx;
+}
+
+/// What is further away is something else that looks alike.
+bool are_near(const Corners& expected, const Corners& found) {
+  const double limit = kMostOffPx + kMostOffShare * longest_side_px(expected);
+  for (std::size_t i = 0; i < 4; ++i) {
+    if ((found[i] - expected[i]).norm() > limit) return false;
+  }
+  return true;
 }
 
 }  // namespace
@@ -73,7 +118,7 @@ MarkerSightings MarkerDetector::detect(ImageView image,
                            ids,
                            parameters_for(image));
   for (std::size_t i = 0; i < ids.size(); ++i) {
-    std::array<Eigen::Vector2d, 4> corners;
+    Corners corners;
     for (std::size_t k = 0; k < 4; ++k) corners[k] = {outlines[i][k].x, outlines[i][k].y};
     if (!is_clockwise(corners)) continue;
     const auto refined = refine_outline(image, camera, corners, family_.side_modules());
@@ -86,12 +131,35 @@ MarkerSightings MarkerDetector::detect(ImageView image,
   return sightings;
 }
 
+MarkerSightings MarkerDetector::confirm(ImageView image,
+                                        const Camera& camera,
+                                        std::uint8_t camera_index,
+                                        std::span<const ExpectedMarker> expected) const {
+  MarkerSightings sightings;
+  for (const ExpectedMarker& marker : expected) {
+    if (marker.id < 0 || marker.id >= family_.size() || !(marker.side > 0.0)) continue;
+    Rigid3 cam_from_marker = marker.cam_from_marker;
+    cam_from_marker.translation /= marker.side;
+    const auto before = project_corners(camera, cam_from_marker);
+    if (!before || !may_be_seen(cam_from_marker, *before)) continue;
+    const auto fit = fit_pattern(image, camera, family_, marker.id, cam_from_marker);
+    if (!fit) continue;
+    const auto after = project_corners(camera, fit->cam_from_marker);
+    if (!after || !are_near(*before, *after)) continue;
+    if (!is_own_pattern(image, camera, family_, marker.id, *fit)) continue;
+    if (auto sighting = sighting_of(marker.id, *after, camera, camera_index)) {
+      sightings.push_back(*sighting);
+    }
+  }
+  return sightings;
+}
+
 std::shared_ptr<const MarkerSightings> measure_anew(
     const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig) {
   if (!sightings) return nullptr;
   auto anew = std::make_shared<MarkerSightings>();
   for (const MarkerSighting& sighting : *sightings) {
-    std::array<Eigen::Vector2d, 4> corners;
+    Corners corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = sighting.pixels[i].cast<double>();
     const Camera& camera = *rig.cameras.at(sighting.camera).camera;
     const auto measured = sighting_of(sighting.id, corners, camera, sighting.camera);

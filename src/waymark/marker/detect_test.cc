@@ -117,6 +117,70 @@ INSTANTIATE_TEST_SUITE_P(
                       View{"fisheye", "tag36h11", 80, 50, 30, 0.5, 0.2},
                       View{"equirectangular", "tag36h11", 63.7, 40, 30, 0.5, 0.25}));
 
+/// Where a marker is thought to be: a pixel aside, a hundredth too far, turned by two degrees.
+Rigid3 about(const Rigid3& pose, double focal_px) {
+  const Rigid3 off(Eigen::Quaterniond(Eigen::AngleAxisd(0.035, Eigen::Vector3d(1, 2, 2) / 3.0)),
+                   Eigen::Vector3d::Zero());
+  Rigid3 guess = pose * off;
+  guess.translation *= 1.01;
+  guess.translation += pose.translation.norm() / focal_px * Eigen::Vector3d(0.7, -0.7, 0.0);
+  return guess;
+}
+
+class ConfirmView : public ::testing::TestWithParam<View> {};
+
+TEST_P(ConfirmView, FindsWhatIsTooSmallOrTooSlantingToBeRead) {
+  const View& view = GetParam();
+  const auto camera = make_camera(view.model);
+  const MarkerDetector detector{MarkerFamily(view.family)};
+  for (const int id : {3, 11}) {
+    const Eigen::Vector3d aside(0.02 * id - 0.15, 0.12 - 0.01 * id, 1.0);
+    const Rigid3 pose = look_at_marker(
+        aside, view.focal_px * kSide / view.side_px, view.tilt_deg * kRadPerDegree, 0.4 * id);
+    const Image image = photograph(*camera, detector.family(), id, pose, view.blur_px);
+    const std::vector<ExpectedMarker> expected = {{id, kSide, about(pose, view.focal_px)}};
+    const MarkerSightings found = detector.confirm(image.view(), *camera, 1, expected);
+    ASSERT_EQ(found.size(), 1u);
+    EXPECT_EQ(found[0].id, id);
+    EXPECT_EQ(found[0].camera, 1);
+    EXPECT_LT(std::sqrt(squared_error_px(found[0], pose, kSide)), view.limit_px);
+  }
+}
+
+INSTANTIATE_TEST_SUITE_P(Views,
+                         ConfirmView,
+                         ::testing::Values(View{"pinhole", "tag36h11", 200, 8, 15, 0.0, 0.15},
+                                           View{"pinhole", "tag36h11", 200, 8, 45, 1.0, 0.3},
+                                           View{"pinhole", "tag36h11", 200, 12, 60, 1.0, 0.3},
+                                           View{"pinhole", "tag36h11", 200, 20, 75, 1.0, 0.3},
+                                           View{"pinhole", "tag36h11", 200, 60, 75, 1.0, 0.3},
+                                           View{"pinhole", "aruco_4x4_50", 200, 6, 15, 0.0, 0.2},
+                                           View{"fisheye", "tag36h11", 80, 10, 30, 0.5, 0.3}));
+
+TEST(ConfirmTest, NothingIsConfirmedWhereThereIsNoneOrAnother) {
+  const auto camera = make_camera("pinhole");
+  const MarkerDetector detector{MarkerFamily("tag36h11")};
+  const Rigid3 pose = look_at_marker({0.1, 0.0, 1.0}, 200 * kSide / 10, 0.5, 0.2);
+  const Image image = photograph(*camera, detector.family(), 4, pose, 0.7);
+  const auto confirm = [&](int id, const Rigid3& at) {
+    const std::vector<ExpectedMarker> expected = {{id, kSide, at}};
+    return detector.confirm(image.view(), *camera, 0, expected).size();
+  };
+  EXPECT_EQ(confirm(4, pose), 1u);
+  for (const int id : {5, 100, 586}) EXPECT_EQ(confirm(id, pose), 0u) << id;
+  // Beside it, before a plain wall; behind the camera; and seen from behind.
+  EXPECT_EQ(confirm(4, look_at_marker({-0.3, 0.2, 1.0}, 200 * kSide / 10, 0.5, 0.2)), 0u);
+  EXPECT_EQ(confirm(4, Rigid3(pose.rotation, -pose.translation)), 0u);
+  const Eigen::Quaterniond around(Eigen::AngleAxisd(EIGEN_PI, Eigen::Vector3d::UnitY()));
+  EXPECT_EQ(confirm(4, Rigid3(pose.rotation * around, pose.translation)), 0u);
+  EXPECT_EQ(confirm(100000, pose), 0u);
+  Image noise(camera->width_px(), camera->height_px());
+  Rng rng(1, 2);
+  for (std::uint8_t& grey : noise.values) grey = static_cast<std::uint8_t>(rng.below(256));
+  const std::vector<ExpectedMarker> expected = {{4, kSide, pose}};
+  EXPECT_TRUE(detector.confirm(noise.view(), *camera, 0, expected).empty());
+}
+
 TEST(DetectTest, TooSmallAMarkerIsMissedAndNeverTakenForAnother) {
   const auto camera = make_camera("pinhole");
   const MarkerDetector detector{MarkerFamily("tag36h11")};

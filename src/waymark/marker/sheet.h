@@ -24,4 +24,10 @@ std::vector<std::string> marker_sheets(const MarkerFamily& family,
                                        std::span<const int> ids,
                                        const Paper& paper = {});
 
+/// The same pages as one PDF file.
+std::string marker_sheets_pdf(const MarkerFamily& family,
+                              double size_m,
+                              std::span<const int> ids,
+                              const Paper& paper = {});
+
 }  // namespace waymark

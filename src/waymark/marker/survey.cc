@@ -163,6 +163,15 @@ Views fitting(const Views& views, const Sim3& map_from_marker) {
   return chosen;
 }
 
+/// Images of a pair are of one moment.
+std::size_t count_moments(const Views& views) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    count += i == 0 || views[i]->timestamp_ns != views[i - 1]->timestamp_ns;
+  }
+  return count;
+}
+
 struct Hypothesis {
   Sim3 map_from_marker;
   std::size_t num_fitting = 0;
@@ -234,7 +243,7 @@ Views settle(const Views& views, Sim3& map_from_marker, Equations& equations) {
 }
 
 void judge_other_places(const Views& others, const Views& chosen, SurveyedMarker& marker) {
-  if (others.size() < 2) return;
+  if (count_moments(others) < 2) return;
   for (const Hypothesis& hypothesis : list_hypotheses(others)) {
     const double off =
         (hypothesis.map_from_marker.translation - marker.map_from_marker.translation).norm() /
@@ -242,7 +251,7 @@ void judge_other_places(const Views& others, const Views& chosen, SurveyedMarker
     const double size = hypothesis.map_from_marker.scale / marker.map_from_marker.scale;
     if (off < kOtherPlaceSides || size < 0.5 || size > 2.0) continue;
     const Views there = fitting(others, hypothesis.map_from_marker);
-    if (there.size() < 2) continue;
+    if (count_moments(there) < 2) continue;
     const auto later = [](const Views& a, const Views& b) {
       return a.front()->timestamp_ns > b.back()->timestamp_ns;
     };
@@ -269,18 +278,18 @@ bool is_twice_in_an_image(const Views& views) {
 SurveyedMarker survey_marker(int id, std::span<const MarkerView> all) {
   SurveyedMarker marker;
   marker.id = id;
-  marker.num_views = all.size();
   Views views;
   for (const MarkerView& view : all) views.push_back(&view);
+  marker.num_views = count_moments(views);
   if (is_twice_in_an_image(views)) marker.verdict = MarkerVerdict::kTwice;
-  if (views.size() < kMinViews) return marker;
+  if (marker.num_views < kMinViews) return marker;
   const std::vector<Hypothesis> hypotheses = list_hypotheses(views);
   if (hypotheses.empty()) return marker;
   marker.map_from_marker = hypotheses.front().map_from_marker;
   Equations equations;
   const Views chosen = settle(views, marker.map_from_marker, equations);
-  marker.num_fitting = chosen.size();
-  if (chosen.size() < kMinViews) return marker;
+  marker.num_fitting = count_moments(chosen);
+  if (marker.num_fitting < kMinViews) return marker;
   const double num_residuals = 8.0 * static_cast<double>(chosen.size());
   const double sigma_px = std::sqrt(equations.cost / num_residuals);
   marker.rms_px = sigma_px;

@@ -41,8 +41,8 @@ struct SurveyedMarker {
   Sim3 map_from_marker;         ///< Of a square of side 1: its scale is the side in map units.
   double side_sigma = 0.0;      ///< Of the side, as a part of it.
   double rms_px = 0.0;          ///< Of the corners, of the views that fit.
-  std::size_t num_views = 0;    ///< All of them.
-  std::size_t num_fitting = 0;  ///< That fit.
+  std::size_t num_views = 0;    ///< Moments of all of them.
+  std::size_t num_fitting = 0;  ///< Moments of those that fit.
   std::int64_t changed_ns = 0;  ///< Of what moved: when it was seen at another place first.
   double found = 0.0;           ///< Side, or distance from where it should be, in metres.
   double expected = 0.0;        ///< The side that was said, in metres.

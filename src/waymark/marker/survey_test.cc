@@ -125,6 +125,27 @@ TEST(SurveyMarkerTest, SeesThatAMarkerIsThereTwice) {
   EXPECT_THAT(describe_fault(survey_marker(3, at_once)), HasSubstr("is there twice"));
 }
 
+/// Both cameras of a pair see the same moments: those are no more keyframes.
+TEST(SurveyMarkerTest, ImagesOfAPairCountOnce) {
+  Scene scene;
+  const Rigid3 truth = Scene::hung(0.4, 0.1);
+  std::deque<MarkerSighting> right;
+  std::vector<MarkerView> views;
+  for (const MarkerView& left : scene.views(3, truth, 0.2)) {
+    views.push_back(left);
+    const Rigid3 right_from_map =
+        Rigid3(Eigen::Quaterniond::Identity(), {-0.1, 0.0, 0.0}) * left.cam_from_map;
+    right.push_back(make_sighting(3, right_from_map * truth, 0.2, kNoisePx, 50 + right.size()));
+    right.back().camera = 1;
+    views.push_back({right_from_map, left.timestamp_ns, &right.back()});
+  }
+  const SurveyedMarker marker = survey_marker(3, views);
+  EXPECT_EQ(marker.verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(marker.num_views, 12u);
+  EXPECT_EQ(marker.num_fitting, 12u);
+  EXPECT_EQ(survey_marker(3, std::span(views).first(4)).verdict, MarkerVerdict::kFewViews);
+}
+
 KnownMarkers six_of(double size_m) {
   KnownMarkers known;
   known.family = "tag36h11";

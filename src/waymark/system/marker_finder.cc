@@ -2,12 +2,25 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/system/marker_finder.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <utility>
 #include <variant>
+#include <vector>
 
 #include "waymark/marker/known_markers.h"
 
 namespace waymark {
+namespace {
+
+/// The images that the cameras of a rig took, in their order; of a pair both.
+std::vector<ImageView> views_of(const FrameImages& images, const Rig& rig) {
+  std::vector<ImageView> views = {images.image0};
+  if (rig.cameras.size() > 1 && !images.image1.is_empty()) views.push_back(images.image1);
+  return views;
+}
+
+}  // namespace
 
 MarkerFinder::MarkerFinder(const MarkerSettings& settings) {
   const auto markers = markers_to_look_for(settings);
@@ -18,17 +31,59 @@ std::function<MarkerSightings()> MarkerFinder::search_in(const FrameImages& imag
                                                          std::shared_ptr<const Rig> rig) const {
   if (!detector_) return nullptr;
   auto found = std::make_shared<std::optional<MarkerSightings>>();
-  return [this, found, image = images.image0, rig = std::move(rig)] {
-    if (!*found) *found = detector_->detect(image, *rig->cameras[0].camera, 0);
+  return [this, found, views = views_of(images, *rig), rig] {
+    if (*found) return **found;
+    found->emplace();
+    for (std::size_t i = 0; i < views.size(); ++i) {
+      const MarkerSightings seen =
+          detector_->detect(views[i], *rig->cameras[i].camera, static_cast<std::uint8_t>(i));
+      (*found)->insert((*found)->end(), seen.begin(), seen.end());
+    }
+    std::ranges::stable_sort(**found, {}, &MarkerSighting::id);
     return **found;
   };
 }
 
-void add_markers(const Frame& frame, MapperMessage& message) {
+MarkerSightings MarkerFinder::confirm(const FrameImages& images,
+                                      const Rig& rig,
+                                      const Map& map,
+                                      const FrameVerdict& outcome,
+                                      const MarkerSightings& read) const {
+  const Rigid3 rig_from_world = outcome.world_from_rig->inverse();
+  MarkerSightings all = read;
+  const std::vector<ImageView> views = views_of(images, rig);
+  for (std::size_t i = 0; i < views.size(); ++i) {
+    const auto camera = static_cast<std::uint8_t>(i);
+    std::vector<ExpectedMarker> expected;
+    for (const MapMarker& marker : map.markers()) {
+      const bool is_read = std::ranges::any_of(read, [&](const MarkerSighting& sighting) {
+        return sighting.id == marker.id && sighting.camera == camera;
+      });
+      if (is_read || map.submap_of(marker) != outcome.submap) continue;
+      const Rigid3 cam_from_world = rig.cameras[i].cam_from_rig * rig_from_world;
+      expected.push_back(
+          {marker.id, marker.side_m, cam_from_world * map.world_from_marker(marker)});
+    }
+    const MarkerSightings found =
+        detector_->confirm(views[i], *rig.cameras[i].camera, camera, expected);
+    all.insert(all.end(), found.begin(), found.end());
+  }
+  std::ranges::stable_sort(all, {}, &MarkerSighting::id);
+  return all;
+}
+
+void MarkerFinder::add_markers(const Frame& frame,
+                               const FrameImages& images,
+                               const Rig& rig,
+                               const Map& map,
+                               const FrameVerdict& outcome,
+                               MapperMessage& message) const {
   MarkerSightings found = frame.find_markers();
+  auto* keyframe = std::get_if<NewKeyframe>(&message);
+  if (keyframe && outcome.world_from_rig) found = confirm(images, rig, map, outcome, found);
   if (found.empty()) return;
   auto markers = std::make_shared<const MarkerSightings>(std::move(found));
-  if (auto* keyframe = std::get_if<NewKeyframe>(&message)) {
+  if (keyframe) {
     keyframe->markers = std::move(markers);
     return;
   }

@@ -9,9 +9,11 @@
 
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
+#include "waymark/map/map.h"
 #include "waymark/marker/detect.h"
 #include "waymark/marker/settings.h"
 #include "waymark/track/frame.h"
+#include "waymark/track/frame_verdict.h"
 #include "waymark/track/messages.h"
 
 namespace waymark {
@@ -27,16 +29,28 @@ class MarkerFinder {
   /// Name of the family that is looked for; empty: none.
   std::string family() const { return detector_ ? detector_->family().name() : ""; }
 
-  /// A search in image 0 of a frame, done once when it is called first; the images must be there
-  /// then. Empty where nothing is looked for.
+  /// A search in the images of a frame, those of a pair both, done once when it is called first;
+  /// the images must be there then. Empty where nothing is looked for.
   std::function<MarkerSightings()> search_in(const FrameImages& images,
                                              std::shared_ptr<const Rig> rig) const;
 
+  /// Notes with a keyframe the markers that its frame shows: those that can be read, and those of
+  /// the map that are seen where they should be. outcome: of the frame.
+  void add_markers(const Frame& frame,
+                   const FrameImages& images,
+                   const Rig& rig,
+                   const Map& map,
+                   const FrameVerdict& outcome,
+                   MapperMessage& message) const;
+
  private:
+  MarkerSightings confirm(const FrameImages& images,
+                          const Rig& rig,
+                          const Map& map,
+                          const FrameVerdict& outcome,
+                          const MarkerSightings& read) const;
+
   std::optional<MarkerDetector> detector_;
 };
-
-/// Notes the markers that a frame shows with the keyframe that is made of it.
-void add_markers(const Frame& frame, MapperMessage& message);
 
 }  // namespace waymark

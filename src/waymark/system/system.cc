@@ -163,7 +163,7 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   if (outcome.message) {
     if (frame.find_markers) {
       StageTimer timer(result.stages, Stage::kKeyframe);
-      add_markers(frame, *outcome.message);
+      marker_finder_.add_markers(frame, images, *rig_, *map(), outcome, *outcome.message);
     }
     // The mapper works in send() in kInline, and what kRealtime has to wait for is a sub-map.
     const bool is_submap = std::holds_alternative<NewSubmap>(*outcome.message);

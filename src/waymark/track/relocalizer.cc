@@ -34,6 +34,7 @@ std::vector<MarkerPose> poses_by_markers(const MarkerSightings& sightings,
                                          const Map& map) {
   std::vector<MarkerPose> poses;
   for (const MarkerSighting& sighting : sightings) {
+    if (sighting.camera >= rig.cameras.size()) continue;  // One camera of a pair is used.
     for (const MapMarker& marker : map.markers()) {
       if (marker.id != sighting.id) continue;
       const Rigid3 world_from_marker = map.world_from_marker(marker);
