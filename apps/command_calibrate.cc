@@ -43,9 +43,7 @@ void add_calibrate_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<CalibrateCommand>();
   CLI::App& calibrate_command = *program.add_subcommand(
       "calibrate", "Find the camera model and calibration of INPUT from its images");
-  calibrate_command
-      .add_option("INPUT", options->input, "Data set folder, folder of images, video file or bag")
-      ->required();
+  add_input_argument(calibrate_command, options->input, options->reading);
   calibrate_command.add_option(
       "-o,--out", options->out, "Write the calibration to this file, for -c [not written]");
   add_fov_option(calibrate_command, options->calibrate);

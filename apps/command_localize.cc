@@ -37,7 +37,7 @@ void report_results(Reporter& reporter,
                             *summary.localized,
                             summary.counts.frames,
                             summary.counts.unreadable));
-  report_reasons(reporter, results.table);
+  report_reasons(reporter, results.table, summary);
   reporter.info(fmt::format("{}: {:.1f} ms per image; results in {}",
                             format_duration(summary.wall_s),
                             summary.tracking_ms.mean,

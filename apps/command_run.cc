@@ -74,7 +74,7 @@ void report_results(Reporter& reporter, const SessionResults& results, const Run
                   summary.keyframes,
                   summary.landmarks,
                   summary.submaps));
-  report_reasons(reporter, results.table);
+  report_reasons(reporter, results.table, summary);
   if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
   if (summary.markers) report_markers(reporter, *summary.markers);
   if (!results.ego_mask.values.empty()) {

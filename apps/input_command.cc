@@ -5,7 +5,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
+#include <iostream>
 #include <map>
 #include <optional>
 #include <string>
@@ -29,18 +31,42 @@ bool is_without_partner(const FrameRecord& frame) {
   return frame.state != FrameState::kUnreadable && frame.has_warning;
 }
 
+/// All of it; a list of images is no longer than that.
+std::string read_standard_input() {
+  constexpr std::size_t kMaxBytes = std::size_t{256} << 20;
+  std::string text;
+  std::array<char, 65536> buffer;
+  while (std::cin.read(buffer.data(), buffer.size()), std::cin.gcount() > 0) {
+    text.append(buffer.data(), static_cast<std::size_t>(std::cin.gcount()));
+    if (text.size() <= kMaxBytes) continue;
+    throw InputError("standard input", "is longer than 256 MiB, expected a list of images");
+  }
+  return text;
+}
+
 }  // namespace
 
+void add_input_argument(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
+  command
+      .add_option("INPUT",
+                  input,
+                  "Data set folder, folder of images, video file, bag of ROS, camera or address; - "
+                  "reads a list of images")
+      ->required()
+      ->each([&reading](const std::string& path) {
+        if (path == "-") reading.image_list = read_standard_input();
+      });
+}
+
 void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
-  command.add_option("INPUT", input, "Data set folder, folder of images, video file or bag of ROS")
-      ->required();
+  add_input_argument(command, input, reading);
   command.add_option(
       "RIGHT", reading.right, "Images or video of camera 1, INPUT being those of camera 0 [none]");
   command
       .add_option("--format",
                   reading.format,
-                  "Kind of INPUT: euroc, kitti, tum, images, video or bag [recognised]")
-      ->check(CLI::IsMember({"euroc", "kitti", "tum", "images", "video", "bag"}));
+                  "Kind of INPUT: euroc, kitti, tum, replica, images, video or bag [recognised]")
+      ->check(CLI::IsMember({"euroc", "kitti", "tum", "replica", "images", "video", "bag"}));
   command
       .add_option("--topics",
                   reading.topics,
@@ -52,6 +78,13 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
   command
       .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")
       ->check(number_between(0.01, 10000.0));
+  command
+      .add_option("--rotate",
+                  reading.rotate_deg,
+                  "Turns images clockwise by 90, 180 or 270 degrees, and the calibration with them "
+                  "[as they are]")
+      ->check(CLI::IsMember({90, 180, 270}))
+      ->type_name("DEG");
   command
       .add_option("--resize",
                   reading.resize_px,
@@ -120,6 +153,7 @@ void add_input(const PreparedInput& prepared, RunSummary& summary) {
   summary.settings = changed_settings(prepared.settings);
   summary.out_of_order = info.counts.out_of_order;
   summary.without_partner = info.counts.without_partner;
+  summary.missing_at_end = info.counts.missing_at_end;
   if (!prepared.estimated) return;
   const EstimatedCalibration& calibration = *prepared.estimated;
   EstimatedCalibrationSummary& told = summary.calibration.emplace();
@@ -205,7 +239,11 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
   };
 }
 
-void report_reasons(Reporter& reporter, const FrameTable& table) {
+void report_reasons(Reporter& reporter, const FrameTable& table, const RunSummary& summary) {
+  if (summary.missing_at_end > 0) {
+    reporter.warning(
+        fmt::format("the video ends {} frames before its container says", summary.missing_at_end));
+  }
   std::map<FrameReason, int> counts;
   int num_without_partner = 0;
   for (const FrameRecord& frame : table.frames) {

@@ -32,6 +32,8 @@ struct ReportOptions {
   }
 };
 
+/// INPUT. Where it is "-" the list of images is read while the command line is.
+void add_input_argument(CLI::App& command, std::filesystem::path& input, InputOptions& reading);
 /// INPUT and how to read it.
 void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading);
 /// The same, its cameras, the settings.
@@ -63,9 +65,9 @@ void write_calibration(const std::filesystem::path& folder,
 /// Tells of every frame.
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info);
 
-/// Why frames have no pose, the commonest reason first, and how many came without their depth;
-/// nothing if there are none.
-void report_reasons(Reporter& reporter, const FrameTable& table);
+/// Why frames have no pose, the commonest reason first, how many came without their depth, and
+/// whether a video ended early; nothing if there are none.
+void report_reasons(Reporter& reporter, const FrameTable& table, const RunSummary& summary);
 
 /// What to try, a line each; nothing where all went well.
 void report_advice(Reporter& reporter, const RunSummary& summary);

@@ -67,6 +67,9 @@ def make_samples(folder, environment):
     make_photos(folder)
     run("ffmpeg", "-v", "error", "-framerate", 20, "-i", "photos/%06d.png", "-c:v", "mpeg4", "-q:v", 1, "walk.mp4")
     (folder / "camchain.yaml").write_text(CAMERA)
+    make_pairs(folder)
+    for side in ("left", "right"):
+        run("ffmpeg", "-v", "error", "-framerate", 20, "-i", f"{side}/%06d.png", "-c:v", "mpeg4", "-q:v", 1, f"{side}.mp4")
     run("ffmpeg", "-v", "error", "-f", "lavfi", "-i", "color=white:s=376x240", "-frames:v", 1, "hood.png")
     run("waymark", "run", "MH_01_easy", "--quiet", "--keep-images", "--map-out", "office.wmap")
     run("waymark", "run", "MH_01_easy", "--quiet", "--frames", 25, "--map-out", "monday.wmap")
@@ -82,6 +85,34 @@ def make_photos(folder):
         (folder / name).mkdir()
         for i, image in enumerate(chosen):
             (folder / name / f"{i:06d}.png").write_bytes(image.read_bytes())
+
+
+def copy_numbered(images, target, name="{:06d}"):
+    target.mkdir(parents=True, exist_ok=True)
+    for i, image in enumerate(sorted(images)):
+        (target / (name.format(i) + image.suffix)).write_bytes(image.read_bytes())
+
+
+def make_pairs(folder):
+    """Two folders of a stereo pair, colour and depth in two folders, a drive of KITTI raw and a scene of Replica."""
+    (folder / "pair.yaml").write_text(PAIR)
+    drive = folder / "2011_09_26" / "2011_09_26_drive_0001_sync"
+    times = "".join(f"2011-09-26 13:02:{25 + i // 20}.{i % 20 * 50:03d}000000\n" for i in range(40))
+    rows = ["S_rect_0{0}: 376 240", "P_rect_0{0}: 290 0 187 {1} 0 290 121 0 0 0 1 0"]
+    drive.mkdir(parents=True)
+    (drive.parent / "calib_cam_to_cam.txt").write_text(
+        "\n".join(row.format(camera, -58 * camera) for camera in (0, 1) for row in rows) + "\n")
+    for camera, side in ((0, "left"), (1, "right")):
+        images = list((folder / "MH_01_easy" / "mav0" / f"cam{camera}" / "data").glob("*.png"))
+        copy_numbered(images, folder / side)
+        copy_numbered(images, drive / f"image_0{camera}" / "data", "{:010d}")
+        (drive / f"image_0{camera}" / "timestamps.txt").write_text(times)
+    for name, kind in (("rgb", "frame"), ("depth", "depth")):
+        images = list((folder / "desk" / name).glob("*.png"))
+        copy_numbered(images, folder / name)
+        copy_numbered(images, folder / "Replica" / "room0" / "results", kind + "{:06d}")
+    (folder / "Replica" / "cam_params.json").write_text(
+        '{"camera": {"w": 376, "h": 240, "fx": 290, "fy": 291, "cx": 187, "cy": 121, "scale": 1000}}\n')
 
 
 def add_euroc_truth(folder):

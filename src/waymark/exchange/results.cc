@@ -205,6 +205,7 @@ std::string format_summary_json(const RunSummary& summary) {
   append_counts(json, summary.counts, summary.num_trajectory_lines);
   json["out_of_order"] = summary.out_of_order;
   json["without_partner"] = summary.without_partner;
+  json["missing_at_end"] = summary.missing_at_end;
   if (summary.localized) json["localized"] = *summary.localized;
   json["keyframes"] = summary.keyframes;
   json["landmarks"] = summary.landmarks;

@@ -127,6 +127,7 @@ struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
   std::size_t out_of_order = 0;          ///< Frames left out, see InputCounts.
   std::size_t without_partner = 0;       ///< Frames of camera 0 alone, see InputCounts.
+  std::size_t missing_at_end = 0;        ///< Frames that a video lacks, see InputCounts.
   std::size_t num_trajectory_lines = 0;  ///< Of trajectory.txt; gives the coverage.
   std::size_t keyframes = 0;             ///< Of the map at the end.
   std::size_t landmarks = 0;             ///< Of the map at the end.

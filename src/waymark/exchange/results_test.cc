@@ -104,11 +104,12 @@ TEST(Results, SummaryHasTheDocumentedKeys) {
   summary.version = "0.1.0";
   const nlohmann::json json = nlohmann::json::parse(format_summary_json(summary));
   for (const char* key :
-       {"frames",      "tracked",        "filled",          "unreadable",   "dropped",
-        "coverage",    "initialized_at", "lost_count",      "keyframes",    "landmarks",
-        "submaps",     "loops",          "relocalizations", "wall_s",       "cpu_s",
-        "peak_rss_mb", "tracking_ms",    "mapping_ms",      "out_of_order", "without_partner",
-        "stages_ms",   "setup",          "timing",          "seed",         "version"}) {
+       {"frames",         "tracked",        "filled",          "unreadable",   "dropped",
+        "coverage",       "initialized_at", "lost_count",      "keyframes",    "landmarks",
+        "submaps",        "loops",          "relocalizations", "wall_s",       "cpu_s",
+        "peak_rss_mb",    "tracking_ms",    "mapping_ms",      "out_of_order", "without_partner",
+        "missing_at_end", "stages_ms",      "setup",           "timing",       "seed",
+        "version"}) {
     EXPECT_TRUE(json.contains(key)) << key;
   }
   EXPECT_FALSE(json.contains("localized"));

@@ -197,7 +197,9 @@ DepthImage decode_compressed_depth(const RosCompressedImage& image,
 BagImageHeader read_bag_image_header(std::string_view bytes,
                                      const BagTopic& topic,
                                      const std::string& where) {
-  const bool is_named_depth = topic.name.find("depth") != std::string::npos;
+  // "Depth_0" in recordings of RealSense.
+  const bool is_named_depth = topic.name.find("depth") != std::string::npos ||
+                              topic.name.find("/Depth_") != std::string::npos;
   if (is_compressed(topic)) {
     const RosCompressedImage image = parse_compressed(bytes, topic, where);
     const bool is_depth = image.format.find("compressedDepth") != std::string::npos ||

@@ -61,7 +61,7 @@ std::optional<RosCameraInfo> find_info(Bag& bag, const ImageTopic& image) {
     is_seen[message.topic] = true;
     std::optional<RosCameraInfo> info = parse_ros_camera_info(bag.read(message), topic.encoding);
     if (!info) continue;
-    if (topic.name == image.camera() + "/camera_info") return info;
+    if (std::ranges::count(image.info_names(), topic.name) > 0) return info;
     if (!image.frame_id.empty() && info->frame_id == image.frame_id) of_frame = std::move(info);
   }
   return of_frame;

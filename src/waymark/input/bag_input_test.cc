@@ -243,6 +243,56 @@ TEST(BagInput, TakesDepthInMillimetres) {
   EXPECT_FALSE(mono->next()->depth);
 }
 
+/// As the recorder of RealSense names topics.
+Recording realsense() {
+  Recording recording{RosEncoding::kRos1};
+  RosCameraInfo info = info_of();
+  info.frame_id = "0";
+  info.distortion_model = "Brown Conrady";
+  const std::string sensors[] = {
+      "sensor_0/Depth_0", "sensor_0/Infrared_1", "sensor_0/Infrared_2", "sensor_1/Color_0"};
+  for (const std::string& sensor : sensors) {
+    recording.info("/device_0/" + sensor + "/info/camera_info", info);
+  }
+  for (int i = 0; i < 4; ++i) {
+    const std::int64_t time_ns = kStartNs + i * kFrameNs;
+    for (int k = 1; k < 4; ++k) {
+      recording.image("/device_0/" + sensors[k] + "/image/data", time_ns, 10 * k + i);
+    }
+    recording.add("/device_0/" + sensors[0] + "/image/data",
+                  "sensor_msgs/Image",
+                  time_ns,
+                  RosImage{"0", 6, 8, "mono16", false, 16, std::string(96, '\x04')});
+  }
+  return recording;
+}
+
+TEST(BagInput, TakesTheColourOfRecordingsOfRealSense) {
+  const TemporaryFolder folder;
+  write_bytes(folder / "a.bag", make_ros1_bag(realsense().messages, Compression::kLz4));
+  auto input = open_input(folder / "a.bag", {});
+  EXPECT_EQ(input->info().setup, Setup::kMono);
+  EXPECT_THAT(input->next()->images.at(0).values, Each(30));
+  EXPECT_EQ(input->info().calibration->cameras[0].description.distortion_model, "radtan");
+
+  // Depth is that of the left infrared camera.
+  InputOptions options;
+  options.topics = {"/device_0/sensor_0/Infrared_1/image/data",
+                    "/device_0/sensor_0/Depth_0/image/data"};
+  input = open_input(folder / "a.bag", options);
+  EXPECT_EQ(input->info().setup, Setup::kRgbd);
+  EXPECT_THAT(input->next()->depth->values, Each(0x0404));
+
+  // A pair with a calibration of both.
+  options.topics = {};
+  options.calibration = input->info().calibration;
+  options.calibration->cameras.push_back(options.calibration->cameras[0]);
+  options.calibration->cameras[1].cam_from_rig.translation.x() = -0.05;
+  input = open_input(folder / "a.bag", options);
+  EXPECT_EQ(input->info().setup, Setup::kStereo);
+  EXPECT_THAT(input->next()->images.at(1).values, Each(20));
+}
+
 TEST(BagInput, ListsTopicsAndSaysWhatItDoesNotUse) {
   const TemporaryFolder folder;
   Recording recording = mono();

@@ -17,6 +17,8 @@
 namespace waymark {
 namespace {
 
+constexpr std::string_view kRealsenseImage = "/image/data";
+
 bool has(std::string_view name, std::string_view part) {
   return name.find(part) != std::string_view::npos;
 }
@@ -45,6 +47,8 @@ bool says_registered(std::string_view name) {
 
 /// How well depth belongs to images: 0 not at all.
 int registration(const ImageTopic& image, const ImageTopic& depth) {
+  // Its depth is that of the left infrared camera, whose images show the dots of the projector.
+  if (image.is_of_realsense()) return 0;
   const bool is_same_frame = !image.frame_id.empty() && image.frame_id == depth.frame_id;
   const bool is_colour = has(image.name, "color") || has(image.name, "rgb");
   if (!is_same_frame && !(says_registered(depth.name) && is_colour)) return 0;
@@ -87,7 +91,15 @@ std::string ImageTopic::base() const {
 
 std::string ImageTopic::camera() const {
   const std::string whole = base();
-  return whole.substr(0, whole.find_last_of('/'));
+  const std::string_view end = is_of_realsense() ? kRealsenseImage : "";
+  const std::string start = whole.substr(0, whole.size() - end.size());
+  return end.empty() ? start.substr(0, start.find_last_of('/')) : start;
+}
+
+bool ImageTopic::is_of_realsense() const { return name.ends_with(kRealsenseImage); }
+
+std::vector<std::string> ImageTopic::info_names() const {
+  return {camera() + "/camera_info", camera() + "/info/camera_info"};
 }
 
 bool ImageTopic::is_rectified() const {
@@ -102,10 +114,15 @@ std::vector<TopicChoice> find_topics(const std::vector<ImageTopic>& topics) {
   const std::optional<TopicChoice> rgbd = find_rgbd(images, depths);
   std::set<std::string> cameras;
   for (const ImageTopic& image : images) cameras.insert(image.camera());
+  const auto colour = std::ranges::find_if(images, [](const ImageTopic& image) {
+    return image.is_of_realsense() && has(image.name, "/Color_");
+  });
 
   std::vector<TopicChoice> choices;
   if (rgbd) {
     choices.push_back({Setup::kMono, rgbd->first, std::nullopt});
+  } else if (colour != images.end()) {
+    choices.push_back({Setup::kMono, *colour, std::nullopt});
   } else if (stereo) {
     choices.push_back({Setup::kMono, stereo->first, std::nullopt});
   } else if (cameras.size() == 1) {

@@ -24,6 +24,10 @@ struct ImageTopic {
   std::string base() const;
   /// What topics of one camera share: "/camera".
   std::string camera() const;
+  /// Whether it is of a file that the recorder of RealSense wrote, "/device_0/.../image/data".
+  bool is_of_realsense() const;
+  /// The names that the camera info of its images may have.
+  std::vector<std::string> info_names() const;
   /// Whether its images are those of an ideal camera, by its name.
   bool is_rectified() const;
 };

@@ -38,6 +38,17 @@ std::optional<int> number_of(const std::filesystem::path& path) {
   return number;
 }
 
+/// An address without the name and password that it may hold.
+std::string address_for_people(const std::string& address) {
+  const std::size_t start = address.find("://");
+  if (start == std::string::npos) return address;
+  const std::size_t host = start + 3;
+  const std::size_t end = address.find('/', host);
+  const std::size_t at = address.substr(0, end).rfind('@');
+  return at == std::string::npos || at < host ? address
+                                              : address.substr(0, host) + address.substr(at + 1);
+}
+
 std::int64_t now_ns() {
   const auto now = std::chrono::system_clock::now().time_since_epoch();
   return std::chrono::duration_cast<std::chrono::nanoseconds>(now).count();
@@ -53,11 +64,14 @@ class CameraInput : public Input {
     info_.num_frames = selection_.limit;
     info_.calibration = choose_calibration(path, options.calibration, std::nullopt, info_.setup);
     open(path);
-    start(path);
-    info_.lines = {fmt::format("{}: camera ({})", path.string(), to_string(info_.setup)),
-                   fmt::format("images of {}x{} px", info_.width_px, info_.height_px),
-                   "times of arrival",
-                   describe_calibration(options.calibration.has_value(), info_.calibration)};
+    const std::string name = address_for_people(path.string());
+    start(name);
+    info_.lines = {
+        fmt::format(
+            "{}: {} ({})", name, is_address(path) ? "stream" : "camera", to_string(info_.setup)),
+        fmt::format("images of {}x{} px", info_.width_px, info_.height_px),
+        "times of arrival",
+        describe_calibration(options.calibration.has_value(), info_.calibration)};
   }
 
   const InputInfo& info() const override { return info_; }
@@ -73,17 +87,24 @@ class CameraInput : public Input {
     try {
       if (number) {
         capture_.open(*number, kDevices);
+      } else if (is_address(path)) {
+        capture_.open(path.string(), cv::CAP_FFMPEG);
       } else {
         capture_.open(path.string(), cv::CAP_V4L2);
       }
     } catch (const cv::Exception&) {
       capture_.release();
     }
+    if (!capture_.isOpened() && is_address(path)) {
+      throw InputError(address_for_people(path.string()),
+                       "cannot be opened as a stream, expected an address that answers, such as "
+                       "rtsp://HOST/PATH");
+    }
     if (!capture_.isOpened()) {
       throw InputError(path.string(),
                        "cannot be opened as a camera, expected one that is there and free");
     }
-    if (!info_.calibration) return;
+    if (!info_.calibration || is_address(path)) return;
     const CameraDescription& camera = info_.calibration->cameras.at(0).description;
     capture_.set(cv::CAP_PROP_FRAME_WIDTH, camera.width_px);
     capture_.set(cv::CAP_PROP_FRAME_HEIGHT, camera.height_px);

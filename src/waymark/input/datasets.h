@@ -65,6 +65,23 @@ Listing list_kitti(const std::filesystem::path& folder, const InputOptions& opti
 /// Whether the folder holds image_0/ with times.txt or calib.txt beside it.
 bool is_kitti(const std::filesystem::path& folder);
 
+/// Drive of KITTI raw (Geiger et al. 2013) or KITTI-360 (Liao et al. 2022): image_00/data/ or
+/// image_00/data_rect/, for stereo image_01, times in image_00/timestamps.txt; where there are no
+/// grey images those of the colour cameras, image_02 and image_03. Calibration:
+/// calib_cam_to_cam.txt beside the drive, or calibration/perspective.txt of KITTI-360; that before
+/// rectification for images of that size.
+Listing list_kitti_raw(const std::filesystem::path& folder, const InputOptions& options);
+
+/// Whether the folder holds image_00 (or image_02) with data/ and timestamps.txt.
+bool is_kitti_raw(const std::filesystem::path& folder);
+
+/// Scene of Replica as rendered for SLAM (Straub et al. 2019, Sucar et al. 2021): results/ with
+/// frame000000.jpg and depth000000.png and so on. Calibration: cam_params.json beside the scenes.
+Listing list_replica(const std::filesystem::path& folder, const InputOptions& options);
+
+/// Whether the folder, or results/ in it, holds images frameN and depthN.
+bool is_replica(const std::filesystem::path& folder);
+
 /// One row of rgb.txt or depth.txt.
 struct TumImage {
   std::int64_t timestamp_ns = 0;
@@ -86,8 +103,11 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
 
 /// Folder of images, or one that holds them in images/; with options.right a second one for stereo,
 /// with options.depth one of depth images. Times come from times.txt in the folder or beside it;
-/// without one the images are taken to be 1/30 s apart, or what options.fps says.
+/// without one from options.fps, else from the names of the images, else they are 1/30 s apart.
 Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options);
+
+/// The images of options.image_list, with options.right or options.depth as above.
+Listing list_named_images(const InputOptions& options);
 
 /// The file of true poses that belongs to an input, if its layout has one and it is there:
 /// mav0/state_groundtruth_estimate0/data.csv (EuRoC), mav0/mocap0/data.csv (TUM-VI),
@@ -103,8 +123,8 @@ std::unique_ptr<Input> open_video(const std::filesystem::path& path, const Input
 /// frame. Throws InputError.
 std::unique_ptr<Input> open_bag(const std::filesystem::path& path, const InputOptions& options);
 
-/// Opens a camera, "camera:N" or a device such as /dev/video0, and reads its first frame. Asks for
-/// images of the size that the calibration states. Throws InputError.
+/// Opens a camera, "camera:N", a device such as /dev/video0 or the address of a stream, and reads
+/// its first frame. Asks for images of the size that the calibration states. Throws InputError.
 std::unique_ptr<Input> open_camera(const std::filesystem::path& path, const InputOptions& options);
 
 }  // namespace waymark

@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <cstdint>
+#include <cstring>
 #include <initializer_list>
 #include <string>
 #include <utility>
@@ -96,7 +98,7 @@ void set_equidistant(CameraDescription& camera, std::vector<double> coeffs) {
 
 bool is_ros_model(std::string_view model) {
   return model == "equidistant" || model == "fisheye" || model == "plumb_bob" ||
-         model == "rational_polynomial";
+         model == "rational_polynomial" || model == "Brown Conrady";  // By RealSense's recorder.
 }
 
 CameraChain checked_chain(const CameraDescription& camera) {
@@ -152,6 +154,24 @@ int pixels(const RowReader& rows, std::size_t index) {
                    fmt::format("size is {} pixels, expected an integer from 1", value));
 }
 
+/// Without its size.
+CameraDescription camera_of(const ColmapCameraModel& model,
+                            const std::vector<double>& parameters,
+                            const std::string& where) {
+  const auto parameter = [&](int index) {
+    return index == kZero ? 0.0 : parameters[static_cast<std::size_t>(index)];
+  };
+  CameraDescription camera;
+  camera.where = where;
+  camera.camera_model = "pinhole";
+  for (const int index : model.intrinsics) camera.intrinsics.push_back(parameter(index));
+  camera.intrinsics[2] -= 0.5;
+  camera.intrinsics[3] -= 0.5;
+  camera.distortion_model = model.distortion_model;
+  for (const int index : model.distortion) camera.distortion_coeffs.push_back(parameter(index));
+  return camera;
+}
+
 CameraDescription read_camera(const RowReader& rows) {
   constexpr std::size_t kFirst = 4;  // CAMERA_ID MODEL WIDTH HEIGHT, then the parameters.
   rows.expect_at_least(kFirst, "CAMERA_ID MODEL WIDTH HEIGHT PARAMS...");
@@ -162,20 +182,98 @@ CameraDescription read_camera(const RowReader& rows) {
         rows.where(),
         fmt::format("{} has {} parameters, expected {}", model.name, count, model.num_parameters));
   }
-  const auto parameter = [&](int index) {
-    return index == kZero ? 0.0 : rows.number(kFirst + static_cast<std::size_t>(index));
-  };
-  CameraDescription camera;
-  camera.where = rows.where();
-  camera.camera_model = "pinhole";
+  std::vector<double> parameters;
+  for (std::size_t i = 0; i < count; ++i) parameters.push_back(rows.number(kFirst + i));
+  CameraDescription camera = camera_of(model, parameters, rows.where());
   camera.width_px = pixels(rows, 2);
   camera.height_px = pixels(rows, 3);
-  for (const int index : model.intrinsics) camera.intrinsics.push_back(parameter(index));
-  camera.intrinsics[2] -= 0.5;
-  camera.intrinsics[3] -= 0.5;
-  camera.distortion_model = model.distortion_model;
-  for (const int index : model.distortion) camera.distortion_coeffs.push_back(parameter(index));
   return camera;
+}
+
+/// Numbers of a binary file, little-endian as COLMAP writes them.
+class BinaryNumbers {
+ public:
+  explicit BinaryNumbers(const ConfigSource& source) : source_(source) {}
+
+  template <class T>
+  T next() {
+    T value;
+    if (source_.text.size() - at_ < sizeof value) {
+      throw InputError(source_.name, "is cut off, expected cameras.bin of a COLMAP model");
+    }
+    std::memcpy(&value, source_.text.data() + at_, sizeof value);
+    at_ += sizeof value;
+    return value;
+  }
+
+ private:
+  const ConfigSource& source_;
+  std::size_t at_ = 0;
+};
+
+/// cameras.bin: the number of cameras, then of each its id, model, size and parameters.
+CameraChain read_binary_cameras(const ConfigSource& source) {
+  // In the order of the numbers that COLMAP's documentation gives its models.
+  constexpr std::array kModels = {"SIMPLE_PINHOLE",
+                                  "PINHOLE",
+                                  "SIMPLE_RADIAL",
+                                  "RADIAL",
+                                  "OPENCV",
+                                  "OPENCV_FISHEYE",
+                                  "FULL_OPENCV",
+                                  "FOV",
+                                  "SIMPLE_RADIAL_FISHEYE",
+                                  "RADIAL_FISHEYE",
+                                  "THIN_PRISM_FISHEYE"};
+  BinaryNumbers numbers(source);
+  const auto num_cameras = numbers.next<std::uint64_t>();
+  numbers.next<std::uint32_t>();  // The id.
+  const auto number = numbers.next<std::int32_t>();
+  const auto width = numbers.next<std::uint64_t>();
+  const auto height = numbers.next<std::uint64_t>();
+  const bool is_one = num_cameras > 0 && number >= 0 && number < std::ssize(kModels) && width > 0 &&
+                      width <= 1'000'000 && height > 0 && height <= 1'000'000;
+  if (!is_one) {
+    throw InputError(source.name, "begins with no camera, expected cameras.bin of a COLMAP model");
+  }
+  const ColmapCameraModel& model =
+      find_model(kModels[static_cast<std::size_t>(number)], source.name);
+  std::vector<double> parameters;
+  for (std::size_t i = 0; i < model.num_parameters; ++i) {
+    parameters.push_back(numbers.next<double>());
+    if (std::isfinite(parameters.back())) continue;
+    throw InputError(source.name, "has a parameter that is no number, expected finite ones");
+  }
+  CameraChain chain;
+  chain.cameras.push_back({camera_of(model, parameters, source.name), Rigid3()});
+  chain.cameras[0].description.width_px = static_cast<int>(width);
+  chain.cameras[0].description.height_px = static_cast<int>(height);
+  make_rig(chain);  // Refuses what no model accepts.
+  if (num_cameras > 1) {
+    chain.notes.push_back(
+        fmt::format("{}: the first of {} cameras is taken", source.name, num_cameras));
+  }
+  return chain;
+}
+
+bool has_any_key(const ConfigNode& root, Keys keys) { return find_any(root, keys) != nullptr; }
+
+/// Whether a row that is no comment names a model after a number.
+bool is_colmap_text(const ConfigSource& source) {
+  constexpr std::size_t kLongestRow = 1000;
+  std::string_view text = source.text;
+  while (!text.empty()) {
+    const std::string_view row = text.substr(0, text.find('\n'));
+    text.remove_prefix(std::min(text.size(), row.size() + 1));
+    if (row.empty() || row.front() == '#') continue;
+    if (row.size() > kLongestRow) return false;
+    RowReader rows(row, source.name, ' ');
+    if (!rows.next() || rows.fields().size() < 5) return false;
+    const std::string_view model = rows.fields()[1];
+    return is_digit(rows.fields()[0].front()) &&
+           std::ranges::all_of(model, [](char c) { return c == '_' || (c >= 'A' && c <= 'Z'); });
+  }
+  return false;
 }
 
 }  // namespace
@@ -234,6 +332,7 @@ void set_ros_distortion(CameraDescription& camera,
 }
 
 CameraChain read_colmap_calibration(const ConfigSource& source) {
+  if (source.text.find('\0') != std::string::npos) return read_binary_cameras(source);
   RowReader rows(source.text, source.name, ' ');
   if (!rows.next()) {
     throw InputError(source.name, "holds no camera, expected cameras.txt of a COLMAP text model");
@@ -248,6 +347,36 @@ CameraChain read_colmap_calibration(const ConfigSource& source) {
         fmt::format("{}: the first of {} cameras is taken", source.name, num_cameras));
   }
   return chain;
+}
+
+std::optional<CalibrationKind> recognize_calibration(const ConfigSource& source) {
+  const bool is_binary = source.name.ends_with(".bin");
+  if (is_binary || is_colmap_text(source)) return CalibrationKind::kColmap;
+  const std::size_t first = source.text.find_first_not_of(" \t\r\n");
+  if (first != std::string::npos && source.text[first] == '{') {
+    for (const char* key : {"\"frames\"", "\"fl_x\"", "\"camera_angle_x\""}) {
+      if (source.text.find(key) != std::string::npos) return CalibrationKind::kNerfstudio;
+    }
+  }
+  const ConfigNode root = parse_config(without_opencv_header(source));
+  if (!has_any_key(root, {"camera_matrix", "cameraMatrix", "Camera_Matrix", "K", "k"})) {
+    return std::nullopt;
+  }
+  return has_any_key(root, {"distortion_model"}) ? CalibrationKind::kRos : CalibrationKind::kOpencv;
+}
+
+CameraChain read_calibration(CalibrationKind kind, const ConfigSource& source) {
+  switch (kind) {
+    case CalibrationKind::kOpencv:
+      return read_opencv_calibration(source);
+    case CalibrationKind::kRos:
+      return read_ros_calibration(source);
+    case CalibrationKind::kColmap:
+      return read_colmap_calibration(source);
+    case CalibrationKind::kNerfstudio:
+      return read_nerfstudio_calibration(source);
+  }
+  fail_check("known CalibrationKind", __FILE__, __LINE__);
 }
 
 }  // namespace waymark

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,8 +36,22 @@ void set_ros_distortion(CameraDescription& camera,
                         std::vector<double> coeffs,
                         const std::string& where);
 
-/// COLMAP: cameras.txt of a text model; its first camera. COLMAP counts pixels from the corner of
-/// the image; the result counts from the centre of the first pixel.
+/// COLMAP: cameras.txt of a text model, or cameras.bin of a binary one; its first camera. COLMAP
+/// counts pixels from the corner of the image; the result counts from the centre of the first
+/// pixel.
 CameraChain read_colmap_calibration(const ConfigSource& source);
+
+/// nerfstudio and instant-ngp: transforms.json; the camera that all frames share, or that of the
+/// first. Pixels count as in COLMAP.
+CameraChain read_nerfstudio_calibration(const ConfigSource& source);
+
+/// Which of these programs wrote a file, by its content.
+enum class CalibrationKind { kOpencv, kRos, kColmap, kNerfstudio };
+
+/// Recognises a file of one of them; nothing for any other, such as a camchain.
+std::optional<CalibrationKind> recognize_calibration(const ConfigSource& source);
+
+/// Reads a file of that kind with the reader above.
+CameraChain read_calibration(CalibrationKind kind, const ConfigSource& source);
 
 }  // namespace waymark

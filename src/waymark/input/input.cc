@@ -4,6 +4,7 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 
 #include "waymark/bag/bag.h"
@@ -14,18 +15,20 @@
 #include "waymark/input/listing_input.h"
 #include "waymark/input/pairing.h"
 #include "waymark/input/resized_input.h"
+#include "waymark/input/rotated_input.h"
 
 namespace waymark {
 namespace {
 
-constexpr const char* kKnownFormats = "euroc, kitti, tum, images, video or bag";
+constexpr const char* kKnownFormats = "euroc, kitti, tum, replica, images, video or bag";
 
 std::string recognize_folder(const std::filesystem::path& folder) {
   if (is_euroc(folder)) return "euroc";
-  if (is_kitti(folder)) return "kitti";
+  if (is_kitti(folder) || is_kitti_raw(folder)) return "kitti";
   if (std::filesystem::exists(folder / "rgb.txt")) return "tum";
   if (is_bag_folder(folder)) return "bag";
   if (std::filesystem::is_directory(folder / "images")) return "images";
+  if (is_replica(folder)) return "replica";
   const std::size_t num_videos = list_videos(folder).size();
   if (num_videos == 1) return "video";
   if (num_videos > 1) {
@@ -78,7 +81,10 @@ Listing list_files(const std::filesystem::path& path,
                      fmt::format("is a file, expected a folder for format {}", format));
   }
   if (format == "euroc") return list_euroc(path, options);
-  if (format == "kitti") return list_kitti(path, options);
+  if (format == "kitti") {
+    return is_kitti_raw(path) ? list_kitti_raw(path, options) : list_kitti(path, options);
+  }
+  if (format == "replica") return list_replica(path, options);
   if (format == "tum") return list_tum_rgbd(path, options);
   if (format == "images") return list_image_folder(path, options);
   throw InputError("--format",
@@ -90,6 +96,14 @@ std::unique_ptr<Input> open_in_full_size(const std::filesystem::path& path,
   if (is_camera(path)) {
     check_companions("camera", options);
     return open_camera(path, options);
+  }
+  if (path == "-") {
+    check_companions("images", options);
+    return std::make_unique<ListingInput>("standard input", list_named_images(options), options);
+  }
+  if (is_address(path)) {
+    check_companions("video", options);
+    return open_video(path, options);
   }
   if (!std::filesystem::exists(path)) {
     throw InputError(path.string(),
@@ -110,14 +124,24 @@ std::unique_ptr<Input> open_in_full_size(const std::filesystem::path& path,
 
 }  // namespace
 
+bool is_address(const std::filesystem::path& path) {
+  const std::string text = path.string();
+  const std::size_t end = text.find("://");
+  const auto is_of_scheme = [](char c) { return (c >= 'a' && c <= 'z') || is_digit(c); };
+  return end != std::string::npos && end > 1 &&
+         std::ranges::all_of(text.substr(0, end), is_of_scheme);
+}
+
 bool is_camera(const std::filesystem::path& path) {
   const std::string text = path.string();
-  return text.starts_with("camera:") || text.starts_with("/dev/video");
+  if (text.starts_with("camera:") || text.starts_with("/dev/video")) return true;
+  return is_address(path) && !(text.starts_with("http") && is_video_name(path));
 }
 
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
   silence_image_library();
   std::unique_ptr<Input> input = open_in_full_size(path, options);
+  if (options.rotate_deg) input = rotate_input(std::move(input), *options.rotate_deg);
   return options.resize_px ? resize_input(std::move(input), *options.resize_px) : std::move(input);
 }
 

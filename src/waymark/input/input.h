@@ -49,7 +49,7 @@ struct InputFrame {
 
 /// What to take of an input, and how.
 struct InputOptions {
-  /// "euroc", "kitti", "tum", "images", "video", "bag"; empty: recognised.
+  /// "euroc", "kitti", "tum", "replica", "images", "video", "bag"; empty: recognised.
   std::string format = {};
   std::optional<Setup> setup = {};         ///< Nothing: all that the input offers.
   std::size_t first = 0;                   ///< Index of the first frame used.
@@ -57,12 +57,15 @@ struct InputOptions {
   std::size_t every = 1;                   ///< Of the frames from first on, each n-th one.
   /// Images of camera 1 where the input is one folder of images, or one video, per camera.
   std::filesystem::path right = {};
+  /// What is read where the path is "-": a line per image, "PATH" or "SECONDS PATH".
+  std::optional<std::string> image_list = {};
   /// Depth images of a folder of images, by name or order; empty: none.
   std::filesystem::path depth = {};
   std::optional<double> fps = {};  ///< Frames per second where nothing tells their times.
   /// Width that images of camera 0 are made smaller to, and all else with them: see
   /// resize_input().
   std::optional<int> resize_px = {};
+  std::optional<int> rotate_deg = {};  ///< See rotate_input(), which comes before.
   /// One image, a folder with one per frame by name or order, or a video; empty: none.
   std::filesystem::path mask = {};
   bool has_jpeg = false;        ///< Frames come with a JPEG file, too.
@@ -79,6 +82,8 @@ struct InputCounts {
   std::size_t out_of_order = 0;
   /// Frames of which camera 0 alone is used: there is no image of camera 1, or no depth.
   std::size_t without_partner = 0;
+  /// Frames that a video has less than its container states, known at its end.
+  std::size_t missing_at_end = 0;
 };
 
 /// A topic of a bag.
@@ -120,14 +125,16 @@ class Input {
   virtual std::optional<InputFrame> next() = 0;
 };
 
-/// Whether a path means a camera: camera:N, or a device such as /dev/video0.
+/// Whether a path means a camera: camera:N, a device such as /dev/video0, or the address of a
+/// stream (rtsp://HOST/PATH; of http:// those that do not end as the name of a video does).
 bool is_camera(const std::filesystem::path& path);
 
 /// Recognises what path holds and opens it: a folder in the layout of EuRoC / TUM-VI, KITTI
 /// odometry or TUM RGB-D, a folder of images, a video file, a folder that holds one video or
-/// images/, a bag of ROS, or a camera (its frames have no end; their times are those of their
-/// arrival). Reads the first image. Throws InputError that names the file (and line) for what is
-/// missing or malformed, and for a first image that contradicts the calibration.
+/// images/, a bag of ROS, the address of a video (http://...), a list of images ("-"), or a camera
+/// (its frames have no end; their times are those of their arrival). Reads the first image. Throws
+/// InputError that names the file (and line) for what is missing or malformed, and for a first
+/// image that contradicts the calibration.
 ///
 /// Times that are not later than the one before are left out up to a tenth of the input, and frames
 /// that lack the image of camera 1 or the depth are used without: InputInfo::counts.

@@ -55,7 +55,7 @@ TEST(OpenInput, SaysWhatItWants) {
   InputOptions options;
   options.format = "eurok";
   EXPECT_EQ(error(folder.path(), options),
-            "--format: is 'eurok', expected euroc, kitti, tum, images, video or bag");
+            "--format: is 'eurok', expected euroc, kitti, tum, replica, images, video or bag");
   options.format = "kitti";
   EXPECT_THAT(error(folder / "a.txt", options),
               HasSubstr("is a file, expected a folder for format kitti"));

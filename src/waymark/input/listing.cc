@@ -11,6 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/image_times.h"
 #include "waymark/input/pairing.h"
 
 namespace waymark {
@@ -90,14 +91,20 @@ std::filesystem::path images_folder_of(const std::filesystem::path& folder) {
   return std::filesystem::is_directory(folder / "images") ? folder / "images" : folder;
 }
 
+/// From the file, unless that is empty; as --fps says; by the names; or at a usual rate.
 std::vector<std::int64_t> image_times(const std::vector<std::filesystem::path>& images,
+                                      const std::filesystem::path& times_path,
                                       const InputOptions& options,
                                       Listing& listing) {
-  const std::filesystem::path folder = images.front().parent_path();
-  const std::filesystem::path times_path = find_image_times(folder);
   if (!times_path.empty()) {
     listing.notes.push_back(fmt::format("times from {}", times_path.string()));
-    return read_times(times_path, images.size(), folder.string());
+    return read_times(times_path, images.size(), images.front().parent_path().string());
+  }
+  if (!options.fps) {
+    if (const auto named = times_in_names(images)) {
+      listing.notes.push_back("times from the names of the images");
+      return *named;
+    }
   }
   const double rate_hz = options.fps.value_or(kAssumedRateHz);
   listing.notes.push_back(
@@ -206,28 +213,60 @@ std::string describe_rate(const std::vector<std::int64_t>& times_ns) {
       "{} frames over {:.1f} s, {:.4g} per second", times_ns.size(), duration_s, rate_hz);
 }
 
-Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options) {
-  const Setup richest = !options.right.empty()   ? Setup::kStereo
-                        : !options.depth.empty() ? Setup::kRgbd
-                                                 : Setup::kMono;
-  Listing listing;
-  listing.format = "images";
-  listing.title = "folder of images";
-  listing.setup = choose_setup(folder, {Setup::kMono, richest}, options.setup);
+namespace {
 
-  const std::vector<std::filesystem::path> images = list_images(images_folder_of(folder));
-  const std::vector<std::int64_t> times_ns = image_times(images, options, listing);
-  const std::string where = images.front().parent_path().string();
+/// Frames of images, with the partners that the options name.
+void add_images(Listing& listing,
+                const std::vector<std::filesystem::path>& images,
+                const std::vector<std::int64_t>& times_ns,
+                const std::string& where,
+                const InputOptions& options) {
   std::vector<std::filesystem::path> used;
   for (const std::size_t i : keep_increasing(listing, times_ns, where)) {
     used.push_back(images[i]);
     listing.frames.push_back({times_ns[i], {images[i]}, {}});
   }
-  if (listing.setup == Setup::kMono) return listing;
+  if (listing.setup == Setup::kMono) return;
   const std::filesystem::path& others_folder =
       listing.setup == Setup::kStereo ? options.right : options.depth;
   const std::vector<std::filesystem::path> others = list_images(images_folder_of(others_folder));
   add_partners(listing, partners_by_name(used, others), others, {}, others_folder.string());
+}
+
+Listing image_listing(const std::filesystem::path& where,
+                      std::string_view title,
+                      const InputOptions& options) {
+  const Setup richest = !options.right.empty()   ? Setup::kStereo
+                        : !options.depth.empty() ? Setup::kRgbd
+                                                 : Setup::kMono;
+  Listing listing;
+  listing.format = "images";
+  listing.title = title;
+  listing.setup = choose_setup(where, {Setup::kMono, richest}, options.setup);
+  return listing;
+}
+
+}  // namespace
+
+Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options) {
+  Listing listing = image_listing(folder, "folder of images", options);
+  const std::vector<std::filesystem::path> images = list_images(images_folder_of(folder));
+  const std::filesystem::path times_path = find_image_times(images.front().parent_path());
+  const std::vector<std::int64_t> times_ns = image_times(images, times_path, options, listing);
+  add_images(listing, images, times_ns, images.front().parent_path().string(), options);
+  return listing;
+}
+
+Listing list_named_images(const InputOptions& options) {
+  constexpr const char* kName = "standard input";
+  Listing listing = image_listing(kName, "list of images", options);
+  ImageList list = parse_image_list(options.image_list.value_or(""), kName);
+  if (list.times_ns.empty()) {
+    list.times_ns = image_times(list.images, {}, options, listing);
+  } else {
+    listing.notes.push_back("times from the list");
+  }
+  add_images(listing, list.images, list.times_ns, kName, options);
   return listing;
 }
 

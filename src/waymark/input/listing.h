@@ -51,6 +51,9 @@ std::size_t count_images(const std::filesystem::path& folder);
 /// Video files of a folder in the same order; empty if there are none.
 std::vector<std::filesystem::path> list_videos(const std::filesystem::path& folder);
 
+/// Whether a path is an address such as http://HOST/PATH, which the video library reads.
+bool is_address(const std::filesystem::path& path);
+
 /// Whether the extension is one of a video that may hold frames.
 bool is_video_name(const std::filesystem::path& path);
 

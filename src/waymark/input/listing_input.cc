@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -17,6 +18,28 @@ namespace {
 /// With so many bad images in a row at the start the path is wrong rather than the disk bad.
 constexpr std::size_t kMaxBadAtStart = 50;
 constexpr std::string_view kDepthImage = "a 16-bit depth image";
+
+/// Whether depth of fewer pixels shows the same as the images: as wide for its height within 1 %.
+bool is_smaller_alike(const ImageSize& depth, const ImageSize& image) {
+  constexpr double kSameShape = 0.01;
+  const double factor_x = static_cast<double>(depth.width_px) / image.width_px;
+  const double factor_y = static_cast<double>(depth.height_px) / image.height_px;
+  return factor_x < 1.0 && factor_y < 1.0 && std::abs(factor_x / factor_y - 1.0) <= kSameShape;
+}
+
+/// Each pixel for all those that it covers.
+DepthImage enlarged(const DepthImage& depth, const ImageSize& size) {
+  const double factor_x = static_cast<double>(depth.width_px) / size.width_px;
+  const double factor_y = static_cast<double>(depth.height_px) / size.height_px;
+  DepthImage result(size.width_px, size.height_px);
+  for (int y = 0; y < size.height_px; ++y) {
+    const std::uint16_t* const from = depth.row(static_cast<int>((y + 0.5) * factor_y));
+    for (int x = 0; x < size.width_px; ++x) {
+      result.row(y)[x] = from[static_cast<int>((x + 0.5) * factor_x)];
+    }
+  }
+  return result;
+}
 
 std::string stem_of(const ListedFrame& frame) { return frame.images.front().stem().string(); }
 
@@ -111,9 +134,11 @@ void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) cons
   if (!frame.depth) {
     frame.warning =
         fmt::format("{}: {}", listed.depth.string(), describe_bad_image(listed.depth, kDepthImage));
-  } else if (size_of(*frame.depth) != size) {
-    frame.warning = describe_wrong_size(listed.depth, size_of(*frame.depth), size);
+  } else if (size_of(*frame.depth) != depth_size_) {
+    frame.warning = describe_wrong_size(listed.depth, size_of(*frame.depth), depth_size_);
     frame.depth.reset();
+  } else if (depth_size_ != size) {
+    frame.depth = enlarged(*frame.depth, size);
   }
 }
 
@@ -156,14 +181,19 @@ void ListingInput::check_first_frame(std::size_t index) {
   masks_.check_first(stem_of(listed), frame);
 }
 
-void ListingInput::check_first_depth() const {
+void ListingInput::check_first_depth() {
   for (const ListedFrame& listed : listing_.frames) {
     if (listed.depth.empty()) continue;
     const std::optional<DepthImage> depth = read_depth_image(listed.depth);
     if (!depth) {
       throw InputError(listed.depth.string(), describe_bad_image(listed.depth, kDepthImage));
     }
-    if (depth->width_px != info_.width_px || depth->height_px != info_.height_px) {
+    const ImageSize size{info_.width_px, info_.height_px};
+    depth_size_ = size_of(*depth);
+    if (listing_.format == "images" && is_smaller_alike(depth_size_, size)) {
+      listing_.notes.push_back(
+          fmt::format("depth images of {}x{} px are enlarged", depth->width_px, depth->height_px));
+    } else if (depth_size_ != size) {
       throw InputError(listed.depth.string(),
                        fmt::format("depth of {}x{}, expected {}x{} as the colour image",
                                    depth->width_px,

@@ -30,7 +30,7 @@ class ListingInput : public Input {
   void read_depth(const ListedFrame& listed, InputFrame& frame) const;
   std::size_t find_first_readable() const;
   void check_first_frame(std::size_t index);
-  void check_first_depth() const;
+  void check_first_depth();
   void describe(const std::filesystem::path& path, const InputOptions& options);
 
   Listing listing_;
@@ -40,6 +40,7 @@ class ListingInput : public Input {
   bool has_right_jpeg_;
   InputInfo info_;
   std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
+  ImageSize depth_size_;          ///< Of depth images, as they are in their files.
   std::size_t num_read_ = 0;
   bool has_begun_ = false;  ///< A frame that was whole was given.
 };

@@ -22,19 +22,40 @@ struct Part {
   std::size_t num_images = 0;
 };
 
+constexpr int kMaxDepth = 5;
+constexpr std::size_t kMaxFolders = 1000;
+
+/// By name.
+std::vector<std::filesystem::path> sub_folders(const std::filesystem::path& folder) {
+  std::vector<std::filesystem::path> folders;
+  std::error_code error;
+  for (std::filesystem::directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (folders.size() < kMaxFolders && entry->is_directory(error))
+      folders.push_back(entry->path());
+  }
+  std::ranges::sort(folders);
+  return folders;
+}
+
 std::vector<Part> parts_of(const std::filesystem::path& folder, bool are_videos) {
   std::vector<Part> parts;
   if (are_videos) {
     for (const auto& video : list_videos(folder)) parts.push_back({video.filename().string(), 0});
     return parts;
   }
-  std::error_code error;
-  for (const auto& entry : std::filesystem::directory_iterator(folder, error)) {
-    if (!entry.is_directory(error)) continue;
-    const std::size_t count = count_images(entry.path());
-    if (count > 0) parts.push_back({entry.path().filename().string(), count});
+  // Folders of the level that is nearest of those that hold images.
+  std::vector<std::filesystem::path> level = sub_folders(folder);
+  for (int depth = 0; depth < kMaxDepth && parts.empty(); ++depth) {
+    std::vector<std::filesystem::path> next;
+    for (const std::filesystem::path& sub_folder : level) {
+      const std::size_t count = count_images(sub_folder);
+      if (count > 0) parts.push_back({sub_folder.lexically_relative(folder).string(), count});
+      for (auto& below : sub_folders(sub_folder)) next.push_back(std::move(below));
+      if (next.size() > kMaxFolders) break;
+    }
+    level = std::move(next);
   }
-  std::ranges::sort(parts, {}, &Part::name);
   return parts;
 }
 

@@ -93,6 +93,24 @@ TEST(TwoFolders, MayBeColourAndDepth) {
   EXPECT_EQ(input->info().counts.without_partner, 1U);
 }
 
+TEST(TwoFolders, MayHaveDepthOfFewerPixels) {
+  const TemporaryFolder folder;
+  write_image(folder / "rgb/a.png", 1296, 968, 10);
+  cv::Mat depth(480, 640, CV_16UC1, cv::Scalar(500));
+  depth(cv::Rect(320, 0, 320, 480)).setTo(900);
+  std::filesystem::create_directories(folder / "depth");
+  cv::imwrite((folder / "depth/a.png").string(), depth);
+  const auto input = open_input(folder / "rgb", {.depth = folder / "depth"});
+  EXPECT_THAT(input->info().lines, Contains("depth images of 640x480 px are enlarged"));
+  const DepthImage enlarged = input->next()->depth.value();
+  EXPECT_EQ(enlarged.width_px, 1296);
+  EXPECT_EQ(enlarged.view().at(647, 967), 500);
+  EXPECT_EQ(enlarged.view().at(648, 0), 900);
+  write_image(folder / "depth/a.png", 640, 400, 500, CV_16UC1);
+  EXPECT_THAT(open_error(folder / "rgb", {.depth = folder / "depth"}),
+              HasSubstr("depth of 640x400, expected 1296x968 as the colour image"));
+}
+
 TEST(SubFolders, AreNamedWithTheCommandForThem) {
   const TemporaryFolder folder;
   make_pair_folders(folder, 3);
@@ -106,6 +124,15 @@ TEST(SubFolders, AreNamedWithTheCommandForThem) {
                         (folder / "right").string()));
   std::filesystem::remove_all(folder / "right");
   EXPECT_THAT(open_error(folder.path()), HasSubstr("holds no image, expected png, jpg"));
+}
+
+TEST(SubFolders, AreFoundFurtherDown) {
+  const TemporaryFolder folder;
+  write_image(folder / "day/drive/cam_left/x/a.png", 8, 6, 10);
+  write_image(folder / "day/drive/cam_right/x/a.png", 8, 6, 10);
+  EXPECT_THAT(open_error(folder.path()),
+              HasSubstr("but day/drive/cam_left/x/ and day/drive/cam_right/x/ hold 1 images each: "
+                        "for a stereo pair say waymark run"));
 }
 
 TEST(TwoInputs, HaveToBeOfOneKind) {

@@ -55,6 +55,7 @@ class ResizedInput final : public Input {
 
   std::optional<InputFrame> next() override {
     std::optional<InputFrame> frame = input_->next();
+    info_.counts = input_->info().counts;
     if (!frame) return frame;
     for (Image& image : frame->images) image = reduce(image.view(), factor_);
     if (frame->depth) frame->depth = pick_reduced(frame->depth->view(), factor_);

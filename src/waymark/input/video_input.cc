@@ -50,7 +50,7 @@ class VideoInput : public Input {
  private:
   void read_times_beside(const std::filesystem::path& path) {
     const std::filesystem::path times_path = path.parent_path() / "times.txt";
-    if (!std::filesystem::exists(times_path)) return;
+    if (is_address(path) || !std::filesystem::exists(times_path)) return;
     const std::vector<std::int64_t> times_ns = read_times(times_path);
     used_ = increasing_times(times_ns, times_path.string(), "times");
     for (const std::size_t i : used_) info_.times_ns.push_back(times_ns[i]);
@@ -71,7 +71,10 @@ class VideoInput : public Input {
     if (!used_.empty() && place >= used_.size()) return std::nullopt;
     const std::size_t index = used_.empty() ? place : used_[place];
     while (reader_.num_grabbed() <= index) {
-      if (!reader_.grab()) return std::nullopt;
+      if (!reader_.grab()) {
+        info_.counts.missing_at_end = reader_.num_missing();
+        return std::nullopt;
+      }
     }
     ++num_read_;
     InputFrame frame;

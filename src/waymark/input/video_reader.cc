@@ -14,6 +14,10 @@ namespace waymark {
 namespace {
 
 constexpr double kAssumedVideoRateHz = 30.0;
+constexpr int kMaxRetries = 50;
+/// Containers that do not count their frames state what their length comes to.
+constexpr double kInexact = 0.02;
+constexpr std::size_t kInexactFrames = 3;
 
 }  // namespace
 
@@ -33,7 +37,13 @@ VideoReader::VideoReader(const std::filesystem::path& path) {
 }
 
 bool VideoReader::grab() {
-  if (!capture_.grab()) return false;
+  // The library stops at what it cannot decode, too, and goes on where it is asked again.
+  const std::size_t stated = num_frames().value_or(0);
+  bool is_there = capture_.grab();
+  for (int i = 0; i < kMaxRetries && !is_there && num_grabbed_ < stated; ++i) {
+    is_there = capture_.grab();
+  }
+  if (!is_there) return false;
   const double time_ms = capture_.get(cv::CAP_PROP_POS_MSEC);
   const std::int64_t step_ns = static_cast<std::int64_t>(1e9 / rate_hz_);
   std::int64_t time_ns =
@@ -60,6 +70,15 @@ std::string VideoReader::encode() {
   std::vector<std::uint8_t> bytes;
   WAYMARK_CHECK(capture_.retrieve(mat) && cv::imencode(".jpg", mat, bytes));
   return {bytes.begin(), bytes.end()};
+}
+
+std::size_t VideoReader::num_missing() const {
+  const std::size_t stated = num_frames().value_or(0);
+  if (stated <= num_grabbed_) return 0;
+  const std::size_t missing = stated - num_grabbed_;
+  const bool is_inexact = missing <= kInexactFrames ||
+                          static_cast<double>(missing) <= kInexact * static_cast<double>(stated);
+  return is_inexact ? 0 : missing;
 }
 
 std::optional<std::size_t> VideoReader::num_frames() const {

@@ -19,7 +19,7 @@ class VideoReader {
   /// Throws InputError for a file that is no video.
   explicit VideoReader(const std::filesystem::path& path);
 
-  /// Steps to the next frame; false at the end.
+  /// Steps to the next frame, past what is damaged; false at the end.
   bool grab();
   /// The frame grabbed last; nothing where it is damaged.
   std::optional<Image> decode();
@@ -31,6 +31,8 @@ class VideoReader {
   double rate_hz() const { return rate_hz_; }
   /// Frames as the container states, which may be an estimate.
   std::optional<std::size_t> num_frames() const;
+  /// At the end: how many frames there are less than that, if it is beyond what an estimate is off.
+  std::size_t num_missing() const;
 
  private:
   cv::VideoCapture capture_;

@@ -6,6 +6,7 @@
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
+#include "waymark/base/text.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/input.h"
 #include "waymark/input/testing/videos.h"
@@ -104,6 +105,41 @@ TEST(Video, LeavesOutTimesOutOfOrder) {
   const InputFrame frame = input->next().value();
   EXPECT_EQ(frame.timestamp_ns, 5'000'000'000);
   EXPECT_EQ(frame.index, 4U);
+}
+
+TEST(Video, TellsThatItEndsBeforeItsContainerSays) {
+  const TemporaryFolder folder;
+  make_video(folder / "v.avi", 12);
+  std::string bytes = read_text_file(folder / "v.avi", "");
+  // The number of frames in the header of the stream (AVI RIFF file reference, AVISTREAMHEADER).
+  const std::size_t length = bytes.find("strh") + 40;
+  ASSERT_EQ(bytes[length], 12);
+  bytes[length] = 60;
+  folder.write("v.avi", bytes);
+  const std::unique_ptr<Input> input = open_input(folder / "v.avi", {});
+  EXPECT_EQ(input->info().num_frames, std::size_t{60});
+  std::size_t num_frames = 0;
+  while (input->next()) ++num_frames;
+  EXPECT_EQ(num_frames, 12u);
+  EXPECT_EQ(input->info().counts.missing_at_end, 48u);
+}
+
+TEST(Video, GoesOnAfterWhatIsDamaged) {
+  const TemporaryFolder folder;
+  make_video(folder / "v.avi", 12);
+  std::string bytes = read_text_file(folder / "v.avi", "");
+  // Two frames in the middle.
+  const std::size_t start = bytes.size() * 4 / 10;
+  for (std::size_t i = start; i < start + bytes.size() / 8; ++i) {
+    bytes[i] = static_cast<char>(i * 31);
+  }
+  folder.write("v.avi", bytes);
+  const std::unique_ptr<Input> input = open_input(folder / "v.avi", {});
+  float last = 0.0F;
+  while (const auto frame = input->next()) {
+    if (!frame->images.empty()) last = frame->images[0].view().at(8, 6);
+  }
+  EXPECT_NEAR(last, 240, 3) << "the last frame is read";
 }
 
 TEST(Video, SaysWhatIsWrong) {

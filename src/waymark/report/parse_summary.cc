@@ -145,6 +145,7 @@ LoopFrames parse_loop(const SummaryObject& summary, const SummaryJson& json) {
 void parse_counts(const SummaryObject& object, RunSummary& summary) {
   object.take("out_of_order", summary.out_of_order);
   object.take("without_partner", summary.without_partner);
+  object.take("missing_at_end", summary.missing_at_end);
   object.take("keyframes", summary.keyframes);
   object.take("landmarks", summary.landmarks);
   object.take("submaps", summary.submaps);
