@@ -11,6 +11,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/config_file.h"
+#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/system/settings.h"
 
@@ -24,7 +26,11 @@ int print_settings(bool is_markdown) {
 
 int check_settings(const std::vector<std::filesystem::path>& files) {
   std::vector<ConfigSource> sources;
-  for (const std::filesystem::path& file : files) sources.push_back(ConfigSource::from_file(file));
+  std::vector<std::string> notes;
+  for (const std::filesystem::path& file : files) {
+    sources.push_back(read_config_file(file, notes));
+  }
+  for (const std::string& note : notes) print_result("note: {}\n", note);
   const ConfigNode config = merge_configs(sources);
   Settings settings;
   read_settings(settings, config);
@@ -44,7 +50,7 @@ int print_camchain(CalibrationReader read, const std::vector<std::filesystem::pa
     throw InputError("command line",
                      fmt::format("--from has {} files, expected one calibration", files.size()));
   }
-  const CameraChain chain = read(ConfigSource::from_file(files[0]));
+  const CameraChain chain = read(read_calibration_source(files[0]));
   for (const std::string& note : chain.notes) print_message("note: {}\n", note);
   print_result("{}", format_camchain(chain));
   return kDone;
@@ -63,8 +69,11 @@ void add_config_command(CLI::App& program, Command& command) {
                                 *read,
                                 {{"opencv", read_opencv_calibration},
                                  {"ros", read_ros_calibration},
-                                 {"colmap", read_colmap_calibration}},
-                                "FILE is a calibration of opencv, ros or colmap: print a camchain");
+                                 {"colmap", read_colmap_calibration},
+                                 {"nerfstudio", read_nerfstudio_calibration},
+                                 {"orbslam", read_orbslam_settings}},
+                                "FILE is a calibration of opencv, ros, colmap, nerfstudio or "
+                                "orbslam: print a camchain");
   const auto is_markdown = std::make_shared<bool>(false);
   config.add_flag(
       "--markdown", *is_markdown, "Print the settings as tables of a page, docs/settings.md");

@@ -23,8 +23,6 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxMapBytes = std::size_t{4} << 30;
-
 struct ImportOptions {
   std::filesystem::path map;
   std::filesystem::path settings;
@@ -39,9 +37,10 @@ void print_notes(const std::vector<std::string>& notes) {
 void expect_no_settings(const ImportOptions& options) {
   const std::string suffix = options.map.extension().string();
   if (suffix != ".yaml" && suffix != ".yml") return;
-  throw InputError(options.map.string(),
-                   "is a settings file, expected a map (.msg); settings are given as --settings " +
-                       options.map.string());
+  throw InputError(
+      options.map.string(),
+      "is a settings file, expected a map (.msg, .db); settings are given as --settings " +
+          options.map.string());
 }
 
 std::optional<CameraChain> read_chain(const ImportOptions& options) {
@@ -73,7 +72,7 @@ int import_settings(const ImportOptions& options) {
 
 int import_map(const ImportOptions& options) {
   if (options.map.empty() && options.settings.empty()) {
-    throw InputError("command line", "MAP is missing, expected a .msg file or --settings");
+    throw InputError("command line", "MAP is missing, expected a .msg or .db file, or --settings");
   }
   if (options.map.empty()) return import_settings(options);
   expect_no_settings(options);
@@ -81,8 +80,9 @@ int import_map(const ImportOptions& options) {
     throw InputError("command line", "-o is missing, expected the map file to write");
   }
   const std::optional<CameraChain> chain = read_chain(options);
-  const std::string bytes = read_text_file(options.map, "a map (.msg)", kMaxMapBytes);
-  ImportedMap imported = import_openvslam_map(bytes, options.map.string());
+  std::optional<ConfigSource> settings;
+  if (chain) settings = ConfigSource::from_file(options.settings);
+  ImportedMap imported = import_openvslam_file(options.map, settings);
   print_notes(imported.notes);
   if (chain && !has_camera(imported.map, chain->cameras[0].description)) {
     print_message("note: {}: its camera is none of the map's, which are used\n",
@@ -104,7 +104,7 @@ void add_import_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<ImportOptions>();
   CLI::App& importing = *program.add_subcommand(
       "import", "Take over a map of OpenVSLAM or stella_vslam, or the cameras of its settings");
-  importing.add_option("MAP", options->map, "Map file (.msg)");
+  importing.add_option("MAP", options->map, "Map file (.msg, .db)");
   importing.add_option("-o,--out", options->out, "Map file to write; without MAP a camchain");
   importing.add_option("--settings",
                        options->settings,

@@ -1,7 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// The readers of settings and calibrations. The first byte of the input, a digit, says which.
+// The readers of settings, calibrations and lists of images. The first byte of the input, a digit,
+// says which.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -11,9 +12,11 @@
 #include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/exchange/config_file.h"
 #include "waymark/exchange/openvslam_camera.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/input/foreign_calibration.h"
+#include "waymark/input/image_times.h"
 
 namespace {
 
@@ -27,11 +30,25 @@ CameraChain read_own(const ConfigSource& source) {
   return waymark::read_camchain(config).value_or(CameraChain());
 }
 
+CameraChain read_any(const ConfigSource& source) {
+  return waymark::read_foreign_cameras(source).value_or(CameraChain());
+}
+
+CameraChain read_list(const ConfigSource& source) {
+  const waymark::ImageList list = waymark::parse_image_list(source.text, source.name);
+  waymark::times_in_names(list.images);
+  return {};
+}
+
 constexpr std::array kReaders = {read_own,
                                  waymark::read_opencv_calibration,
                                  waymark::read_ros_calibration,
                                  waymark::read_colmap_calibration,
-                                 waymark::read_openvslam_settings};
+                                 waymark::read_openvslam_settings,
+                                 waymark::read_orbslam_settings,
+                                 waymark::read_nerfstudio_calibration,
+                                 read_any,
+                                 read_list};
 
 }  // namespace
 

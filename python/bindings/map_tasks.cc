@@ -30,8 +30,6 @@ namespace {
 
 using MapClass = Class<PythonMap, std::shared_ptr<PythonMap>>;
 
-constexpr std::size_t kMaxImportBytes = std::size_t{4} << 30;
-
 /// Two maps in one, and what became of them.
 struct PythonMergedMap {
   std::shared_ptr<PythonMap> map;
@@ -190,8 +188,7 @@ py::tuple import_map(const py::object& path) {
   std::vector<std::string> notes;
   {
     const ReleasedGil released;
-    ImportedMap imported =
-        import_openvslam_map(read_text_file(file, "a map (.msg)", kMaxImportBytes), file.string());
+    ImportedMap imported = import_openvslam_file(file);
     map = std::make_shared<PythonMap>();
     map->stored.map = imported.map.freeze();
     notes = std::move(imported.notes);
@@ -334,7 +331,7 @@ void bind_map_tasks(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::modul
   module.def("import_map", &import_map, py::arg("path"), R"(import_map(path)
 --
 
-Takes over a map (.msg) of OpenVSLAM or stella_vslam: the Map, and a list of str that says what was
+Takes over a map (.msg, .db) of OpenVSLAM or stella_vslam: the Map, and a list of str that says what was
 left out. InputError for one that is damaged.)");
   module.def(
       "import_settings",

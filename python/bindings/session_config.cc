@@ -9,6 +9,7 @@
 #include "waymark/base/config.h"
 #include "waymark/base/config_value.h"
 #include "waymark/base/text.h"
+#include "waymark/exchange/config_file.h"
 
 namespace waymark::python {
 namespace {
@@ -46,7 +47,8 @@ void add_sources(py::handle cameras, std::vector<ConfigSource>& sources, int nes
   } else if (py::isinstance<py::list>(cameras) || py::isinstance<py::tuple>(cameras)) {
     for (const py::handle part : cameras) add_sources(part, sources, nesting + 1);
   } else if (py::isinstance<py::str>(cameras) || py::hasattr(cameras, "__fspath__")) {
-    sources.push_back(ConfigSource::from_file(path_argument("cameras", cameras)));
+    std::vector<std::string> notes;
+    sources.push_back(read_config_file(path_argument("cameras", cameras), notes));
   } else {
     fail_type("cameras", cameras, kExpectedCameras);
   }

@@ -5,58 +5,14 @@
 
 #include <algorithm>
 #include <map>
-#include <optional>
 
 #include "waymark/bag/bag.h"
+#include "waymark/bag/sqlite_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
-
-struct CloseSqlite {
-  void operator()(sqlite3* base) const { sqlite3_close_v2(base); }
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-  void operator()(sqlite3_blob* blob) const { sqlite3_blob_close(blob); }
-};
-using Database = std::unique_ptr<sqlite3, CloseSqlite>;
-using Statement = std::unique_ptr<sqlite3_stmt, CloseSqlite>;
-using Blob = std::unique_ptr<sqlite3_blob, CloseSqlite>;
-
-Statement prepare(sqlite3* base, const char* query) {
-  sqlite3_stmt* statement = nullptr;
-  sqlite3_prepare_v2(base, query, -1, &statement, nullptr);
-  return Statement(statement);
-}
-
-/// As a file of somebody else's: nothing that it defines is run.
-Database open_database(const std::string& uri) {
-  sqlite3* opened = nullptr;
-  const int status = sqlite3_open_v2(
-      uri.c_str(), &opened, SQLITE_OPEN_READONLY | SQLITE_OPEN_URI | SQLITE_OPEN_NOMUTEX, nullptr);
-  Database base(opened);
-  if (status != SQLITE_OK) return nullptr;
-  for (const int option : {SQLITE_DBCONFIG_ENABLE_TRIGGER,
-                           SQLITE_DBCONFIG_ENABLE_VIEW,
-                           SQLITE_DBCONFIG_TRUSTED_SCHEMA}) {
-    sqlite3_db_config(base.get(), option, 0, nullptr);
-  }
-  sqlite3_exec(base.get(), "PRAGMA cell_size_check=ON", nullptr, nullptr, nullptr);
-  const bool is_readable =
-      sqlite3_exec(base.get(), "SELECT 1 FROM messages LIMIT 1", nullptr, nullptr, nullptr) ==
-      SQLITE_OK;
-  return is_readable ? std::move(base) : nullptr;
-}
-
-/// A path in a URI of SQLite.
-std::string uri_of(const std::filesystem::path& path) {
-  std::string uri = "file:";
-  for (const char c : std::filesystem::absolute(path).string()) {
-    const bool is_special = c == '%' || c == '?' || c == '#';
-    uri += is_special ? fmt::format("%{:02x}", static_cast<unsigned>(c)) : std::string(1, c);
-  }
-  return uri;
-}
 
 std::string_view text_of(sqlite3_stmt* row, int column) {
   const auto* text = reinterpret_cast<const char*>(sqlite3_column_text(row, column));
@@ -64,29 +20,15 @@ std::string_view text_of(sqlite3_stmt* row, int column) {
   return {text, static_cast<std::size_t>(sqlite3_column_bytes(row, column))};
 }
 
-/// Rows come in the order of their ids. In a damaged file pages may refer to each other in a
-/// circle, which has no end.
-class RowOrder {
- public:
-  /// False for a row, whose id is in column 0, that is not after the one before.
-  bool take(sqlite3_stmt* row) {
-    const std::int64_t id = sqlite3_column_int64(row, 0);
-    const bool is_next = !last_ || id > *last_;
-    last_ = id;
-    return is_next;
-  }
-
- private:
-  std::optional<std::int64_t> last_;
+struct CloseBlob {
+  void operator()(sqlite3_blob* blob) const { sqlite3_blob_close(blob); }
 };
+using Blob = std::unique_ptr<sqlite3_blob, CloseBlob>;
 
 class SqliteBag : public BagFile {
  public:
   explicit SqliteBag(const std::filesystem::path& path) : path_(path) {
-    // What still stands in the journal of a recorder that did not end is read along, unless the
-    // folder cannot be written, where such a journal cannot be used.
-    base_ = open_database(uri_of(path));
-    if (!base_) base_ = open_database(uri_of(path) + "?immutable=1");
+    base_ = open_sqlite(path, "messages");
     if (!base_) {
       throw InputError(path.string(),
                        "cannot be read as a bag of ROS 2, expected a data base with "
@@ -96,11 +38,11 @@ class SqliteBag : public BagFile {
 
   void scan(std::uint32_t file, BagContent& content) {
     const std::map<std::int64_t, std::uint32_t> topics = read_topics(content);
-    const Statement rows =
-        prepare(base_.get(), "SELECT rowid, topic_id, timestamp FROM messages NOT INDEXED");
+    const SqliteStatement rows =
+        prepare_sqlite(base_.get(), "SELECT rowid, topic_id, timestamp FROM messages NOT INDEXED");
     std::size_t num_bad = 0;
     int status = SQLITE_ERROR;
-    RowOrder order;
+    SqliteRowOrder order;
     while (rows && (status = sqlite3_step(rows.get())) == SQLITE_ROW && order.take(rows.get())) {
       const auto topic = topics.find(sqlite3_column_int64(rows.get(), 1));
       if (topic == topics.end()) continue;
@@ -146,9 +88,9 @@ class SqliteBag : public BagFile {
  private:
   std::map<std::int64_t, std::uint32_t> read_topics(BagContent& content) {
     std::map<std::int64_t, std::uint32_t> topics;
-    const Statement rows = prepare(
+    const SqliteStatement rows = prepare_sqlite(
         base_.get(), "SELECT rowid, name, type, serialization_format FROM topics NOT INDEXED");
-    RowOrder order;
+    SqliteRowOrder order;
     while (rows && sqlite3_step(rows.get()) == SQLITE_ROW && order.take(rows.get())) {
       const RosEncoding encoding =
           text_of(rows.get(), 3) == "cdr" ? RosEncoding::kCdr : RosEncoding::kUnknown;
@@ -171,7 +113,7 @@ class SqliteBag : public BagFile {
   }
 
   std::filesystem::path path_;
-  Database base_;
+  SqliteDatabase base_;
   Blob blob_;  ///< After base_, as it has to be closed before it.
 };
 

@@ -45,4 +45,10 @@ CameraChain openvslam_camchain(const OpenvslamCamera& camera);
 /// Throws InputError with its line for what is missing, malformed or has no counterpart.
 CameraChain read_openvslam_settings(const ConfigSource& source);
 
+/// The cameras of a settings file of ORB-SLAM3 (its calibration tutorial of 2021: `Camera.type`,
+/// `Camera1.fx`, `Stereo.T_c1_c2`, ...) or with the flat keys of its predecessors (`Camera.fx`,
+/// `Camera.bf`), as a camchain. A pair that these rectify (`LEFT.K`, `RIGHT.K`) is taken as it is,
+/// before rectification. Notes and errors as above.
+CameraChain read_orbslam_settings(const ConfigSource& source);
+
 }  // namespace waymark

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <map>
 #include <memory>
 #include <set>
@@ -26,6 +27,16 @@ constexpr double kMinDistance = 1e-9;
 /// Memory that the search grids of all keyframes may take, in pixels of all images together: as
 /// many as 100 000 images of 2 megapixels have.
 constexpr double kMaxPixels = 2e11;
+constexpr std::size_t kMaxMapBytes = std::size_t{4} << 30;
+
+/// How every data base of SQLite begins.
+bool is_sqlite_file(const std::filesystem::path& path) {
+  constexpr std::string_view kMagic("SQLite format 3\0", 16);
+  std::string start(kMagic.size(), '\0');
+  std::ifstream stream(path, std::ios::binary);
+  stream.read(start.data(), static_cast<std::streamsize>(start.size()));
+  return stream && start == kMagic && std::filesystem::is_regular_file(path);
+}
 
 class Importer {
  public:
@@ -289,6 +300,26 @@ void Importer::add_loop_edges() {
 ImportedMap import_openvslam_map(std::string_view bytes, const std::string& name) {
   const OpenvslamRecords records = read_openvslam_records(bytes, name);
   return Importer(records, name).import();
+}
+
+ImportedMap import_openvslam_file(const std::filesystem::path& path,
+                                  const std::optional<ConfigSource>& settings) {
+  if (!is_sqlite_file(path)) {
+    const std::string bytes = read_text_file(path, "a map (.msg or .db)", kMaxMapBytes);
+    return import_openvslam_map(bytes, path.string());
+  }
+  const OpenvslamPyramid pyramid =
+      settings ? read_openvslam_pyramid(*settings) : OpenvslamPyramid();
+  const OpenvslamRecords records = read_openvslam_database(path, pyramid);
+  const std::string name = path.string();
+  ImportedMap imported = Importer(records, name).import();
+  imported.notes.push_back(
+      fmt::format("{}: the image pyramid, which it does not store, is {} levels of {:g}{}",
+                  name,
+                  pyramid.num_levels,
+                  pyramid.scale_factor,
+                  settings ? "" : "; --settings FILE may say otherwise"));
+  return imported;
 }
 
 }  // namespace waymark

@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <Eigen/Geometry>
 #include <cstdint>
+#include <filesystem>
 #include <map>
 #include <memory>
 #include <optional>
@@ -61,6 +62,14 @@ struct OpenvslamRecords {
 /// Reads both the keys of stella_vslam and those of OpenVSLAM of 2019 and 2020. Throws InputError
 /// for whatever is missing, malformed or beyond all bounds; name is what errors call the file.
 OpenvslamRecords read_openvslam_records(std::string_view bytes, const std::string& name);
+
+/// The same of a map in SQLite (.db) of stella_vslam. Pyramids are not stored there: all keyframes
+/// get the given one. Memory stays within that of the file. Throws InputError.
+OpenvslamRecords read_openvslam_database(const std::filesystem::path& path,
+                                         const OpenvslamPyramid& pyramid);
+
+/// The pyramid that settings (YAML) of these programs state, else that of their defaults.
+OpenvslamPyramid read_openvslam_pyramid(const ConfigSource& settings);
 
 /// What the key points of a keyframe were seen by.
 struct OpenvslamView {

@@ -12,6 +12,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/config_value.h"
 #include "waymark/exchange/openvslam_camera.h"
+#include "waymark/exchange/openvslam_records.h"
 #include "waymark/input/foreign_calibration.h"
 
 namespace waymark {
@@ -166,6 +167,20 @@ CameraChain read_openvslam_settings(const ConfigSource& source) {
   }
   note_ignored(root, source.name, chain);
   return chain;
+}
+
+OpenvslamPyramid read_openvslam_pyramid(const ConfigSource& settings) {
+  const ConfigNode root = parse_config(without_opencv_header(settings));
+  const Section feature(root, settings.name, "Feature");
+  OpenvslamPyramid pyramid;
+  if (const ConfigNode* factor = feature.find("scale_factor")) {
+    pyramid.scale_factor =
+        config_double(*factor, "Feature.scale_factor", {.low = 1.01, .high = 10});
+  }
+  if (const ConfigNode* levels = feature.find("num_levels")) {
+    pyramid.num_levels = config_int(*levels, "Feature.num_levels", {.low = 1, .high = 64});
+  }
+  return pyramid;
 }
 
 }  // namespace waymark

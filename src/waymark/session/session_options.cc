@@ -10,15 +10,16 @@
 #include "waymark/base/config.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/camera/pixel_angles.h"
+#include "waymark/exchange/config_file.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {
 
-ConfigNode read_configuration(const SessionOptions& options) {
+ConfigNode read_configuration(const SessionOptions& options, std::vector<std::string>& notes) {
   std::vector<ConfigSource> sources;
   for (const std::filesystem::path& file : options.configs) {
-    sources.push_back(ConfigSource::from_file(file));
+    sources.push_back(read_config_file(file, notes));
   }
   for (const std::string& assignment : options.assignments) {
     sources.push_back(ConfigSource::from_assignment(assignment));
@@ -75,7 +76,8 @@ std::string describe(const Map& map, const std::filesystem::path& path) {
 
 PreparedInput prepare_input(const SessionOptions& options) {
   PreparedInput prepared;
-  const ConfigNode config = read_configuration(options);
+  std::vector<std::string> notes;
+  const ConfigNode config = read_configuration(options, notes);
   read_settings(prepared.settings, config);
   if (options.seed) prepared.settings.seed = *options.seed;
 
@@ -109,9 +111,8 @@ PreparedInput prepare_input(const SessionOptions& options) {
       prepared.description.push_back(*std::move(unused));
     }
   }
-  for (const std::string& note : info.calibration->notes) {
-    prepared.description.push_back("note: " + note);
-  }
+  notes.insert(notes.end(), info.calibration->notes.begin(), info.calibration->notes.end());
+  for (const std::string& note : notes) prepared.description.push_back("note: " + note);
   return prepared;
 }
 
