@@ -129,6 +129,7 @@ struct Trajectory {
 
 // Each adds the classes and functions of the file of its name.
 void bind_calibrate(py::module_& module);
+void bind_report(py::module_& module);
 void bind_camera(py::module_& module);
 void bind_images(py::module_& module);
 void bind_features(py::module_& module);

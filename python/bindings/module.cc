@@ -67,6 +67,7 @@ PYBIND11_MODULE(_waymark, module) {
   python::bind_errors(module);
   python::bind_camera(module);
   python::bind_calibrate(module);
+  python::bind_report(module);
   python::bind_images(module);
   python::bind_features(module);
   python::bind_map(module);

@@ -142,6 +142,28 @@ class Inputs(Test):
         self.assertTrue(any("Mapping" in note for note in calibration.notes))
 
 
+class Reports(Test):
+    def test_of_one_run(self):
+        page = waymark.report(DATA / "stereo_out", path=self.folder / "page.html")
+        self.assertEqual(page, str(self.folder / "page.html"))
+        self.assertIn("Quality", (self.folder / "page.html").read_text())
+        waymark.report([DATA / "stereo_out"], ground_truth=DATA / "stereo/groundtruth.txt", align="sim3", path=page)
+        self.assertIn("Position error", (self.folder / "page.html").read_text())
+
+    def test_of_several(self):
+        page = waymark.report([DATA / "stereo_out", DATA / "mono_out"], path=self.folder / "page.html")
+        self.assertIn("2 runs compared", pathlib.Path(page).read_text())
+
+    def test_what_cannot_be(self):
+        self.assert_raises(waymark.InputError, "gone", waymark.report, self.folder / "gone")
+        self.assert_raises(waymark.InputError, "has no folder", waymark.report, [])
+        self.assert_raises(ValueError, "align: is 'se2', expected se3, sim3, none", waymark.report, DATA / "stereo_out",
+                           align="se2")
+        self.assert_raises(waymark.OutputError, "page.html", waymark.report, DATA / "stereo_out",
+                           path=self.folder / "no/such/page.html")
+        self.assert_raises(TypeError, "folders", waymark.report, None)
+
+
 class Viewers(Test):
     def page_of(self, viewer):
         with urllib.request.urlopen(viewer.url, timeout=10) as answer:

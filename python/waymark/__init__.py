@@ -22,7 +22,7 @@ from ._waymark import (NO_ID, Calibration, CalibrationEstimate, Camera, Estimate
                        Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
                        MarkerSightings, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
                        __version__, calibrate, import_map, import_settings, info, open_input,
-                       read_depth_image, read_grey_image)
+                       read_depth_image, read_grey_image, report)
 
 __all__ = [
     "NO_ID", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
@@ -31,5 +31,5 @@ __all__ = [
     "MarkerSightings", "MergedMap", "OutputError",
     "Statistics", "Submap", "System", "TrackingResult", "Trajectory", "Viewer", "__version__",
     "calibrate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
-    "read_grey_image",
+    "read_grey_image", "report",
 ]

@@ -30,6 +30,19 @@ std::string format_report(const RunFolder& run, const TruePath* truth);
 /// OutputError.
 void write_report(const std::filesystem::path& folder);
 
+/// What a page is made of.
+struct PageRequest {
+  std::vector<std::filesystem::path> folders;  ///< That run or localize wrote; several to compare.
+  std::filesystem::path groundtruth;           ///< Poses to compare with; empty: none.
+  std::optional<TrajectoryAlignment> alignment;  ///< As in TruePath.
+  /// The file to write; empty: report.html in the folder, of several comparison.html here.
+  std::filesystem::path out;
+};
+
+/// Writes the page of a run, or of several to compare; the name of the file. Throws InputError,
+/// OutputError.
+std::filesystem::path write_page(const PageRequest& request);
+
 /// A page that compares runs, two at least: their figures side by side, their paths over each
 /// other. Where there is no ground truth, they are laid over the first, by equal times.
 std::string format_run_comparison(std::span<const RunFolder> runs, const TruePath* truth);

@@ -7,7 +7,6 @@
 #include <map>
 #include <utility>
 
-#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/evaluate/association.h"
 #include "waymark/report/advice.h"
@@ -243,6 +242,11 @@ std::string coverage_section(const RunFolder& run) {
                                   summary.out_of_order,
                                   summary.without_partner));
   }
+  if (summary.missing_at_end > 0) {
+    body += paragraph("note",
+                      fmt::format("The video ended {} frames before its container says.",
+                                  summary.missing_at_end));
+  }
   return section(
       "Coverage and its reasons",
       body + paragraph("note", "docs/results.md says what each state and reason means."));
@@ -337,10 +341,6 @@ Evaluation evaluate_run(const RunFolder& run, const TruePath& truth) {
       truth.alignment.value_or(is_free ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSe3);
   options.num_frames = run.table.frames.size();
   return evaluate(run.trajectories.front(), truth.poses, options);
-}
-
-void write_report(const std::filesystem::path& folder) {
-  write_file_atomically(folder / "report.html", format_report(read_run_folder(folder), nullptr));
 }
 
 std::string format_report(const RunFolder& run, const TruePath* truth) {
