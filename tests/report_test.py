@@ -2,17 +2,20 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """The report of runs that went well, in part and badly, the advice at their end, and of folders that are none."""
+import html
 import html.parser
 import json
 import pathlib
 import re
 import shutil
 import sys
+import tempfile
 import unittest
 
 import cv2
+import numpy as np
 
-from cli_support import CliTest, truncate, waymark
+from cli_support import CAMERA, CliTest, truncate, waymark
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parent.parent / "script"))
 from evaluation.degrade import blur, dark, flat  # noqa: E402
@@ -97,7 +100,7 @@ class Runs(ReportTest):
     def test_a_focal_length_that_is_off(self):
         told = self.folder / "told"
         made = waymark("simulate", "room", "--motion", "inspect", "--setup", "mono", "--frames", 205, "--told",
-                       "focal=1.08", "-o", told)
+                       "focal=1.10", "-o", told)
         self.assertEqual(made.returncode, 0, made.stderr)
         self.run_reported(told, "-c", told / "camchain.yaml", "--set", "calibration.refine=off")
         self.assertEqual(self.grade(), "check")
@@ -164,6 +167,84 @@ class Runs(ReportTest):
         self.assertEqual(done.returncode, 3, done.stderr)
         self.assertIn("not_in_map", self.advised())
         self.assertEqual(waymark("report", self.out).returncode, 0)
+
+
+class Causes(ReportTest):
+    """What is advised where the cause is there; those of images, pairs and localizing are above."""
+
+    @classmethod
+    def setUpClass(cls):
+        folder = tempfile.TemporaryDirectory(prefix="waymark_test_")
+        cls.addClassCleanup(folder.cleanup)
+        cls.made = {}
+        camera = pathlib.Path(folder.name) / "camera.yaml"
+        camera.write_text(CAMERA.split("cam1:")[0])
+        for motion, count in (("inspect", 120), ("fast_turn", 70)):
+            cls.made[motion] = pathlib.Path(folder.name) / motion
+            done = waymark("simulate", "room", "--motion", motion, "--camera", camera, "--setup", "mono", "--frames",
+                           count, "--quiet", "-o", cls.made[motion])
+            assert done.returncode == 0, done.stderr
+
+    def copied(self, motion="inspect"):
+        copy = self.folder / "input"
+        shutil.copytree(self.made[motion], copy)
+        return copy
+
+    def advised_after(self, source, *options, status=0):
+        self.run_reported(source, "-c", source / "camchain.yaml", *options, status=status)
+        causes = self.advised()
+        for advice in self.summary()["advice"]:
+            self.assertIn(advice["remedy"].split(";")[0][:30], html.unescape(self.page()))
+        return causes
+
+    def test_few_features(self):
+        source = self.copied()
+        wall = np.full((240, 376), 60, np.uint8)
+        wall[:, 188:] = 190
+        cv2.circle(wall, (90, 120), 50, 140, -1)
+        self.spoil(source, lambda image, frame: wall, first=60)
+        self.assertEqual(self.advised_after(source), ["few_features"])
+
+    def test_losses(self):
+        source = self.copied()
+        somebody = np.full((240, 376), 90, np.uint8)
+        self.spoil(source, lambda image, frame: somebody if frame in range(40, 44) or frame in range(65, 69) or
+                   frame in range(90, 94) else image)
+        self.assertIn("losses", self.advised_after(source))
+
+    def test_fast_motion(self):
+        self.assertIn("fast_motion", self.advised_after(self.copied(), "--every", 20))
+
+    def test_parts(self):
+        source = self.copied()
+        other = self.folder / "other"
+        shutil.copytree(self.made["fast_turn"], other)
+        for path, image in zip(self.images(source)[50:], self.images(other)):
+            # Upside down no place of the first part is in it.
+            cv2.imwrite(str(path), cv2.rotate(cv2.imread(str(image), cv2.IMREAD_GRAYSCALE), cv2.ROTATE_180))
+        self.assertIn("parts", self.advised_after(source))
+
+    def test_late(self):
+        self.assertIn("late", self.advised_after(self.copied(), "--timing", "realtime", "--pace", 1000))
+
+    def test_jumps(self):
+        source = self.copied("fast_turn")
+        rows = (source / "mav0/cam0/data.csv").read_text().split("\n")
+        (source / "mav0/cam0/data.csv").write_text("\n".join(rows[:51] + rows[63:66]) + "\n")
+        self.assertIn("jumps", self.advised_after(source))
+
+    def test_calibration(self):
+        source = self.copied()
+        rng = np.random.default_rng(1)
+        rows, columns = np.mgrid[0:240, 0:376].astype(np.float32)
+
+        def warped(image, frame):
+            """As no camera sees it, another way in each image."""
+            field = cv2.resize(rng.normal(0, 7, (4, 6, 2)).astype(np.float32), (376, 240), interpolation=cv2.INTER_CUBIC)
+            return cv2.remap(image, columns + field[..., 0], rows + field[..., 1], cv2.INTER_LINEAR)
+        self.spoil(source, warped)
+        causes = self.advised_after(source, "--frames", 60, "--set", "calibration.refine=off")
+        self.assertTrue("calibration" in causes or self.summary()["mistakes"], causes)
 
 
 class Overlay(ReportTest):
