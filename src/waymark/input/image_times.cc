@@ -81,19 +81,18 @@ ImageList parse_image_list(std::string_view text, const std::string& name) {
     const std::string_view line = trimmed(whole);
     if (line.empty() || line.front() == '#') continue;
     const std::size_t space = line.find_first_of(" \t");
-    const std::optional<std::int64_t> time =
-        space == std::string_view::npos ? std::nullopt : parse_seconds(line.substr(0, space));
-    const bool had_times = !list.times_ns.empty();
-    if (!list.images.empty() && had_times != time.has_value()) {
+    constexpr std::int64_t kNone = -1;
+    const std::int64_t time_ns = space == std::string_view::npos
+                                     ? kNone
+                                     : parse_seconds(line.substr(0, space)).value_or(kNone);
+    const bool has_time = time_ns >= 0;
+    if (!list.images.empty() && has_time == list.times_ns.empty()) {
       throw InputError(fmt::format("{}:{}", name, number),
                        fmt::format("{} a time, expected one in every line or in none",
-                                   time ? "has" : "has not"));
+                                   has_time ? "has" : "has not"));
     }
-    if (time.value_or(0) < 0) {
-      throw InputError(fmt::format("{}:{}", name, number), "has a negative time, expected seconds");
-    }
-    if (time) list.times_ns.push_back(time.value_or(0));
-    list.images.emplace_back(trimmed(time ? line.substr(space) : line));
+    if (has_time) list.times_ns.push_back(time_ns);
+    list.images.emplace_back(trimmed(has_time ? line.substr(space) : line));
   }
   if (list.images.empty()) {
     throw InputError(name, "holds no line, expected one path of an image per line");
