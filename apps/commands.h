@@ -22,6 +22,7 @@ void add_run_command(CLI::App& program, Command& command);
 void add_localize_command(CLI::App& program, Command& command);
 void add_map_command(CLI::App& program, Command& command);
 void add_atlas_command(CLI::App& program, Command& command);
+void add_fleet_command(CLI::App& program, Command& command);
 void add_markers_command(CLI::App& program, Command& command);
 void add_calibrate_command(CLI::App& program, Command& command);
 void add_eval_command(CLI::App& program, Command& command);

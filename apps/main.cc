@@ -56,6 +56,7 @@ int run_program(const std::vector<std::string>& arguments) {
   add_localize_command(program, command);
   add_map_command(program, command);
   add_atlas_command(program, command);
+  add_fleet_command(program, command);
   add_view_command(program, command);
   add_eval_command(program, command);
   add_report_command(program, command);

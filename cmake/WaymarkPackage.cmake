@@ -56,6 +56,7 @@ if("python" IN_LIST CPACK_COMPONENTS_ALL) # An extension fits one version of Pyt
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
       "python3 (>= 3.${Python3_VERSION_MINOR}~), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-distributed, python3-fsspec") # Of waymark.fleet.
 endif()
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "visual SLAM for any camera, Python module
 Waymark finds out from images where a camera was and what the place looks like.

@@ -128,6 +128,8 @@ struct Trajectory {
 };
 
 // Each adds the classes and functions of the file of its name.
+void bind_atlas(py::module_& module);
+void bind_atlas_tasks(py::module_& module);
 void bind_calibrate(py::module_& module);
 void bind_report(py::module_& module);
 void bind_camera(py::module_& module);

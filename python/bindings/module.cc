@@ -75,5 +75,7 @@ PYBIND11_MODULE(_waymark, module) {
   python::bind_system(module);
   python::bind_localizer(module);
   python::bind_viewer(module);
+  python::bind_atlas(module);
+  python::bind_atlas_tasks(module);
   python::rename_module(module);
 }

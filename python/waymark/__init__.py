@@ -17,7 +17,7 @@ that is its camera 0, is in the world and how it stands. Units are metres, radia
 times, nanoseconds; lengths of a map made by one camera without depth have no unit. Arrays that come
 out are read-only.
 """
-from ._waymark import (NO_ID, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
+from ._waymark import (NO_ID, Atlas, AtlasLocalizer, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
                        Features, FocalCheck, FrameDetails, Input, InputError, InputFrame, Keyframe,
                        Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
                        MarkerSightings, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
@@ -25,7 +25,7 @@ from ._waymark import (NO_ID, Calibration, CalibrationEstimate, Camera, Estimate
                        read_depth_image, read_grey_image, report)
 
 __all__ = [
-    "NO_ID", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
+    "NO_ID", "Atlas", "AtlasLocalizer", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
     "FocalCheck", "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
     "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "Markers",
     "MarkerSightings", "MergedMap", "OutputError",

@@ -1,0 +1,332 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+//
+// The steps that make an atlas, each a pure function of files in its folder: what waymark.fleet has
+// done by many processes.
+#include <pybind11/pybind11.h>
+#include <pybind11/stl.h>
+
+#include <array>
+#include <map>
+#include <memory>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "arguments.h"
+#include "atlas.h"
+#include "bindings.h"
+#include "texts.h"
+#include "waymark/atlas/adjust_tiles.h"
+#include "waymark/atlas/anchors.h"
+#include "waymark/atlas/atlas_places.h"
+#include "waymark/atlas/steps.h"
+
+namespace waymark::python {
+namespace {
+
+std::array<double, 8> numbers_of(const Sim3& transform) {
+  const Eigen::Vector4d& q = transform.rotation.coeffs();
+  const Eigen::Vector3d& t = transform.translation;
+  return {q.x(), q.y(), q.z(), q.w(), t.x(), t.y(), t.z(), transform.scale};
+}
+
+Sim3 transform_of(const py::handle& numbers) {
+  const auto n = numbers.cast<std::array<double, 8>>();
+  return {Eigen::Quaterniond(n[3], n[0], n[1], n[2]), {n[4], n[5], n[6]}, n[7]};
+}
+
+py::dict describe(const AtlasTile& tile) {
+  py::dict described;
+  described["origin"] = tile.origin;
+  described["checksum"] = tile.checksum;
+  described["places"] = tile.places;
+  described["recording"] = tile.recording;
+  described["submap"] = tile.submap;
+  described["num_keyframes"] = tile.num_keyframes;
+  described["num_landmarks"] = tile.num_landmarks;
+  described["is_metric"] = tile.is_metric;
+  described["pixel_angle_rad"] = tile.pixel_angle_rad;
+  described["centre"] = std::array{tile.centre.x(), tile.centre.y(), tile.centre.z()};
+  described["radius"] = tile.radius;
+  described["anchor"] = numbers_of(tile.atlas_from_tile);
+  described["frame"] = tile.frame;
+  return described;
+}
+
+AtlasTile read_tile(const py::handle& described) {
+  AtlasTile tile;
+  tile.origin = described["origin"].cast<std::string>();
+  tile.checksum = described["checksum"].cast<std::string>();
+  tile.places = described["places"].cast<std::string>();
+  tile.recording = described["recording"].cast<std::uint32_t>();
+  tile.submap = described["submap"].cast<std::uint32_t>();
+  tile.num_keyframes = described["num_keyframes"].cast<std::uint32_t>();
+  tile.num_landmarks = described["num_landmarks"].cast<std::uint32_t>();
+  tile.is_metric = described["is_metric"].cast<bool>();
+  tile.pixel_angle_rad = described["pixel_angle_rad"].cast<double>();
+  const auto centre = described["centre"].cast<std::array<double, 3>>();
+  tile.centre = {centre[0], centre[1], centre[2]};
+  tile.radius = described["radius"].cast<double>();
+  tile.atlas_from_tile = transform_of(described["anchor"]);
+  tile.frame = described["frame"].cast<std::uint32_t>();
+  return tile;
+}
+
+py::dict describe(const AtlasLink& link) {
+  py::dict described;
+  described["a"] = link.a;
+  described["b"] = link.b;
+  described["is_border"] = link.is_border;
+  described["num_shared"] = link.num_shared;
+  described["b_from_a"] = numbers_of(link.b_from_a);
+  return described;
+}
+
+AtlasLink read_link(const py::handle& described) {
+  AtlasLink link;
+  link.a = described["a"].cast<std::uint32_t>();
+  link.b = described["b"].cast<std::uint32_t>();
+  link.is_border = described["is_border"].cast<bool>();
+  link.num_shared = described["num_shared"].cast<std::uint32_t>();
+  link.b_from_a = transform_of(described["b_from_a"]);
+  return link;
+}
+
+/// As a flat list: of a, of b, of a, ...
+py::list describe(const SharedLandmarks& landmarks) {
+  py::list flat;
+  for (const auto& [a, b] : landmarks) {
+    flat.append(a.value);
+    flat.append(b.value);
+  }
+  return flat;
+}
+
+SharedLandmarks read_landmarks(const py::handle& flat) {
+  const auto ids = flat.cast<std::vector<std::uint32_t>>();
+  SharedLandmarks landmarks;
+  for (std::size_t i = 0; i + 1 < ids.size(); i += 2) {
+    landmarks.push_back({LandmarkId{ids[i]}, LandmarkId{ids[i + 1]}});
+  }
+  return landmarks;
+}
+
+/// [origin of a, origin of b, landmarks]
+py::tuple describe(const NewShared& shared) {
+  return py::make_tuple(shared.origin_a, shared.origin_b, describe(shared.landmarks));
+}
+
+std::vector<NewShared> read_shared(const py::list& list) {
+  std::vector<NewShared> shared;
+  for (const py::handle one : list) {
+    const auto row = py::reinterpret_borrow<py::sequence>(one);
+    shared.push_back({row[0].cast<std::string>(),
+                      row[1].cast<std::string>(),
+                      read_landmarks(py::object(row[2]))});
+  }
+  return shared;
+}
+
+/// Of the links of contents, by their tiles.
+ReadShared reader_of(const AtlasContents& contents, const std::vector<NewShared>& shared) {
+  std::map<std::pair<std::string, std::string>, SharedLandmarks> by_origins;
+  for (const NewShared& one : shared) by_origins[{one.origin_a, one.origin_b}] = one.landmarks;
+  return [&contents, by_origins = std::move(by_origins)](const AtlasLink& link) {
+    const auto at = by_origins.find({contents.tiles[link.a].origin, contents.tiles[link.b].origin});
+    return at == by_origins.end() ? SharedLandmarks{} : at->second;
+  };
+}
+
+Atlas atlas_in(const py::object& folder) {
+  return Atlas::of_tiles(path_argument("folder", folder));
+}
+
+py::tuple cut(const py::object& folder,
+              const py::object& map,
+              const std::string& checksum,
+              const std::string& name,
+              std::size_t keyframes) {
+  const Atlas atlas = atlas_in(folder);
+  const std::filesystem::path path = path_argument("map", map);
+  CutRecording cut;
+  {
+    const ReleasedGil released;
+    cut = cut_recording(atlas, load_map(path), checksum, name, keyframes);
+  }
+  py::list shared;
+  for (const NewShared& one : cut.shared) shared.append(describe(one));
+  return py::make_tuple(describe_contents(cut.contents), shared);
+}
+
+py::dict append(const py::list& all) {
+  AtlasContents contents;
+  for (const py::handle one : all) append_contents(contents, read_contents(one.cast<py::dict>()));
+  return describe_contents(contents);
+}
+
+/// The places of all tiles, and what asks them.
+struct PythonPlaces {
+  Atlas atlas;
+  AtlasContents contents;
+  AtlasPlaces places;
+
+  PythonPlaces(const py::object& folder, const py::dict& described)
+      : atlas(atlas_in(folder)), contents(read_contents(described)), places(atlas, contents) {}
+
+  /// Of a tile: [(tile, score, queries), ...]
+  py::list alike(std::uint32_t tile) const {
+    std::vector<AlikeTile> found;
+    {
+      const ReleasedGil released;
+      const StoredMap stored = atlas.load_tile(contents.tiles.at(tile));
+      found = find_alike_tiles(contents, places, tile, *stored.map, kMaxLinksSought);
+    }
+    py::list described;
+    for (const AlikeTile& one : found) {
+      py::list queries;
+      for (const KeyframeId id : one.queries) queries.append(id.value);
+      described.append(py::make_tuple(one.tile, one.score, queries));
+    }
+    return described;
+  }
+};
+
+py::list pairs_of(const py::list& alike) {
+  std::vector<std::pair<std::uint32_t, std::vector<AlikeTile>>> by_tile;
+  for (const py::handle of_tile : alike) {
+    const auto row = py::reinterpret_borrow<py::sequence>(of_tile);
+    auto& [tile, others] = by_tile.emplace_back();
+    tile = row[0].cast<std::uint32_t>();
+    for (const py::handle one : py::object(row[1])) {
+      const auto fields = py::reinterpret_borrow<py::sequence>(one);
+      AlikeTile& other = others.emplace_back();
+      other.tile = fields[0].cast<std::uint32_t>();
+      other.score = fields[1].cast<double>();
+      for (const std::uint32_t id : fields[2].cast<std::vector<std::uint32_t>>()) {
+        other.queries.push_back(KeyframeId{id});
+      }
+    }
+  }
+  py::list pairs;
+  for (const TilePair& pair : choose_pairs(by_tile)) {
+    py::list queries;
+    for (const KeyframeId id : pair.queries) queries.append(id.value);
+    pairs.append(py::make_tuple(pair.a, pair.b, queries));
+  }
+  return pairs;
+}
+
+py::object match(const py::object& folder,
+                 const py::dict& described,
+                 std::uint32_t a,
+                 std::uint32_t b,
+                 const std::vector<std::uint32_t>& queries,
+                 std::uint64_t seed) {
+  const Atlas atlas = atlas_in(folder);
+  const AtlasContents contents = read_contents(described);
+  TilePair pair{a, b, {}};
+  for (const std::uint32_t id : queries) pair.queries.push_back(KeyframeId{id});
+  std::optional<FoundLink> found;
+  {
+    const ReleasedGil released;
+    const StoredMap of_a = atlas.load_tile(contents.tiles.at(a));
+    const StoredMap of_b = atlas.load_tile(contents.tiles.at(b));
+    found = link_pair(contents, pair, *of_a.map, *of_b.map, seed);
+  }
+  if (!found) return py::none();
+  return py::make_tuple(describe(found->link), describe(found->shared));
+}
+
+py::dict solve(const py::dict& described) {
+  AtlasContents contents = read_contents(described);
+  sort_contents(contents);
+  solve_anchors(contents);
+  return describe_contents(contents);
+}
+
+std::string adjust(const py::object& folder,
+                   const py::dict& described,
+                   std::uint32_t tile,
+                   const py::list& shared) {
+  const Atlas atlas = atlas_in(folder);
+  const AtlasContents contents = read_contents(described);
+  const ReadShared reader = reader_of(contents, read_shared(shared));
+  const ReleasedGil released;
+  return adjust_stored_tile(atlas, contents, tile, reader);
+}
+
+std::array<double, 8> refit(const py::object& folder,
+                            const py::dict& described,
+                            std::size_t link,
+                            const py::list& shared) {
+  const Atlas atlas = atlas_in(folder);
+  const AtlasContents contents = read_contents(described);
+  const ReadShared reader = reader_of(contents, read_shared(shared));
+  const ReleasedGil released;
+  const AtlasLink& one = contents.links.at(link);
+  return numbers_of(refit_link(atlas, contents, one, reader(one)));
+}
+
+void commit(const py::object& folder, const py::dict& described, const py::list& shared) {
+  Atlas atlas = Atlas::open_or_create(path_argument("folder", folder));
+  AtlasContents contents = read_contents(described);
+  sort_contents(contents);
+  atlas.commit(contents, read_shared(shared));
+}
+
+}  // namespace
+
+py::dict describe_contents(const AtlasContents& contents) {
+  py::list recordings, tiles, links;
+  for (const AtlasRecording& one : contents.recordings) {
+    py::dict recording;
+    recording["checksum"] = one.checksum;
+    recording["name"] = text_of(one.name);
+    recording["since"] = one.since;
+    recordings.append(recording);
+  }
+  for (const AtlasTile& tile : contents.tiles) tiles.append(describe(tile));
+  for (const AtlasLink& link : contents.links) links.append(describe(link));
+  py::dict described;
+  described["recordings"] = recordings;
+  described["tiles"] = tiles;
+  described["links"] = links;
+  return described;
+}
+
+AtlasContents read_contents(const py::dict& described) {
+  AtlasContents contents;
+  for (const py::handle one : described["recordings"]) {
+    contents.recordings.push_back({one["checksum"].cast<std::string>(),
+                                   one["name"].cast<std::string>(),
+                                   one["since"].cast<std::uint32_t>()});
+  }
+  for (const py::handle one : described["tiles"]) contents.tiles.push_back(read_tile(one));
+  for (const py::handle one : described["links"]) contents.links.push_back(read_link(one));
+  for (const AtlasTile& tile : contents.tiles) {
+    if (tile.recording >= contents.recordings.size()) throw py::value_error("recording: not there");
+  }
+  for (const AtlasLink& link : contents.links) {
+    if (std::max(link.a, link.b) >= contents.tiles.size()) throw py::value_error("link: no tile");
+  }
+  return contents;
+}
+
+void bind_atlas_tasks(py::module_& module) {
+  module.def("_cut", &cut);
+  module.def("_append", &append);
+  py::class_<PythonPlaces>(module, "_Places")
+      .def(py::init<const py::object&, const py::dict&>())
+      .def("alike", &PythonPlaces::alike);
+  module.def("_pairs", &pairs_of);
+  module.def("_match", &match);
+  module.def("_solve", &solve);
+  module.def("_schedule",
+             [](const py::dict& contents) { return schedule_adjustment(read_contents(contents)); });
+  module.def("_adjust", &adjust);
+  module.def("_refit", &refit);
+  module.def("_commit", &commit);
+}
+
+}  // namespace waymark::python
