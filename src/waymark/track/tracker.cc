@@ -48,6 +48,7 @@ Tracker::Tracker(std::shared_ptr<const Rig> rig,
       patch_locator_(rig),
       locator_(rig),
       relocalizer_(rig, settings, seed),
+      scale_keeper_(seed),
       keyframe_assessor_(rig, has_range),
       search_radii_px_(search_radii(*rig)) {}
 
@@ -374,6 +375,8 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame, StageTimes
   std::optional<Initialization> start = initializer_.add(frame);
   if (!start) return std::nullopt;
   initializer_.reset();
+  start->submap.rig = rig_;
+  if (!has_range_ && last_.has_pose()) scale_keeper_.keep(*map_, recovery_keyframes(), *start);
   TrackOutcome outcome;
   outcome.state = FrameState::kTracked;
   outcome.num_matches = outcome.num_inliers = static_cast<int>(start->submap.landmarks.size());
@@ -384,7 +387,6 @@ std::optional<TrackOutcome> Tracker::start_submap(const Frame& frame, StageTimes
   for (FilledPose& filled : outcome.details.filled) {
     filled.pose.reference.value += ids_.submap_start().value;
   }
-  start->submap.rig = rig_;
   outcome.message = std::move(start->submap);
   last_.forget_motion();
   last_.set(frame, pose, start->rig_from_world, {});

@@ -20,6 +20,7 @@
 #include "waymark/track/patch_locator.h"
 #include "waymark/track/pose_refiner.h"
 #include "waymark/track/relocalizer.h"
+#include "waymark/track/scale_keeper.h"
 #include "waymark/track/sent_ids.h"
 #include "waymark/track/sightings.h"
 #include "waymark/track/stage_times.h"
@@ -120,6 +121,7 @@ class Tracker {
   PatchLocator patch_locator_;
   FrameLocator locator_;
   Relocalizer relocalizer_;
+  ScaleKeeper scale_keeper_;
   KeyframeAssessor keyframe_assessor_;
   std::array<double, 2> search_radii_px_;  ///< Around a prediction, and when that fails.
 

@@ -1,0 +1,59 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <optional>
+#include <span>
+
+#include "waymark/map/map.h"
+#include "waymark/match/appearance.h"
+#include "waymark/optimize/similarity.h"
+#include "waymark/track/initializer.h"
+
+namespace waymark {
+
+/// How long the unit of a new part of a map is in units of the part before.
+struct KeptScale {
+  double scale = 1.0;
+  double log_sigma = 0.0;         ///< Standard deviation of the logarithm of the scale.
+  std::size_t num_landmarks = 0;  ///< Of both parts that it rests on; 0: it rests on the motion.
+};
+
+/// Where a camera without scale was lost in a map, a new part begins in units of its own. Finds
+/// what they are in those of the part before, so that lengths of both can be compared.
+class ScaleKeeper {
+ public:
+  explicit ScaleKeeper(std::uint64_t seed) : seed_(seed) {}
+
+  /// Gives a new part the scale of that in which the camera was lost: by landmarks, else by its
+  /// speed. What neither tells begins with a unit of its own. keyframes: where the camera was last,
+  /// the speed being that of the newest of them.
+  void keep(const Map& map, std::span<const KeyframeId> keyframes, Initialization& start);
+
+  /// By what the new part and keyframes of the old one show alike: fewer landmarks than a pose
+  /// rests on tell the scale between the two, as they have to agree in both (find_similarity()).
+  /// Of several keyframes the one with which most agree counts.
+  std::optional<KeptScale> by_landmarks(const Map& map,
+                                        std::span<const KeyframeId> keyframes,
+                                        const NewSubmap& start);
+
+ private:
+  LandmarkMatches match(const Map& map,
+                        const Keyframe& before,
+                        const NewSubmap& start,
+                        std::size_t index);
+
+  std::uint64_t seed_;
+  AppearanceMatcher appearance_;
+};
+
+/// By the speed of the newest keyframes up to `last`, which the camera should have kept up. Nothing
+/// where it hardly moved.
+std::optional<KeptScale> scale_by_speed(const Map& map, KeyframeId last, const NewSubmap& start);
+
+/// Makes the lengths of a new part this many times as long.
+void scale_by(double factor, Initialization& start);
+
+}  // namespace waymark
