@@ -58,7 +58,7 @@ std::unique_ptr<LoopScene> walk(int from_step,
 const Rigid3 kFrameOfA;
 const Rigid3 kFrameOfB = Rigid3::exp((Vector6d() << 4, -1, 2, 0.2, 1.1, -0.4).finished());
 
-double error_of(const Map& map, const LoopScene& a, const LoopScene& b) {
+double largest_error_of(const Map& map, const LoopScene& a, const LoopScene& b) {
   double most = 0.0;
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     const std::size_t index = id.value;
@@ -87,7 +87,7 @@ TEST(JoinByMarkersTest, MapsThatShareNothingButAMarkerBecomeOne) {
   EXPECT_EQ(merged.num_loops, 0);
   EXPECT_EQ(merged.map->submaps()[1].joined_into, SubmapId{0});
   const Map joined = join_maps(a->map, b->map);
-  EXPECT_LT(error_of(joined, *a, *b), 1e-6);
+  EXPECT_LT(largest_error_of(joined, *a, *b), 1e-6);
   ASSERT_EQ(joined.markers().size(), 2u);  // Each once.
   for (const MapMarker& marker : joined.markers()) {
     const HungMarker& hung = marker.id == kFirst.id ? kFirst : kSecond;
@@ -100,7 +100,7 @@ TEST(JoinByMarkersTest, TheOneOfThreeThatWasMovedBetweenTheRecordingsDoesNoHarm)
   const auto a = walk(0, 8, kFrameOfA, {kFirst, kSecond, kThird});
   const auto b = walk(20, 28, kFrameOfB, {moved(kFirst), kSecond, kThird});
   const Map joined = join_maps(a->map, b->map);
-  EXPECT_LT(error_of(joined, *a, *b), 1e-6);
+  EXPECT_LT(largest_error_of(joined, *a, *b), 1e-6);
   for (const MapMarker& marker : joined.markers()) EXPECT_NE(marker.id, kFirst.id);
 }
 
@@ -130,7 +130,7 @@ TEST(JoinByMarkersTest, WhatWasSurveyedInAnotherFrameHoldsNothing) {
   }
   b->map.set_markers(markers);
   const Map joined = join_maps(a->map, b->map);
-  EXPECT_LT(error_of(joined, *a, *b), 1e-6);
+  EXPECT_LT(largest_error_of(joined, *a, *b), 1e-6);
   for (const MapMarker& marker : joined.markers()) {
     EXPECT_FALSE(marker.surveyed_world_from_marker);
   }
