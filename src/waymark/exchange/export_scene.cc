@@ -35,37 +35,58 @@ std::size_t index_of(const RigCamera& camera, ExportScene& scene) {
   return scene.cameras.size() - 1;
 }
 
-/// Distance in pixels between where a landmark should be seen and where it was; nothing where it
-/// cannot be seen.
-std::optional<double> reprojection_error(const Camera& camera,
-                                         const Eigen::Vector3d& point_in_cam,
-                                         const Eigen::Vector2d& measured) {
+/// Where a view shows a point, and how far that is from where it should, in pixels.
+struct SightedPixel {
   Eigen::Vector2d pixel;
+  double error_px;
+};
+
+/// Whether a feature, of either camera, is a point on an edge.
+bool is_on_edge(const Features& features, std::uint32_t feature) {
+  const bool is_primary = feature < features.num_primary;
+  return features.is_edge(is_primary ? feature : features.partner[feature]);
+}
+
+/// A feature that shows a point; nothing where that cannot be seen. Of points on edges the place
+/// along the edge is not measured: that is where it should be.
+std::optional<SightedPixel> sight_projected(const Camera& camera,
+                                            const Eigen::Vector3d& point_in_cam,
+                                            const Keypoint& keypoint,
+                                            bool is_edge) {
+  Eigen::Vector2d predicted;
   std::uint8_t is_visible = 0;
-  camera.project({&point_in_cam, 1}, {&pixel, 1}, {&is_visible, 1});
+  camera.project({&point_in_cam, 1}, {&predicted, 1}, {&is_visible, 1});
   if (!is_visible) return std::nullopt;
-  Eigen::Vector2d error = (pixel - measured).cwiseAbs();
+  const Eigen::Vector2d measured(keypoint.x_px, keypoint.y_px);
+  Eigen::Vector2d off = measured - predicted;
   const double wrap = camera.wrap_width_px();
-  if (wrap > 0.0) error.x() = std::min(error.x(), wrap - error.x());
-  return error.norm();
+  if (wrap > 0.0) off.x() = std::remainder(off.x(), wrap);
+  if (!is_edge) return SightedPixel{measured, off.norm()};
+  const Eigen::Vector2d across = edge_normal(keypoint.angle_rad).cast<double>();
+  const double off_across = across.dot(off);
+  return SightedPixel{predicted + off_across * across, std::abs(off_across)};
 }
 
 /// The same of a feature of a keyframe; where the camera's model is unknown by what the feature
 /// holds.
-std::optional<double> sighting_error(const Keyframe& keyframe,
-                                     std::size_t rig_camera,
-                                     std::uint32_t feature,
-                                     const Eigen::Vector3d& position_in_world) {
+std::optional<SightedPixel> sight(const Keyframe& keyframe,
+                                  std::size_t rig_camera,
+                                  std::uint32_t feature,
+                                  const Eigen::Vector3d& position_in_world) {
   const RigCamera& camera = keyframe.rig->cameras[rig_camera];
-  const Keypoint& keypoint = keyframe.features->keypoints[feature];
+  const Features& features = *keyframe.features;
+  const Keypoint& keypoint = features.keypoints[feature];
   if (camera.camera->can_project()) {
     const Rigid3 cam_from_world = camera.cam_from_rig * keyframe.rig_from_world;
-    return reprojection_error(
-        *camera.camera, cam_from_world * position_in_world, {keypoint.x_px, keypoint.y_px});
+    return sight_projected(*camera.camera,
+                           cam_from_world * position_in_world,
+                           keypoint,
+                           is_on_edge(features, feature));
   }
   const std::optional<double> squared = squared_residual(keyframe, feature, position_in_world);
   if (!squared) return std::nullopt;
-  return Pyramid::scale(keypoint.level) * std::sqrt(*squared);
+  return SightedPixel{{keypoint.x_px, keypoint.y_px},
+                      Pyramid::scale(keypoint.level) * std::sqrt(*squared)};
 }
 
 class SceneBuilder {
@@ -117,7 +138,7 @@ class SceneBuilder {
   void add_sighting(const Keyframe& keyframe,
                     std::uint32_t first_view,
                     std::uint32_t feature,
-                    ExportPoint& point) const {
+                    ExportPoint& point) {
     const std::size_t num_primary = keyframe.features->num_primary;
     const std::size_t rig_camera = feature < num_primary ? 0 : 1;
     if (rig_camera > 0 && cameras_ == ExportCameras::kFirst) return;
@@ -125,12 +146,13 @@ class SceneBuilder {
     for (const ExportSighting& other : point.sightings) {
       if (other.view == view) return;
     }
-    const std::optional<double> error =
-        sighting_error(keyframe, rig_camera, feature, point.position_in_world);
-    if (!error || *error > kMaxExportErrorPx) return;
-    const std::size_t first_feature = rig_camera == 0 ? 0 : num_primary;
-    point.sightings.push_back({view, feature - static_cast<std::uint32_t>(first_feature)});
-    point.error_px += *error;
+    const std::optional<SightedPixel> sighted =
+        sight(keyframe, rig_camera, feature, point.position_in_world);
+    if (!sighted || sighted->error_px > kMaxExportErrorPx) return;
+    const auto first_feature = static_cast<std::uint32_t>(rig_camera == 0 ? 0 : num_primary);
+    point.sightings.push_back({view, feature - first_feature});
+    point.error_px += sighted->error_px;
+    scene_.views[view].pixels[feature - first_feature] = sighted->pixel;
   }
 
   void add_point(LandmarkId id, const Landmark& landmark) {

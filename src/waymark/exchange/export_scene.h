@@ -65,9 +65,10 @@ enum class ExportCameras { kFirst, kAll };
 
 /// A sub-map in these terms; image files of several cameras are named "cam0/..." and "cam1/...".
 /// Sightings that are off by more than kMaxExportErrorPx are left out,
-/// and points that are then seen by fewer than two views. Points are coloured as the images show
-/// them where there are images (broken ones count as none), else grey. InputError for cameras that
-/// carry no description.
+/// and points that are then seen by fewer than two views. What shows a point on an edge lies across
+/// the edge where it was measured and along it where the point should be seen. Points are coloured
+/// as the images show them where there are images (broken ones count as none), else grey.
+/// InputError for cameras that carry no description.
 ExportScene make_export_scene(const Map& map,
                               SubmapId submap,
                               const KeyframeImages& images = {},

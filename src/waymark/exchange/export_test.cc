@@ -37,6 +37,41 @@ TEST(ExportScene, LeavesOutSightingsThatAreOff) {
   EXPECT_EQ(scene.views[1].points[4], kNoPoint);
 }
 
+/// A map whose feature 29 is a point on an edge in each keyframe, where keyframe 1 saw it moved.
+Map map_with_an_edge(float angle_rad, const Eigen::Vector2f& moved_px) {
+  MapParts parts = take_apart(small_map("plain"));
+  for (MapParts::StoredKeyframe& stored : parts.keyframes) {
+    auto features = std::make_shared<Features>(*stored.keyframe.features);
+    features->num_edges = features->num_primary - 29;
+    Keypoint& keypoint = features->keypoints[29];
+    keypoint.angle_rad = angle_rad;
+    if (stored.id == KeyframeId{1}) {
+      keypoint.x_px += moved_px.x();
+      keypoint.y_px += moved_px.y();
+    }
+    stored.keyframe.features = std::move(features);
+  }
+  return Map::restore(std::move(parts));
+}
+
+TEST(ExportScene, ShowsPointsOnEdgesWhereTheirEdgesAre) {
+  const float angle_rad = 0.4f;
+  const Eigen::Vector2f across = edge_normal(angle_rad);
+  const Eigen::Vector2f along(-across.y(), across.x());
+  const ExportScene exact = make_export_scene(small_map("plain"), SubmapId{0});
+  ASSERT_EQ(exact.points.size(), 30u);
+  const auto place = exact.views[1].pixels[29];
+  const ExportScene scene =
+      make_export_scene(map_with_an_edge(angle_rad, 7.0f * along + across), SubmapId{0});
+  ASSERT_EQ(scene.points.size(), 30u);
+  EXPECT_EQ(scene.points[29].sightings.size(), 3u);
+  EXPECT_NEAR(scene.points[29].error_px, 1.0 / 3.0, 0.1);
+  EXPECT_LT((scene.views[1].pixels[29] - place - across.cast<double>()).norm(), 0.1);
+  const ExportScene beside =
+      make_export_scene(map_with_an_edge(angle_rad, 6.0f * across), SubmapId{0});
+  EXPECT_EQ(beside.points[29].sightings.size(), 2u);
+}
+
 TEST(ExportScene, TakesColoursFromImages) {
   const cv::Mat blue(480, 640, CV_8UC3, cv::Scalar(200, 60, 20));
   std::vector<std::uint8_t> jpeg;
