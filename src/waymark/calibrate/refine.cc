@@ -137,8 +137,9 @@ LensProblem::LensProblem(const Map& map,
     for (const Observation& seen : landmark.observations) {
       const auto at = std::lower_bound(keyframes.begin(), keyframes.end(), seen.keyframe);
       if (at == keyframes.end() || *at != seen.keyframe) continue;
-      const Keypoint& keypoint =
-          map.keyframes().at(seen.keyframe).features->keypoints[seen.feature];
+      const Features& features = *map.keyframes().at(seen.keyframe).features;
+      if (features.is_edge(seen.feature)) continue;
+      const Keypoint& keypoint = features.keypoints[seen.feature];
       point.sightings.push_back({static_cast<int>(at - keyframes.begin()),
                                  {keypoint.x_px, keypoint.y_px},
                                  static_cast<float>(Pyramid::scale(keypoint.level))});

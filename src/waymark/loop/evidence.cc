@@ -73,7 +73,7 @@ LandmarkMatches EvidenceCollector::match_by_appearance(const Map& map,
   const Keyframe& in_query = map.keyframes().at(query);
   const Keyframe& in_match = map.keyframes().at(match);
   std::vector<std::uint32_t> known;
-  for (std::uint32_t i = 0; i < in_query.features->num_primary; ++i) {
+  for (std::uint32_t i = 0; i < in_query.features->num_corners(); ++i) {
     if (in_query.landmarks[i].is_valid()) known.push_back(i);
   }
   LandmarkMatches matches;
@@ -122,7 +122,7 @@ LandmarkMatches EvidenceCollector::match_by_projection(const Map& map, Revisit& 
   const Keyframe& in_match = map.keyframes().at(revisit.match);
   std::vector<std::uint32_t> features_of_match;
   landmarks_.clear();
-  for (std::uint32_t i = 0; i < in_match.features->num_primary; ++i) {
+  for (std::uint32_t i = 0; i < in_match.features->num_corners(); ++i) {
     const LandmarkId id = in_match.landmarks[i];
     if (!id.is_valid() || !(map.landmarks().at(id).appearance.size_m > 0.0)) continue;
     landmarks_.add(id, map.landmarks().at(id));
@@ -166,6 +166,7 @@ Sightings EvidenceCollector::look_for(const Map& map,
       landmarks_.add(id, landmark);
     }
   }
+  landmarks_.keep_corners();
   projection_.look_with(map.keyframes().at(target).rig);
   const ProjectionMatches& found = projection_.match(landmarks_,
                                                      *map.keyframes().at(target).features,
@@ -199,7 +200,7 @@ void EvidenceCollector::count_sightings(const Map& map, RevisitEvidence& evidenc
     const Sightings sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
     evidence.num_confirming += static_cast<int>(sightings.num_found) >=
-                                   enough_of(kMinFoundToConfirm, features.num_primary) &&
+                                   enough_of(kMinFoundToConfirm, features.num_corners()) &&
                                sightings.share() >= kMinShareToConfirm;
   }
 }

@@ -34,8 +34,8 @@ constexpr double kMaxRatioError = 0.15;
 bool meets(const Map& map, const RevisitEvidence& evidence, const Demand& demand) {
   const Revisit& revisit = evidence.revisit;
   const std::size_t num_features =
-      std::min(map.keyframes().at(revisit.query).features->num_primary,
-               map.keyframes().at(revisit.match).features->num_primary);
+      std::min(map.keyframes().at(revisit.query).features->num_corners(),
+               map.keyframes().at(revisit.match).features->num_corners());
   const auto is_enough = [&](std::size_t count, int full) {
     return static_cast<int>(count) >= enough_of(full, num_features);
   };

@@ -37,6 +37,26 @@ struct LandmarkSet {
     descriptors.push_back(landmark.appearance.descriptor);
     across.push_back(landmark.appearance.across);
   }
+
+  /// Drops points on edges, which look alike: by them no place is known.
+  void keep_corners() {
+    std::size_t num_kept = 0;
+    for (std::size_t i = 0; i < size(); ++i) {
+      if (!across[i].isZero()) continue;
+      ids[num_kept] = ids[i];
+      positions_in_world[num_kept] = positions_in_world[i];
+      directions[num_kept] = directions[i];
+      sizes_m[num_kept] = sizes_m[i];
+      descriptors[num_kept] = descriptors[i];
+      across[num_kept++] = across[i];
+    }
+    ids.resize(num_kept);
+    positions_in_world.resize(num_kept);
+    directions.resize(num_kept);
+    sizes_m.resize(num_kept);
+    descriptors.resize(num_kept);
+    across.resize(num_kept);
+  }
 };
 
 }  // namespace waymark

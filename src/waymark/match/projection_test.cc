@@ -143,6 +143,22 @@ TEST_F(Projection, FindsEdgesAcrossThem) {
   EXPECT_EQ(matches.features, std::vector{2u});
 }
 
+TEST_F(Projection, KeepsCornersOfASet) {
+  LandmarkSet set = edge_landmark();
+  set.across[0].setZero();
+  Landmark edge;
+  edge.appearance.across = Eigen::Vector3d::UnitX();
+  Landmark corner;
+  corner.position_in_world = {1.0, 2.0, 3.0};
+  set.add(LandmarkId{7}, edge);
+  set.add(LandmarkId{8}, corner);
+  set.keep_corners();
+  ASSERT_EQ(set.size(), 2u);
+  EXPECT_EQ(set.ids[1], LandmarkId{8});
+  EXPECT_EQ(set.positions_in_world[1], corner.position_in_world);
+  EXPECT_EQ(set.descriptors.size(), 2u);
+}
+
 TEST_F(Projection, KeepsEdgesAndCornersApart) {
   Features features = edge_features(*rig_, {{.x_px = 320.0f, .y_px = 239.0f}});
   LandmarkSet corner = edge_landmark();

@@ -34,7 +34,7 @@ constexpr double kSearchPart = 1.0 / 16.0;
 constexpr double kRestPx = kMinParallaxPx / 4;
 
 int min_landmarks(const Features& features) {
-  return enough_of(kMinLandmarks, features.num_primary);
+  return enough_of(kMinLandmarks, features.num_corners());
 }
 
 /// Of a pair: the image that offers less counts.

@@ -32,11 +32,11 @@ Expected facing_landmarks(const Keyframe& keyframe,
                           const Map& map,
                           const Rigid3& cam_from_world) {
   Expected expected;
-  if (features.num_primary == 0) return expected;
-  const auto end = features.size_rad.begin() + static_cast<std::ptrdiff_t>(features.num_primary);
+  if (features.num_corners() == 0) return expected;
+  const auto end = features.size_rad.begin() + static_cast<std::ptrdiff_t>(features.num_corners());
   const auto [finest, coarsest] = std::minmax_element(features.size_rad.begin(), end);
   const Eigen::Vector3d centre = cam_from_world.origin_in_source();
-  for (std::size_t i = 0; i < keyframe.features->num_primary; ++i) {
+  for (std::size_t i = 0; i < keyframe.features->num_corners(); ++i) {
     if (!keyframe.landmarks[i].is_valid()) continue;
     const Landmark& landmark = map.landmarks().at(keyframe.landmarks[i]);
     const Eigen::Vector3d to_camera = centre - landmark.position_in_world;
@@ -75,7 +75,7 @@ void count_features(const Features& features,
                     const std::vector<std::uint8_t>& is_cell_expected,
                     const Camera& camera,
                     Regions& regions) {
-  for (std::size_t i = 0; i < features.num_primary; ++i) {
+  for (std::size_t i = 0; i < features.num_corners(); ++i) {
     const Eigen::Vector2d pixel(features.keypoints[i].x_px, features.keypoints[i].y_px);
     if (!is_cell_expected[part_of(pixel, camera, kCells)]) continue;
     ++regions[part_of(pixel, camera, kRegions)].num_features;

@@ -70,5 +70,20 @@ TEST_F(PlaceConfidenceTest, ExpectsOnlyWhatTheCameraCouldSee) {
             0.0);
 }
 
+std::shared_ptr<const Features> with_edges(const Features& features) {
+  auto changed = std::make_shared<Features>(features);
+  changed->num_edges = features.num_primary / 2;
+  return changed;
+}
+
+TEST_F(PlaceConfidenceTest, RestsOnCorners) {
+  const Keyframe& keyframe = scene_.map.keyframes().at(KeyframeId{0});
+  scene_.map.measure_keyframe(KeyframeId{0}, scene_.rig, with_edges(*keyframe.features));
+  view_.features = with_edges(*view_.features);
+  const std::size_t num_corners = view_.features->num_corners();
+  EXPECT_GT(confidence([&](std::size_t i) { return i < num_corners; }), 0.8);
+  EXPECT_EQ(confidence([&](std::size_t i) { return i >= num_corners; }), 0.0);
+}
+
 }  // namespace
 }  // namespace waymark

@@ -59,6 +59,7 @@ std::optional<LocatedPlace> PlaceLocator::locate_near(const Features& features,
                                                       KeyframeId candidate,
                                                       const Rigid3& guess) {
   gather_local_map(map, map.keyframes().at(candidate).landmarks, candidate, local_);
+  local_.landmarks.keep_corners();
   std::vector<LandmarkId> landmarks =
       locator_.find(features, local_.landmarks, guess, {.radius_px = kGuessRadiusPx});
   return refine(features, map, candidate, candidate.value, std::move(landmarks));
@@ -76,11 +77,12 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
   attempt_.failure = FrameReason::kTooFewInliers;
   std::optional<LocatedFrame> located = find_consensus(features, map, stream, std::move(landmarks));
   if (!located) return std::nullopt;
-  const int enough = enough_of(kMinInliers, features.num_primary);
+  const int enough = enough_of(kMinInliers, features.num_corners());
   const std::array<std::pair<double, int>, 2> rounds = {
       {{kFirstRadiusPx, enough / 2}, {kSecondRadiusPx, enough}}};
   for (const auto& [radius_px, min_inliers] : rounds) {
     gather_local_map(map, primary_landmarks(features, located->landmarks), candidate, local_);
+    local_.landmarks.keep_corners();
     located = locator_.locate_again(features,
                                     map,
                                     *std::move(located),
