@@ -21,6 +21,7 @@
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
 #include "waymark/session/image_keeper.h"
+#include "waymark/session/input_ahead.h"
 #include "waymark/session/live_input.h"
 #include "waymark/session/overlay_video.h"
 #include "waymark/session/quality.h"
@@ -115,12 +116,14 @@ SessionResults map_input(Session& session,
                          Autosave& autosave,
                          LiveControl* live,
                          OverlayVideo* overlay,
+                         bool reads_ahead,
                          Reporter& reporter) {
   CalibrationWatch watch(session,
                          [&reporter](const std::string& mistake) { reporter.warning(mistake); });
   SessionHooks hooks;
   hooks.watch = &watch;
   hooks.should_stop = is_interrupted;
+  hooks.reads_ahead = reads_ahead;
   hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
@@ -276,7 +279,11 @@ std::optional<int> map_once(const RunOptions& options,
     remove_abandoned_parts(options.map_out);
   }
   std::atomic<bool> is_paused{false};
-  TimedInput input(*session.input,
+  const bool reads_ahead = options.session.timing == Timing::kLockstep && options.pace == 0.0 &&
+                           !session.input->info().is_live;
+  const bool decodes_ahead = reads_ahead && session.input->can_decode_apart();
+  InputAhead ahead(*session.input);
+  TimedInput input(decodes_ahead ? ahead : *session.input,
                    options.pace,
                    options.session.timing == Timing::kRealtime,
                    is_interrupted,
@@ -295,7 +302,8 @@ std::optional<int> map_once(const RunOptions& options,
   LiveControl* const shown = live ? &*live : nullptr;
   std::optional<OverlayVideo> overlay = start_overlay(options.overlay);
   OverlayVideo* const drawn = overlay ? &*overlay : nullptr;
-  SessionResults results = map_input(session, images, autosave, shown, drawn, reporter);
+  SessionResults results =
+      map_input(session, images, autosave, shown, drawn, reads_ahead, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(options.session.timing);

@@ -2,66 +2,22 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
-#include <cstddef>
 #include <memory>
-#include <optional>
 #include <vector>
 
 #include "waymark/camera/rig.h"
-#include "waymark/camera/tangent.h"
 #include "waymark/image/depth.h"
-#include "waymark/image/extractor.h"
+#include "waymark/image/feature_finder.h"
 #include "waymark/image/features.h"
 #include "waymark/image/image.h"
-#include "waymark/image/pyramid.h"
-#include "waymark/image/stereo.h"
 #include "waymark/image/view_mask.h"
 
 namespace waymark {
 
-struct SmallImage;
-
-struct FrameSettings {
-  FeatureSettings features = {};
-  StereoSettings stereo = {};
-  DepthSettings depth = {};
-  ViewSettings view = {};
-};
-
-/// Throws InputError where the size of an image is not that of its camera in the rig.
-void check_sizes(const FrameImages& images, const Rig& rig);
-
-/// What the stages of the last frame took.
-struct FrameTimes {
-  double features_ms = 0.0;  ///< Extraction and bearings of camera 0.
-  double depth_ms = 0.0;     ///< Stereo search with the pyramid of camera 1, or the depth image.
-};
-
-/// Takes the seam out of 360 degree images: repeats columns at both sides, so that what lies across
-/// the seam is found and described like everything else. Keeps its buffers.
-class SeamPadding {
- public:
-  /// margin_px: columns at either side, at most the width.
-  explicit SeamPadding(int margin_px) : margin_px_(margin_px) {}
-
-  int margin_px() const { return margin_px_; }
-
-  /// The image, margin_px wider at both sides. Stays valid until the next call.
-  ImageView widen(ImageView image);
-
-  /// The mask of the widened image: 0 in the margins, where everything is seen a second time. An
-  /// empty mask is one of `otherwise` all over an image of this size.
-  ImageView widen_mask(ImageView mask, int width_px, int height_px, std::uint8_t otherwise);
-
- private:
-  int margin_px_;
-  Image image_;
-  Image mask_;
-};
-
-/// Turns images into the immutable data of a frame: extraction, tangents, stereo or depth. Keeps
-/// its buffers; what is new per frame is the result. The same images give the same frame once the
-/// surroundings of the image circle are known (ViewMask::learn), until watch() finds something.
+/// Turns the images of a sequence into the immutable data of its frames: finds features, depths and
+/// what moves along with the camera. Keeps its buffers; what is new per frame is the result. The
+/// same images give the same frame once the surroundings of the image circle are known
+/// (ViewMask::learn), until watch() finds something.
 class FrameBuilder {
  public:
   /// Throws InputError for a word that view.auto_mask does not know.
@@ -73,6 +29,16 @@ class FrameBuilder {
   /// motion: as far as it is known beforehand; features of rolling shutters are corrected by it,
   /// and found in depth images of other times.
   std::shared_ptr<const Features> build(const FrameImages& images, const RigMotion& motion = {});
+
+  /// The same of images in which features were found beforehand, in the view() of now.
+  std::shared_ptr<const Features> build(FoundFrame found,
+                                        const FrameImages& images,
+                                        const RigMotion& motion);
+
+  /// With what the next frame is looked at.
+  FrameView view() const;
+  /// Whether the next images may change that before they are looked at.
+  bool is_learning() const;
 
   /// Looks for what moves along with camera 0. From the next image on it is kept free of features.
   /// is_same_world: whether the landmarks and directions are in the same world as those before.
@@ -93,32 +59,14 @@ class FrameBuilder {
   void look_with(const Rig& rig);
 
  private:
-  void extract_primary(const FrameImages& images, Features& features);
-  /// Returns how many of them, the last, are points on edges.
-  std::size_t extract_keypoints(const FrameImages& images);
-  void add_stereo(const FrameImages& images, Features& features);
   void add_depth(const FrameImages& images, const RigMotion& motion, Features& features);
-  const TangentArrays& compute_tangents(const Camera& camera);
-  static void reserve(Features& features, std::size_t count);
-  static void append(Features& features,
-                     const Keypoint& keypoint,
-                     const TangentArrays& tangents,
-                     std::size_t i);
 
-  Rig rig_;
-  FrameSettings settings_;
+  std::shared_ptr<const Rig> rig_;
+  DepthSettings depth_;
   bool is_auto_masked_;
-  FeatureExtractor extractor_;
+  FeatureFinder finder_;
   std::vector<ViewMask> view_masks_;  // Per camera of the rig.
-  std::optional<SeamPadding> seam_;   // Where the columns of camera 0 repeat.
-  std::optional<StereoSearch> stereo_;
-  TangentComputer tangent_computer_;
-  Pyramid pyramid0_;  // Where the extractor's has a wider image.
-  Pyramid pyramid1_;
   std::vector<Keypoint> keypoints_;
-  std::vector<Descriptor> descriptors_;
-  std::vector<Eigen::Vector2d> pixels_;
-  std::vector<float> level_scales_;
   std::shared_ptr<const SmallImage> small_image_;
   FrameTimes times_;
 };

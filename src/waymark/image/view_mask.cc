@@ -147,10 +147,10 @@ double lit_radius(ImageView image, const Eigen::Vector2d& center) {
 }
 
 /// The levels, all of them if empty, or 0 where the mask is 0. Keeps the buffer.
-void combine(const Image& levels, ImageView mask, Image& result) {
+void combine(ImageView levels, ImageView mask, Image& result) {
   if (result.values.empty()) result = Image(mask.width_px, mask.height_px);
   for (int y = 0; y < mask.height_px; ++y) {
-    const std::uint8_t* const allowed = levels.values.empty() ? nullptr : levels.row(y);
+    const std::uint8_t* const allowed = levels.is_empty() ? nullptr : levels.row(y);
     for (int x = 0; x < mask.width_px; ++x) {
       const std::uint8_t count = allowed ? allowed[x] : Pyramid::kNumLevels;
       result.row(y)[x] = mask.at(x, y) == 0 ? 0 : count;
@@ -176,6 +176,20 @@ std::vector<float> distances_to_zero(ImageView image) {
   return squared;
 }
 
+ImageView LevelMask::combined_with(ImageView other, Image& buffer) const {
+  const ImageView limits = is_empty() ? ImageView() : num_levels_->view();
+  if (other.is_empty()) return limits;
+  combine(limits, other, buffer);
+  return buffer.view();
+}
+
+bool LevelMask::allows(const Eigen::Vector2d& pixel, int level) const {
+  if (is_empty()) return true;
+  const int x = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, num_levels_->width_px - 1);
+  const int y = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, num_levels_->height_px - 1);
+  return num_levels_->view().at(x, y) > level;
+}
+
 ViewMask::ViewMask(std::shared_ptr<const Camera> camera, const ViewSettings& settings)
     : camera_(std::move(camera)),
       center_px_(principal_point(*camera_)),
@@ -187,7 +201,7 @@ ViewMask::ViewMask(std::shared_ptr<const Camera> camera, const ViewSettings& set
 }
 
 void ViewMask::learn(ImageView image) {
-  if (!may_have_circle_ || num_learned_ == kNumLearned) return;
+  if (!is_learning()) return;
   ++num_learned_;
   const double radius = lit_radius(image, center_px_);
   if (radius < kMinCircle * 0.5 * std::min(image.width_px, image.height_px)) return;
@@ -204,10 +218,12 @@ void ViewMask::watch(const LocatedImage& located, bool is_same_world) {
 
 void ViewMask::exclude_ego() {
   const Image& mask = ego_.mask();
-  if (mask.values.empty()) {
-    num_levels_ = lens_levels_;
+  if (!mask.values.empty()) {
+    Image num_levels;
+    combine(lens_levels_.view(), mask.view(), num_levels);
+    levels_ = LevelMask(std::move(num_levels));
   } else {
-    combine(lens_levels_, mask.view(), num_levels_);
+    levels_ = lens_levels_.values.empty() ? LevelMask() : LevelMask(lens_levels_);
   }
 }
 
@@ -238,19 +254,6 @@ void ViewMask::update() {
     lens_levels_.values[i] = static_cast<std::uint8_t>(count);
   }
   exclude_ego();
-}
-
-ImageView ViewMask::num_levels(ImageView other) {
-  if (other.is_empty()) return num_levels_.values.empty() ? ImageView() : num_levels_.view();
-  combine(num_levels_, other, combined_);
-  return combined_.view();
-}
-
-bool ViewMask::allows(const Eigen::Vector2d& pixel, int level) const {
-  if (num_levels_.values.empty()) return true;
-  const int x = std::clamp(static_cast<int>(std::lround(pixel.x())), 0, camera_->width_px() - 1);
-  const int y = std::clamp(static_cast<int>(std::lround(pixel.y())), 0, camera_->height_px() - 1);
-  return num_levels_.view().at(x, y) > level;
 }
 
 }  // namespace waymark

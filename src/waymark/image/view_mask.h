@@ -5,6 +5,7 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "waymark/camera/camera.h"
@@ -17,6 +18,32 @@ namespace waymark {
 /// Distance in pixels from each pixel to the nearest one that is 0, row by row; infinite where
 /// there is none (Felzenszwalb and Huttenlocher 2012, Distance transforms of sampled functions).
 std::vector<float> distances_to_zero(ImageView image);
+
+/// How many pyramid levels may have features at each pixel of the images of a camera. Immutable:
+/// copies share it, and are what equals it.
+class LevelMask {
+ public:
+  /// No limits.
+  LevelMask() = default;
+  /// Of the size of the images.
+  explicit LevelMask(Image num_levels)
+      : num_levels_(std::make_shared<const Image>(std::move(num_levels))) {}
+
+  /// Whether there are no limits.
+  bool is_empty() const { return num_levels_ == nullptr; }
+
+  /// The limits, and 0 where the other mask, empty or of the same size, is 0; empty where there are
+  /// none. Valid as long as this is and the buffer, which may be used, is left alone.
+  ImageView combined_with(ImageView other, Image& buffer) const;
+
+  /// Whether a feature of the level may be at a pixel of the image.
+  bool allows(const Eigen::Vector2d& pixel, int level) const;
+
+  bool operator==(const LevelMask&) const = default;
+
+ private:
+  std::shared_ptr<const Image> num_levels_;
+};
 
 /// Where in the images of a camera features may be. Kept free are pixels without a bearing, the
 /// black surroundings of a lens's image circle, directions that the settings exclude, and what is
@@ -40,13 +67,11 @@ class ViewMask {
   /// What was found to move along, see EgoMask::mask().
   const Image& ego_mask() const { return ego_.mask(); }
 
-  /// How many pyramid levels may have features at each pixel: a feature's patch does not touch the
-  /// surroundings. 0 as well where the other mask, empty or of the same size, is 0. Empty where
-  /// there are no limits. Stays valid until the next call.
-  ImageView num_levels(ImageView other);
+  /// Whether learn() may still find surroundings.
+  bool is_learning() const { return may_have_circle_ && num_learned_ < kNumLearned; }
 
-  /// Whether a feature of the level may be at a pixel of the image.
-  bool allows(const Eigen::Vector2d& pixel, int level) const;
+  /// Where features may be: a feature's patch does not touch the surroundings.
+  const LevelMask& levels() const { return levels_; }
 
  private:
   void update();
@@ -60,9 +85,8 @@ class ViewMask {
   Image has_bearing_;   // 1 or 0; empty: all have.
   Image is_direction_;  // 1 or 0 by the settings; empty: all are used.
   EgoMask ego_;
-  Image lens_levels_;  // As num_levels_, but for what moves along.
-  Image num_levels_;   // Empty: no limits.
-  Image combined_;
+  Image lens_levels_;  // As levels_, but for what moves along; empty: no limits.
+  LevelMask levels_;
 };
 
 }  // namespace waymark

@@ -77,8 +77,8 @@ TEST(ViewMask, PlainCamerasHaveNoLimits) {
   black.resize(320, 240);
   for (int y = 0; y < 240; ++y) std::fill_n(black.row(y), 320, std::uint8_t{0});
   mask.learn(black.view());
-  EXPECT_TRUE(mask.num_levels({}).is_empty());
-  EXPECT_TRUE(mask.allows({0.0, 0.0}, 7));
+  EXPECT_TRUE(mask.levels().is_empty());
+  EXPECT_TRUE(mask.levels().allows({0.0, 0.0}, 7));
 }
 
 TEST(ViewMask, KeepsPatchesClearOfPixelsWithoutBearing) {
@@ -86,32 +86,33 @@ TEST(ViewMask, KeepsPatchesClearOfPixelsWithoutBearing) {
   ViewMask mask(make_fisheye(-0.1), {});
   for (int level = 0; level < Pyramid::kNumLevels; ++level) {
     const double last = 121.6 - 19.0 * Pyramid::scale(level);
-    EXPECT_TRUE(mask.allows({kCenterPx + last - 2.0, kCenterPx}, level)) << level;
-    EXPECT_FALSE(mask.allows({kCenterPx, kCenterPx - last - 2.0}, level)) << level;
+    EXPECT_TRUE(mask.levels().allows({kCenterPx + last - 2.0, kCenterPx}, level)) << level;
+    EXPECT_FALSE(mask.levels().allows({kCenterPx, kCenterPx - last - 2.0}, level)) << level;
   }
 }
 
 TEST(ViewMask, FindsTheImageCircle) {
   ViewMask mask(make_fisheye(), {});
-  EXPECT_TRUE(mask.num_levels({}).is_empty());
+  EXPECT_TRUE(mask.levels().is_empty());
   PaddedImage black;
   black.resize(kSizePx, kSizePx);
   for (int y = 0; y < kSizePx; ++y) std::fill_n(black.row(y), kSizePx, std::uint8_t{3});
   mask.learn(black.view());  // The lid is still on.
-  EXPECT_TRUE(mask.num_levels({}).is_empty());
+  EXPECT_TRUE(mask.levels().is_empty());
   mask.learn(make_vignetted(150.0).view());
   mask.learn(make_vignetted(170.0).view());  // The first image was dark at the border.
-  EXPECT_TRUE(mask.allows({kCenterPx + 170.0 - 25.0, kCenterPx}, 0));
-  EXPECT_FALSE(mask.allows({kCenterPx + 170.0 - 19.0, kCenterPx}, 0));
+  EXPECT_TRUE(mask.levels().allows({kCenterPx + 170.0 - 25.0, kCenterPx}, 0));
+  EXPECT_FALSE(mask.levels().allows({kCenterPx + 170.0 - 19.0, kCenterPx}, 0));
   mask.learn(testing::make_texture(kSizePx, kSizePx, 4).view());
-  EXPECT_TRUE(mask.num_levels({}).is_empty());
+  EXPECT_TRUE(mask.levels().is_empty());
 }
 
 TEST(ViewMask, CombinesWithAnotherMask) {
   ViewMask mask(make_fisheye(-0.1), {});
   Image other(kSizePx, kSizePx);
   std::fill_n(other.values.begin(), kSizePx * kSizePx / 2, std::uint8_t{1});
-  const ImageView combined = mask.num_levels(other.view());
+  Image buffer;
+  const ImageView combined = mask.levels().combined_with(other.view(), buffer);
   EXPECT_EQ(combined.at(200, 190), Pyramid::kNumLevels);
   EXPECT_EQ(combined.at(200, 210), 0);
   EXPECT_EQ(combined.at(2, 2), 0);
@@ -121,14 +122,14 @@ TEST(ViewMask, ExcludesDirections) {
   const auto camera =
       std::make_shared<EquirectangularCamera>(EquirectangularModel(720, 360), 720, 360);
   ViewMask poles(camera, {.top_deg = 10.0, .bottom_deg = 30.0});
-  EXPECT_FALSE(poles.allows({100.0, 18.0}, 0));
-  EXPECT_TRUE(poles.allows({100.0, 21.0}, 7));
-  EXPECT_TRUE(poles.allows({600.0, 298.0}, 7));
-  EXPECT_FALSE(poles.allows({600.0, 301.0}, 0));
+  EXPECT_FALSE(poles.levels().allows({100.0, 18.0}, 0));
+  EXPECT_TRUE(poles.levels().allows({100.0, 21.0}, 7));
+  EXPECT_TRUE(poles.levels().allows({600.0, 298.0}, 7));
+  EXPECT_FALSE(poles.levels().allows({600.0, 301.0}, 0));
   ViewMask narrow(make_fisheye(), {.max_angle_deg = 90.0});
   const double edge = 100.0 * std::numbers::pi / 2.0;
-  EXPECT_TRUE(narrow.allows({kCenterPx, kCenterPx + edge - 1.0}, 7));
-  EXPECT_FALSE(narrow.allows({kCenterPx, kCenterPx + edge + 1.0}, 0));
+  EXPECT_TRUE(narrow.levels().allows({kCenterPx, kCenterPx + edge - 1.0}, 7));
+  EXPECT_FALSE(narrow.levels().allows({kCenterPx, kCenterPx + edge + 1.0}, 0));
 }
 
 TEST(FrameBuilder, KeepsTheVignetteFreeOfFeatures) {

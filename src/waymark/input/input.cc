@@ -138,6 +138,12 @@ bool is_camera(const std::filesystem::path& path) {
   return is_address(path) && !(text.starts_with("http") && is_video_name(path));
 }
 
+std::optional<Input::Decoding> Input::as_decoding(std::optional<InputFrame> frame) {
+  if (!frame) return std::nullopt;
+  const auto decoded = std::make_shared<InputFrame>(*std::move(frame));
+  return [decoded] { return std::move(*decoded); };
+}
+
 std::unique_ptr<Input> open_input(const std::filesystem::path& path, const InputOptions& options) {
   silence_image_library();
   std::unique_ptr<Input> input = open_in_full_size(path, options);

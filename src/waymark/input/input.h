@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -117,12 +118,27 @@ struct InputInfo {
 /// A recorded input, read frame after frame. For one thread.
 class Input {
  public:
+  /// Decodes the images of a frame, in any thread, while the input goes on.
+  using Decoding = std::function<InputFrame()>;
+
   virtual ~Input() = default;
   /// What was understood when it was opened.
   virtual const InputInfo& info() const = 0;
   /// The next frame, or nothing at the end. A bad image is a fault of its frame, never an
   /// exception.
   virtual std::optional<InputFrame> next() = 0;
+
+  /// Whether other threads may decode: next_decoding() and complete() take the place of next().
+  virtual bool can_decode_apart() const { return false; }
+  /// next() in parts: what of the next frame can be done by another thread, or nothing at the end.
+  /// Leaves info() as it is.
+  virtual std::optional<Decoding> next_decoding() { return as_decoding(next()); }
+  /// The rest, of each frame in turn, by the thread that asks for info().
+  virtual void complete(InputFrame&) {}
+
+ protected:
+  /// One that has been decoded.
+  static std::optional<Decoding> as_decoding(std::optional<InputFrame> frame);
 };
 
 /// Whether a path means a camera: camera:N, a device such as /dev/video0, or the address of a

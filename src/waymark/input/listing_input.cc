@@ -69,42 +69,58 @@ ListingInput::ListingInput(const std::filesystem::path& path,
 }
 
 std::optional<InputFrame> ListingInput::next() {
-  if (num_read_ == *info_.num_frames) return std::nullopt;
-  InputFrame frame = read(selection_.first + selection_.every * num_read_++);
-  if (frame.images.size() == num_cameras(info_.setup)) has_begun_ = true;
-  if (!has_begun_ && frame.fault == FrameFault::kNone) hold_back(frame, "image of camera 1");
+  const std::optional<Decoding> decoding = next_decoding();
+  if (!decoding) return std::nullopt;
+  InputFrame frame = (*decoding)();
+  complete(frame);
   return frame;
 }
 
-/// A bad image of camera 1 leaves the frame with camera 0, once there is a map with its scale.
-void ListingInput::use_without_partner(InputFrame& frame) {
-  if (!has_begun_ || frame.images.size() != 1 || frame.fault == FrameFault::kNone) return;
-  frame.fault = FrameFault::kNone;
-  ++info_.counts.without_partner;
+std::optional<Input::Decoding> ListingInput::next_decoding() {
+  if (num_read_ == *info_.num_frames) return std::nullopt;
+  const std::size_t index = selection_.first + selection_.every * num_read_++;
+  return [this, index] { return decode(index); };
+}
+
+void ListingInput::complete(InputFrame& frame) {
+  const ListedFrame& listed = listing_.frames[frame.index];
+  // A bad image of camera 1 leaves the frame with camera 0, once there is a map with its scale.
+  if (has_begun_ && frame.images.size() == 1 && frame.fault != FrameFault::kNone) {
+    frame.fault = FrameFault::kNone;
+    ++info_.counts.without_partner;
+    decode_rest(listed, frame);
+  }
+  if (frame.fault != FrameFault::kNone) {
+    frame.images.clear();
+    return;
+  }
+  if (masks_.is_video()) masks_.attach(stem_of(listed), frame);
+  if (frame.images.size() == num_cameras(info_.setup)) has_begun_ = true;
+  if (!has_begun_ && frame.fault == FrameFault::kNone) hold_back(frame, "image of camera 1");
 }
 
 std::string ListingInput::describe_camera(std::size_t camera) const {
   return info_.setup == Setup::kStereo ? fmt::format(" (camera {})", camera) : "";
 }
 
-InputFrame ListingInput::read(std::size_t index) {
+InputFrame ListingInput::decode(std::size_t index) const {
   const ListedFrame& listed = listing_.frames[index];
   InputFrame frame;
   frame.index = index;
   frame.timestamp_ns = listed.timestamp_ns;
   frame.fault = read_images(listed, frame);
-  use_without_partner(frame);
-  if (frame.fault != FrameFault::kNone) {
-    frame.images.clear();
-    return frame;
-  }
+  if (frame.fault == FrameFault::kNone) decode_rest(listed, frame);
+  return frame;
+}
+
+/// What comes with images that are used.
+void ListingInput::decode_rest(const ListedFrame& listed, InputFrame& frame) const {
   read_depth(listed, frame);
-  masks_.attach(stem_of(listed), frame);
   if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front()).value_or("");
   if (has_right_jpeg_ && frame.images.size() > 1) {
     frame.right_jpeg = read_as_jpeg(listed.images[1]).value_or("");
   }
-  return frame;
+  if (!masks_.is_video()) masks_.attach(stem_of(listed), frame);
 }
 
 FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& frame) const {

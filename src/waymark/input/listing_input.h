@@ -21,11 +21,14 @@ class ListingInput : public Input {
 
   const InputInfo& info() const override { return info_; }
   std::optional<InputFrame> next() override;
+  bool can_decode_apart() const override { return true; }
+  std::optional<Decoding> next_decoding() override;
+  void complete(InputFrame& frame) override;
 
  private:
-  InputFrame read(std::size_t index);
+  InputFrame decode(std::size_t index) const;
+  void decode_rest(const ListedFrame& listed, InputFrame& frame) const;
   FrameFault read_images(const ListedFrame& listed, InputFrame& frame) const;
-  void use_without_partner(InputFrame& frame);
   std::string describe_camera(std::size_t camera) const;
   void read_depth(const ListedFrame& listed, InputFrame& frame) const;
   std::size_t find_first_readable() const;

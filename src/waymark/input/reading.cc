@@ -160,7 +160,7 @@ std::filesystem::path MaskSource::path_of(const std::string& stem) const {
   return fixed_ || video_ ? path_ : by_name_.at(stem);
 }
 
-std::optional<Image> MaskSource::read(const std::string& stem, std::size_t index) {
+std::optional<Image> MaskSource::read(const std::string& stem, std::size_t index) const {
   if (fixed_) return fixed_;
   if (!video_) return read_grey_image(path_of(stem));
   while (video_->num_grabbed() <= index) {
@@ -191,7 +191,7 @@ bool MaskSource::has(const std::string& stem) const {
   return fixed_ || video_ || by_name_.contains(stem);
 }
 
-void MaskSource::attach(const std::string& stem, InputFrame& frame) {
+void MaskSource::attach(const std::string& stem, InputFrame& frame) const {
   if (!has(stem) || frame.images.empty()) return;
   frame.mask = read(stem, frame.index);
   const ImageSize size = size_of(frame.images.front());

@@ -104,19 +104,23 @@ class MaskSource {
   /// them, unless they are as many: then they belong to the frames in their order.
   void match(const std::vector<std::string>& stems);
 
+  /// Whether they are the frames of a video.
+  bool is_video() const { return video_ != nullptr; }
+
   /// Whether the frame whose image has this name (without extension) has a mask.
   bool has(const std::string& stem) const;
 
   /// Gives a frame with images its mask, if there is one. One that cannot be read or has not the
-  /// size of the image is a fault of the frame and takes its images away. Frames come in order.
-  void attach(const std::string& stem, InputFrame& frame);
+  /// size of the image is a fault of the frame and takes its images away. Where the masks are a
+  /// video frames come in order, else in any, and from any thread.
+  void attach(const std::string& stem, InputFrame& frame) const;
 
   /// Throws InputError unless the frame, the first good one, got along with its mask.
   void check_first(const std::string& stem, const InputFrame& frame) const;
 
  private:
   std::filesystem::path path_of(const std::string& stem) const;
-  std::optional<Image> read(const std::string& stem, std::size_t index);
+  std::optional<Image> read(const std::string& stem, std::size_t index) const;
 
   std::filesystem::path path_;
   std::optional<Image> fixed_;

@@ -56,16 +56,38 @@ class ResizedInput final : public Input {
   std::optional<InputFrame> next() override {
     std::optional<InputFrame> frame = input_->next();
     info_.counts = input_->info().counts;
-    if (!frame) return frame;
-    for (Image& image : frame->images) image = reduce(image.view(), factor_);
-    if (frame->depth) frame->depth = pick_reduced(frame->depth->view(), factor_);
-    if (frame->mask) frame->mask = pick_reduced(frame->mask->view(), factor_);
-    frame->jpeg = resize_jpeg(frame->jpeg, factor_);
-    frame->right_jpeg = resize_jpeg(frame->right_jpeg, factor_);
+    if (frame) resize(*frame);
     return frame;
   }
 
+  bool can_decode_apart() const override { return input_->can_decode_apart(); }
+
+  std::optional<Decoding> next_decoding() override {
+    std::optional<Decoding> decoding = input_->next_decoding();
+    if (!decoding) return decoding;
+    return [this, decode = *std::move(decoding)] {
+      InputFrame frame = decode();
+      if (frame.fault == FrameFault::kNone) resize(frame);
+      return frame;
+    };
+  }
+
+  void complete(InputFrame& frame) override {
+    const bool is_resized = frame.fault == FrameFault::kNone;
+    input_->complete(frame);
+    info_.counts = input_->info().counts;
+    if (!is_resized) resize(frame);
+  }
+
  private:
+  void resize(InputFrame& frame) const {
+    for (Image& image : frame.images) image = reduce(image.view(), factor_);
+    if (frame.depth) frame.depth = pick_reduced(frame.depth->view(), factor_);
+    if (frame.mask) frame.mask = pick_reduced(frame.mask->view(), factor_);
+    frame.jpeg = resize_jpeg(frame.jpeg, factor_);
+    frame.right_jpeg = resize_jpeg(frame.right_jpeg, factor_);
+  }
+
   std::unique_ptr<Input> input_;
   double factor_;
   InputInfo info_;

@@ -78,16 +78,38 @@ class RotatedInput final : public Input {
   std::optional<InputFrame> next() override {
     std::optional<InputFrame> frame = input_->next();
     info_.counts = input_->info().counts;
-    if (!frame) return frame;
-    for (Image& image : frame->images) image = turn(image, num_quarters_);
-    if (frame->depth) frame->depth = turn(*frame->depth, num_quarters_);
-    if (frame->mask) frame->mask = turn(*frame->mask, num_quarters_);
-    frame->jpeg = turn_jpeg(frame->jpeg, num_quarters_);
-    frame->right_jpeg = turn_jpeg(frame->right_jpeg, num_quarters_);
+    if (frame) turn_all(*frame);
     return frame;
   }
 
+  bool can_decode_apart() const override { return input_->can_decode_apart(); }
+
+  std::optional<Decoding> next_decoding() override {
+    std::optional<Decoding> decoding = input_->next_decoding();
+    if (!decoding) return decoding;
+    return [this, decode = *std::move(decoding)] {
+      InputFrame frame = decode();
+      if (frame.fault == FrameFault::kNone) turn_all(frame);
+      return frame;
+    };
+  }
+
+  void complete(InputFrame& frame) override {
+    const bool is_turned = frame.fault == FrameFault::kNone;
+    input_->complete(frame);
+    info_.counts = input_->info().counts;
+    if (!is_turned) turn_all(frame);
+  }
+
  private:
+  void turn_all(InputFrame& frame) const {
+    for (Image& image : frame.images) image = turn(image, num_quarters_);
+    if (frame.depth) frame.depth = turn(*frame.depth, num_quarters_);
+    if (frame.mask) frame.mask = turn(*frame.mask, num_quarters_);
+    frame.jpeg = turn_jpeg(frame.jpeg, num_quarters_);
+    frame.right_jpeg = turn_jpeg(frame.right_jpeg, num_quarters_);
+  }
+
   std::unique_ptr<Input> input_;
   int num_quarters_;
   InputInfo info_;

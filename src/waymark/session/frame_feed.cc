@@ -5,6 +5,7 @@
 #include <sys/resource.h>
 
 #include <algorithm>
+#include <deque>
 #include <iterator>
 #include <map>
 #include <memory>
@@ -83,6 +84,48 @@ void add_frame(const InputFrame& frame,
   frames.table.frames.push_back(record_of_result(frame, result));
 }
 
+/// The frames of an input, some of which are told of before it is their turn.
+class FramesInTurn {
+ public:
+  FramesInTurn(Input& input, const FrameLookahead& lookahead)
+      : input_(input), lookahead_(lookahead) {}
+
+  /// Nothing at the end. Throws what the input threw, after the frames before.
+  std::shared_ptr<const InputFrame> next() {
+    const std::size_t count = std::min(lookahead_.count, kMaxLookahead);
+    while (!has_ended_ && waiting_.size() <= count) read();
+    if (waiting_.empty()) {
+      if (failure_) std::rethrow_exception(failure_);
+      return nullptr;
+    }
+    std::shared_ptr<const InputFrame> frame = std::move(waiting_.front());
+    waiting_.pop_front();
+    return frame;
+  }
+
+ private:
+  void read() {
+    std::optional<InputFrame> next;
+    try {
+      next = input_.next();
+    } catch (...) {
+      failure_ = std::current_exception();
+    }
+    has_ended_ = !next;
+    if (!next) return;
+    waiting_.push_back(std::make_shared<const InputFrame>(*std::move(next)));
+    const std::shared_ptr<const InputFrame>& frame = waiting_.back();
+    const bool is_fed = frame->fault == FrameFault::kNone;
+    if (is_fed && lookahead_.count > 0) lookahead_.prepare(borrow(*frame), frame);
+  }
+
+  Input& input_;
+  const FrameLookahead& lookahead_;
+  std::deque<std::shared_ptr<const InputFrame>> waiting_;
+  bool has_ended_ = false;
+  std::exception_ptr failure_;
+};
+
 }  // namespace
 
 void forget_session(FedFrames& frames) {
@@ -93,7 +136,8 @@ void forget_session(FedFrames& frames) {
 FedFrames feed_all(Input& input,
                    const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
-                   const FrameObserver& observer) {
+                   const FrameObserver& observer,
+                   const FrameLookahead& lookahead) {
   FedFrames frames;
   // Rows of all frames that there may be, rather than twice as many now and then.
   constexpr std::size_t kMaxExpected = 1'000'000;
@@ -102,9 +146,10 @@ FedFrames feed_all(Input& input,
   frames.fed.reserve(num_expected);
   frames.tracking_ms.reserve(num_expected);
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
+  FramesInTurn in_turn(input, lookahead);
   try {
     while (!should_stop || !should_stop()) {
-      const std::optional<InputFrame> frame = input.next();
+      const std::shared_ptr<const InputFrame> frame = in_turn.next();
       if (!frame) break;
       add_frame(*frame, feed, frames);
       if (observer) observer(frames.table.frames.back(), frame->warning);

@@ -7,12 +7,14 @@
 #include <set>
 #include <utility>
 
+#include "waymark/session/frame_feed.h"
+
 namespace waymark {
 namespace {
 
-// A start may make keyframes of frames that long ago, and a new keyframe takes some frames to show
-// in the map.
-constexpr std::size_t kNumYoung = 100;
+// A start may make keyframes of frames that long ago, a new keyframe takes some frames to show in
+// the map, and frames are read some time before they are fed.
+constexpr std::size_t kNumYoung = 100 + kMaxLookahead;
 
 }  // namespace
 

@@ -172,7 +172,12 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
     if (hooks.watch) hooks.watch->add_time(record.index, record.timestamp_ns);
     if (hooks.observer) hooks.observer(record, warning);
   };
-  FedFrames frames = feed_all(input, feed, hooks.should_stop, observe);
+  FrameLookahead lookahead;
+  if (hooks.reads_ahead && !input.info().is_live) lookahead.count = system.max_prepared();
+  lookahead.prepare = [&](const FrameImages& frame, std::shared_ptr<const void> owner) {
+    system.prepare(frame, std::move(owner));
+  };
+  FedFrames frames = feed_all(input, feed, hooks.should_stop, observe, lookahead);
   finish(system, hooks, frames);
   reserve.release();
   if (hooks.watch) hooks.watch->finish(system);

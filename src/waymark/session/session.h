@@ -47,6 +47,8 @@ struct SessionHooks {
   std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
   CalibrationWatch* watch = nullptr;  ///< Its mistakes become part of the summary.
+  /// Whether frames may be read before they are fed: not where they come at their own pace.
+  bool reads_ahead = true;
 };
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and

@@ -9,11 +9,12 @@
 #include "waymark/image/frame_builder.h"
 #include "waymark/loop/global_mapper.h"
 #include "waymark/marker/known_markers.h"
+#include "waymark/system/frames_ahead.h"
 #include "waymark/system/marker_finder.h"
 #include "waymark/system/starting_map.h"
+#include "waymark/system/trajectory.h"
 #include "waymark/system/workers.h"
 #include "waymark/track/tracker.h"
-#include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
 namespace {
@@ -30,21 +31,27 @@ bool has_focal_check(const Map& map, FrameId first) {
          map.keyframes().at(newest).frame.value >= first.value + kFramesToCheck;
 }
 
-bool has_pose(FrameState state) {
-  return state == FrameState::kTracked || state == FrameState::kFilled;
+FrameSettings frame_settings(const Settings& settings) {
+  return {settings.features, settings.stereo, settings.depth, settings.view};
 }
 
 }  // namespace
 
 class System::Impl {
  public:
-  Impl(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
+  Impl(Rig rig,
+       const Settings& settings,
+       Timing timing,
+       std::shared_ptr<const Map> map,
+       unsigned num_threads)
       : given_rig_(std::make_shared<const Rig>(
             with_depth_offset(std::move(rig), settings.depth.inverse_offset))),
         settings_(settings),
         timing_(timing),
+        num_threads_(num_threads),
         rig_(given_rig_),
-        builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
+        builder_(*rig_, frame_settings(settings)),
+        ahead_(builder_, frame_settings(settings), timing == Timing::kLockstep ? num_threads : 0),
         memory_(rig_, frame_after(map.get())),
         mapper_(rig_,
                 settings.mapping,
@@ -62,12 +69,16 @@ class System::Impl {
   }
 
   TrackingResult feed(const FrameImages& images);
+  void prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
+    ahead_.prepare(images, std::move(owner));
+  }
+  std::size_t max_prepared() const { return ahead_.capacity(); }
   void finish();
   void set_mapping(bool is_on);
   /// The same, from its beginning and with an empty map.
   std::unique_ptr<Impl> begin_anew() const;
-  std::vector<TrajectoryFrame> trajectory() const;
-  std::vector<FrameState> frame_states() const;
+  std::vector<TrajectoryFrame> trajectory() const { return list_poses(memory_, *map()); }
+  std::vector<FrameState> frame_states() const { return list_states(memory_); }
   std::shared_ptr<const Map> map() const { return visible_.snapshot.map; }
   SystemStatistics statistics() const;
   std::shared_ptr<const Rig> rig() const {
@@ -81,6 +92,7 @@ class System::Impl {
 
  private:
   void make_tracker(bool has_range);
+  std::shared_ptr<const Features> build(const FrameImages& images, StageTimes& times);
   /// Looks for what moves along in a frame that was tracked.
   void watch(ImageView image0, const TrackOutcome& outcome, StageTimes& times);
   void look_with_calibration();
@@ -97,10 +109,12 @@ class System::Impl {
   const std::shared_ptr<const Rig> given_rig_;
   const Settings settings_;
   const Timing timing_;
+  const unsigned num_threads_;
 
   // The caller's thread.
   std::shared_ptr<const Rig> rig_;  // As calibrated so far.
   FrameBuilder builder_;
+  FramesAhead ahead_;
   std::optional<Tracker> tracker_;
   TrajectoryMemory memory_;
   PublishedMap visible_;
@@ -138,16 +152,13 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   const FrameId id = memory_.next();
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
   look_with_calibration();
-  const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
-  auto features = builder_.build(images, motion);
+  auto features = build(images, result.stages);
   result.num_features = static_cast<std::uint32_t>(features->num_primary);
   const Frame frame{id,
                     images.timestamp_ns,
                     std::move(features),
                     builder_.small_image(),
                     marker_finder_.search_in(images, rig_)};
-  result.stages[Stage::kFeatures] = builder_.times().features_ms;
-  result.stages[Stage::kDepth] = builder_.times().depth_ms;
   {
     StageTimer timer(result.stages, Stage::kWait);
     look_at_map(id);
@@ -175,6 +186,20 @@ TrackingResult System::Impl::feed(const FrameImages& images) {
   return result;
 }
 
+std::shared_ptr<const Features> System::Impl::build(const FrameImages& images, StageTimes& times) {
+  const RigMotion motion = builder_.needs_motion(images) ? tracker_->predict_motion() : RigMotion{};
+  std::optional<FoundFrame> found;
+  {
+    StageTimer timer(times, Stage::kWait);
+    found = ahead_.take(images);
+  }
+  auto features =
+      found ? builder_.build(*std::move(found), images, motion) : builder_.build(images, motion);
+  times[Stage::kFeatures] = builder_.times().features_ms;
+  times[Stage::kDepth] = builder_.times().depth_ms;
+  return features;
+}
+
 void System::Impl::watch(ImageView image0, const TrackOutcome& outcome, StageTimes& times) {
   if (!outcome.world_from_rig) return;
   StageTimer timer(times, Stage::kFeatures);
@@ -199,7 +224,7 @@ void System::Impl::set_mapping(bool is_on) {
 
 std::unique_ptr<System::Impl> System::Impl::begin_anew() const {
   WAYMARK_CHECK(!is_finished_);
-  auto anew = std::make_unique<Impl>(*given_rig_, settings_, timing_, nullptr);
+  auto anew = std::make_unique<Impl>(*given_rig_, settings_, timing_, nullptr, num_threads_);
   anew->purpose_ = purpose_;
   return anew;
 }
@@ -325,35 +350,10 @@ void System::Impl::tell_motions() {
   });
 }
 
-std::vector<TrajectoryFrame> System::Impl::trajectory() const {
-  std::vector<TrajectoryFrame> frames;
-  frames.reserve(memory_.entries().size());
-  for (std::uint32_t i = 0; i < memory_.entries().size(); ++i) {
-    const TrajectoryMemory::Entry& memory = memory_.entries()[i];
-    const auto [reference, scale, rig_from_reference] = memory.pose();
-    // The newest frames may refer to a keyframe that the visible map does not contain yet.
-    if (!has_pose(memory.state) || reference >= map()->keyframes().end_id()) continue;
-    const Rigid3 rig_from_world = map()->rig_from_world(reference, rig_from_reference, scale);
-    const KeyframeId living = map()->resolve(reference);
-    frames.push_back({FrameId{i},
-                      memory.timestamp_ns,
-                      memory.state,
-                      map()->keyframes().at(living).submap,
-                      rig_from_world.inverse()});
-  }
-  return frames;
-}
-
 MarkerReport System::Impl::markers() const {
   if (!is_finished_ || !marker_finder_.is_on()) return {};
   const MarkerSurvey& survey = mapper_.marker_survey();
   return {marker_finder_.family(), survey.markers, survey.frame};
-}
-
-std::vector<FrameState> System::Impl::frame_states() const {
-  std::vector<FrameState> states;
-  for (const auto& memory : memory_.entries()) states.push_back(memory.state);
-  return states;
 }
 
 SystemStatistics System::Impl::statistics() const {
@@ -369,10 +369,19 @@ SystemStatistics System::Impl::statistics() const {
   return statistics;
 }
 
-System::System(Rig rig, const Settings& settings, Timing timing, std::shared_ptr<const Map> map)
-    : impl_(std::make_unique<Impl>(std::move(rig), settings, timing, std::move(map))) {}
+System::System(Rig rig,
+               const Settings& settings,
+               Timing timing,
+               std::shared_ptr<const Map> map,
+               unsigned num_threads)
+    : impl_(std::make_unique<Impl>(std::move(rig), settings, timing, std::move(map), num_threads)) {
+}
 System::~System() = default;
 TrackingResult System::feed(const FrameImages& images) { return impl_->feed(images); }
+void System::prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
+  impl_->prepare(images, std::move(owner));
+}
+std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
 void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }

@@ -2,10 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <memory>
 #include <optional>
 #include <string>
+#include <thread>
 #include <vector>
 
 #include "waymark/base/timing.h"
@@ -66,10 +68,13 @@ class System {
   /// map: one made before, that is to be extended, by whatever cameras; a copy goes on. The camera
   /// is looked for in it; where it is not found, a new sub-map begins, which is joined once it is.
   /// Their models must be known (see load_map()), else InputError.
+  ///
+  /// num_threads: that look at frames ahead, see prepare(); 0: none.
   System(Rig rig,
          const Settings& settings,
          Timing timing,
-         std::shared_ptr<const Map> map = nullptr);
+         std::shared_ptr<const Map> map = nullptr,
+         unsigned num_threads = std::thread::hardware_concurrency());
   ~System();
   System(const System&) = delete;
   System& operator=(const System&) = delete;
@@ -77,6 +82,16 @@ class System {
   /// Tracks one frame; timestamps must increase. A map without scale takes no images with range:
   /// then the first frame throws InputError. Rethrows what failed in the mapper's thread.
   TrackingResult feed(const FrameImages& images);
+
+  /// Has other threads find the features of a frame that is fed later, while those before it are
+  /// tracked: with the images of max_prepared() frames at hand all cores are busy. Only time
+  /// depends on it. In the order in which they are fed; what is not fed is forgotten. owner keeps
+  /// the images as long as they are looked at, and unchanged.
+  void prepare(const FrameImages& images, std::shared_ptr<const void> owner);
+
+  /// So many frames may be prepared at a time, others are left out; 0 unless the timing is
+  /// kLockstep.
+  std::size_t max_prepared() const;
 
   /// Of the frame fed last; empty before the first.
   const FrameDetails& details() const;

@@ -48,6 +48,33 @@ TEST(System, FollowsARenderedSequence) {
   }
 }
 
+TEST(System, FramesThatWerePreparedGiveTheSameBits) {
+  const Played alone = play(Timing::kInline);
+  const auto forever = std::make_shared<int>(0);
+  for (const unsigned num_threads : {1u, 2u, 4u}) {
+    System system(small_rig(), small_settings(), Timing::kLockstep, nullptr, num_threads);
+    EXPECT_EQ(system.max_prepared(), 2 * num_threads);
+    std::size_t next = 0;
+    for (std::size_t i = 0; i < frames().size(); ++i) {
+      for (; next < std::min(i + system.max_prepared(), frames().size()); ++next) {
+        system.prepare(input_of(frames()[next]), forever);
+      }
+      const TrackingResult result = system.feed(input_of(frames()[i]));
+      EXPECT_EQ(result.num_features, alone.results[i].num_features) << "frame " << i;
+      EXPECT_EQ(result.num_inliers, alone.results[i].num_inliers) << "frame " << i;
+    }
+    system.finish();
+    const std::vector<TrajectoryFrame> trajectory = system.trajectory();
+    ASSERT_EQ(trajectory.size(), alone.trajectory.size());
+    for (std::size_t i = 0; i < trajectory.size(); ++i) {
+      EXPECT_EQ(trajectory[i].world_from_rig.translation,
+                alone.trajectory[i].world_from_rig.translation)
+          << "frame " << i << ", " << num_threads << " threads";
+    }
+  }
+  EXPECT_EQ(System(small_rig(), small_settings(), Timing::kInline).max_prepared(), 0u);
+}
+
 TEST(System, InlineAndLockstepGiveTheSameBits) {
   const Played alone = play(Timing::kInline);
   const Played threaded = play(Timing::kLockstep);
