@@ -12,6 +12,7 @@
 #include "waymark/base/check.h"
 #include "waymark/camera/resized_camera.h"
 #include "waymark/image/convert.h"
+#include "waymark/input/changed_input.h"
 
 namespace waymark {
 namespace {
@@ -30,10 +31,10 @@ std::string resize_jpeg(const std::string& jpeg, double factor) {
   return {result.begin(), result.end()};
 }
 
-class ResizedInput final : public Input {
+class ResizedInput final : public ChangedInput {
  public:
   ResizedInput(std::unique_ptr<Input> input, double factor)
-      : input_(std::move(input)), factor_(factor), info_(input_->info()) {
+      : ChangedInput(std::move(input)), factor_(factor) {
     info_.width_px = static_cast<int>(factor * info_.width_px);
     info_.height_px = static_cast<int>(factor * info_.height_px);
     if (info_.focal_px) *info_.focal_px *= factor;
@@ -51,36 +52,8 @@ class ResizedInput final : public Input {
     }
   }
 
-  const InputInfo& info() const override { return info_; }
-
-  std::optional<InputFrame> next() override {
-    std::optional<InputFrame> frame = input_->next();
-    info_.counts = input_->info().counts;
-    if (frame) resize(*frame);
-    return frame;
-  }
-
-  bool can_decode_apart() const override { return input_->can_decode_apart(); }
-
-  std::optional<Decoding> next_decoding() override {
-    std::optional<Decoding> decoding = input_->next_decoding();
-    if (!decoding) return decoding;
-    return [this, decode = *std::move(decoding)] {
-      InputFrame frame = decode();
-      if (frame.fault == FrameFault::kNone) resize(frame);
-      return frame;
-    };
-  }
-
-  void complete(InputFrame& frame) override {
-    const bool is_resized = frame.fault == FrameFault::kNone;
-    input_->complete(frame);
-    info_.counts = input_->info().counts;
-    if (!is_resized) resize(frame);
-  }
-
  private:
-  void resize(InputFrame& frame) const {
+  void change(InputFrame& frame) const override {
     for (Image& image : frame.images) image = reduce(image.view(), factor_);
     if (frame.depth) frame.depth = pick_reduced(frame.depth->view(), factor_);
     if (frame.mask) frame.mask = pick_reduced(frame.mask->view(), factor_);
@@ -88,9 +61,7 @@ class ResizedInput final : public Input {
     frame.right_jpeg = resize_jpeg(frame.right_jpeg, factor_);
   }
 
-  std::unique_ptr<Input> input_;
-  double factor_;
-  InputInfo info_;
+  const double factor_;
 };
 
 }  // namespace

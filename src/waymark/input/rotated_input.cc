@@ -12,6 +12,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/rotated_camera.h"
+#include "waymark/input/changed_input.h"
 
 namespace waymark {
 namespace {
@@ -48,10 +49,10 @@ std::string turn_jpeg(const std::string& jpeg, int num_quarters) {
   return {result.begin(), result.end()};
 }
 
-class RotatedInput final : public Input {
+class RotatedInput final : public ChangedInput {
  public:
   RotatedInput(std::unique_ptr<Input> input, int num_quarters)
-      : input_(std::move(input)), num_quarters_(num_quarters), info_(input_->info()) {
+      : ChangedInput(std::move(input)), num_quarters_(num_quarters) {
     if (num_quarters % 2 == 1) std::swap(info_.width_px, info_.height_px);
     info_.lines.push_back(fmt::format("turned clockwise by {} degrees: {}x{} px",
                                       90 * num_quarters,
@@ -73,36 +74,8 @@ class RotatedInput final : public Input {
     }
   }
 
-  const InputInfo& info() const override { return info_; }
-
-  std::optional<InputFrame> next() override {
-    std::optional<InputFrame> frame = input_->next();
-    info_.counts = input_->info().counts;
-    if (frame) turn_all(*frame);
-    return frame;
-  }
-
-  bool can_decode_apart() const override { return input_->can_decode_apart(); }
-
-  std::optional<Decoding> next_decoding() override {
-    std::optional<Decoding> decoding = input_->next_decoding();
-    if (!decoding) return decoding;
-    return [this, decode = *std::move(decoding)] {
-      InputFrame frame = decode();
-      if (frame.fault == FrameFault::kNone) turn_all(frame);
-      return frame;
-    };
-  }
-
-  void complete(InputFrame& frame) override {
-    const bool is_turned = frame.fault == FrameFault::kNone;
-    input_->complete(frame);
-    info_.counts = input_->info().counts;
-    if (!is_turned) turn_all(frame);
-  }
-
  private:
-  void turn_all(InputFrame& frame) const {
+  void change(InputFrame& frame) const override {
     for (Image& image : frame.images) image = turn(image, num_quarters_);
     if (frame.depth) frame.depth = turn(*frame.depth, num_quarters_);
     if (frame.mask) frame.mask = turn(*frame.mask, num_quarters_);
@@ -110,9 +83,7 @@ class RotatedInput final : public Input {
     frame.right_jpeg = turn_jpeg(frame.right_jpeg, num_quarters_);
   }
 
-  std::unique_ptr<Input> input_;
-  int num_quarters_;
-  InputInfo info_;
+  const int num_quarters_;
 };
 
 }  // namespace
