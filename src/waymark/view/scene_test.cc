@@ -235,7 +235,7 @@ TEST(Scene, TellsMarkersAndPointsOnEdges) {
   marker.id = 17;
   marker.side_m = 0.5;
   marker.reference = keyframe;
-  const Keyframe& reference = map.keyframes().at(keyframe);
+  const Keyframe reference = map.keyframes().at(keyframe);  // Also after freeze().
   marker.reference_scale = reference.applied_scale;
   // At the origin of the world, upright.
   marker.marker_from_reference = reference.rig_from_world.inverse();
