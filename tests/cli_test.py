@@ -77,7 +77,7 @@ class Usage(CliTest):
 
     def test_wrong_usage(self):
         self.assert_fails(waymark(), 2)
-        self.assert_fails(waymark("fly"), 2, "'fly'", "run, info, localize, map, view, eval, report, simulate")
+        self.assert_fails(waymark("fly"), 2, "'fly'", "run, info, localize, map, atlas, fleet, view, eval, report, simulate")
         self.assert_fails(waymark("run"), 2, "INPUT")
         self.assert_fails(waymark("run", self.folder, "--wings"), 2, "--wings")
         self.assert_fails(waymark("run", self.folder, "--setup", "quad"), 2, "quad")
