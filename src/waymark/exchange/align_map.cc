@@ -102,7 +102,8 @@ AlignedMap align_to_distances(const Map& map,
                                  submap.value));
   }
   const std::optional<double> factor = scale_by_distances(map, distances);
-  if (!factor) throw InputError(where, "is between two at the same place, expected some distance");
+  if (!factor)
+    throw InputError(where, "is between two at the same place, expected two that are apart");
   check_factor(where, *factor);
   const Sim3 scale{Eigen::Quaterniond::Identity(), Eigen::Vector3d::Zero(), *factor};
   return {put_into_metres(Map::thaw(map), submap, scale),
