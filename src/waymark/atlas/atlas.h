@@ -29,14 +29,14 @@ struct AtlasRecording {
 /// A tile: a map file of a bounded number of keyframes that never changes, and what of it is known
 /// without opening it.
 struct AtlasTile {
-  std::string origin;           ///< SHA-256 of its file as it was cut: who it is.
-  std::string checksum;         ///< SHA-256 of its file: which state of it counts.
-  std::string places;           ///< SHA-256 of the file with its part of the place index.
-  std::uint32_t recording = 0;  ///< Index in AtlasContents::recordings.
-  std::uint32_t submap = 0;     ///< Which of the recording's sub-maps it was cut from.
-  std::uint32_t num_keyframes = 0;
-  std::uint32_t num_landmarks = 0;
-  bool is_metric = false;  ///< Whether its lengths are metres; else the scale is free.
+  std::string origin;               ///< SHA-256 of its file as it was cut: who it is.
+  std::string checksum;             ///< SHA-256 of its file: which state of it counts.
+  std::string places;               ///< SHA-256 of the file with its part of the place index.
+  std::uint32_t recording = 0;      ///< Index in AtlasContents::recordings.
+  std::uint32_t submap = 0;         ///< Which of the recording's sub-maps it was cut from.
+  std::uint32_t num_keyframes = 0;  ///< That it has.
+  std::uint32_t num_landmarks = 0;  ///< That it has.
+  bool is_metric = false;           ///< Whether its lengths are metres; else the scale is free.
   double pixel_angle_rad =
       0.0;  ///< What a pixel in the middle of its images covers, in the median.
   Eigen::Vector3d centre = Eigen::Vector3d::Zero();  ///< Mean position of its rigs, in its frame.
@@ -64,9 +64,9 @@ struct AtlasContents {
 
 /// Shared landmarks of a link that is new, by the origins of its tiles, a before b.
 struct NewShared {
-  std::string origin_a;
-  std::string origin_b;
-  SharedLandmarks landmarks;
+  std::string origin_a;       ///< Of the tile that comes first.
+  std::string origin_b;       ///< Of the other one.
+  SharedLandmarks landmarks;  ///< That both show.
 };
 
 /// A folder with a map of any size in tiles; docs/atlas-format.md describes its files. Tiles are
@@ -85,6 +85,7 @@ class Atlas {
   /// A folder for tiles alone, without a state: for those who make them and publish them elsewhere.
   static Atlas of_tiles(const std::filesystem::path& folder);
 
+  /// Where it is.
   const std::filesystem::path& folder() const { return folder_; }
   /// As of when it was opened or last written.
   const AtlasContents& contents() const { return contents_; }

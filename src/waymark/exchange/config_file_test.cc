@@ -123,7 +123,8 @@ TEST(ConfigFile, OfNerfstudioMayHaveOtherModels) {
            {R"({"fl_x": "wide", )" + rest, "fl_x that is no number"},
            {R"({"frames": []})", "has no w, which is needed"},
            {R"({"fl_x": 3, "frames": [)", "is no JSON"}}) {
-    EXPECT_THAT(input_error_of([&] { read(text); }), HasSubstr(words)) << text;
+    EXPECT_THAT(input_error_of([&, &settings = text] { read(settings); }), HasSubstr(words))
+        << text;
   }
 }
 

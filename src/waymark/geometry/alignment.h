@@ -27,22 +27,24 @@ std::optional<Eigen::Matrix3d> align_directions(std::span<const Eigen::Vector3d>
 std::optional<Rigid3> align_rigid(std::span<const Eigen::Vector3d> points_a,
                                   std::span<const Eigen::Vector3d> points_b,
                                   std::span<const double> weights = {});
+/// The same with a scale.
 std::optional<Sim3> align_similarity(std::span<const Eigen::Vector3d> points_a,
                                      std::span<const Eigen::Vector3d> points_b,
                                      std::span<const double> weights = {});
 
 /// A trajectory to be aligned: world_from_rig poses in the order of their strictly ascending times.
 struct TimedPoses {
-  std::span<const std::int64_t> timestamps_ns;
-  std::span<const Rigid3> world_from_rig;
+  std::span<const std::int64_t> timestamps_ns;  ///< Ascending.
+  std::span<const Rigid3> world_from_rig;       ///< One per time.
 };
 
-/// Indices of the poses of a and b that belong together: each pose of a with the nearest in time of
-/// b if that is at most max_difference_ns away, each pose of b used once at most (for the nearest).
+/// Indices of two poses that belong together.
 struct PosePair {
-  std::uint32_t a;
-  std::uint32_t b;
+  std::uint32_t a;  ///< Of the first trajectory.
+  std::uint32_t b;  ///< Of the second one.
 };
+/// Each pose of a with the nearest in time of b if that is at most max_difference_ns away, each
+/// pose of b used once at most (for the nearest).
 std::vector<PosePair> associate(std::span<const std::int64_t> timestamps_a_ns,
                                 std::span<const std::int64_t> timestamps_b_ns,
                                 std::int64_t max_difference_ns);

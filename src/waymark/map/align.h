@@ -36,9 +36,9 @@ using MapPlace = std::variant<KeyframeId, LandmarkId>;
 
 /// How far apart two places really are.
 struct KnownDistance {
-  MapPlace a;
-  MapPlace b;
-  double metres;
+  MapPlace a;     ///< One of them.
+  MapPlace b;     ///< The other one.
+  double metres;  ///< Between them.
 };
 
 /// Metres per unit of the map, such that the squared errors in metres are least in sum. Nothing if
@@ -50,7 +50,7 @@ Eigen::Quaterniond turn_upright(const Eigen::Vector3d& up);
 
 /// How a sub-map fits a trajectory.
 struct TrajectoryFit {
-  Sim3 trajectory_from_map;
+  Sim3 trajectory_from_map;       ///< Of the frames of both.
   std::size_t num_keyframes = 0;  ///< With a pose of the trajectory at their time.
   double rms_m = 0.0;             ///< Of their positions.
 };
