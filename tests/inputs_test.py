@@ -94,6 +94,11 @@ class Inputs(CliTest):
         shutil.rmtree(self.out, ignore_errors=True)
         self.assert_fails(done, 2, *words)
 
+    def camchain_on_its_side(self):
+        """Of the images turned counter-clockwise."""
+        return self.config("cam0:\n  camera_model: pinhole\n  intrinsics: [291, 290, 121, 188]\n  distortion_model: radtan\n"
+                           "  distortion_coeffs: [-0.2, 0.05, 0.0001, 0.0002]\n  resolution: [240, 376]\n")
+
     def test_turned_images(self):
         expected = [list(map(float, line.split()[1:4])) for line in
                     self.trajectory(self.source, "-c", self.camchain).splitlines()]
@@ -103,13 +108,33 @@ class Inputs(CliTest):
             cv2.imwrite(str(path), cv2.rotate(cv2.imread(str(path), cv2.IMREAD_GRAYSCALE), cv2.ROTATE_90_COUNTERCLOCKWISE))
         # Turned twice, each the same way round: the images are as they were, their calibration is stated on its side.
         self.assertGreater(len(expected), 30)
-        camera = "cam0:\n  camera_model: pinhole\n  intrinsics: [291, 290, 121, 188]\n  distortion_model: radtan\n" \
-                 "  distortion_coeffs: [-0.2, 0.05, 0.0001, 0.0002]\n  resolution: [240, 376]\n"
-        again = self.trajectory(turned, "-c", self.config(camera), "--rotate", 90)
+        again = self.trajectory(turned, "-c", self.camchain_on_its_side(), "--rotate", 90)
         self.assertEqual([list(map(float, line.split()[1:4])) for line in again.splitlines()], expected)
         self.assertIn("turned clockwise by 90 degrees: 376x240 px",
                       waymark("info", turned, "--rotate", 90).stdout)
         self.assert_refused(waymark("info", turned, "--rotate", 45), "--rotate")
+
+    def test_a_video_that_says_how_it_is_turned(self):
+        """What a phone held upright writes: images on their side, and a tag."""
+        plain, tagged = self.folder / "plain.mp4", self.folder / "tagged.mp4"
+        subprocess.run(["ffmpeg", "-v", "error", "-framerate", "20", "-i", self.source / "%06d.png", "-vf", "transpose=cclock",
+                        "-c:v", "mpeg4", "-q:v", "2", plain], check=True)
+        subprocess.run(["ffmpeg", "-v", "error", "-i", plain, "-metadata:s:v", "rotate=90", "-c", "copy", tagged], check=True)
+        self.assertIn("240x376 px", waymark("info", plain).stdout)
+        self.assertIn("376x240 px", waymark("info", tagged).stdout)
+        upright = self.trajectory(tagged, "-c", self.camchain)
+        self.assertEqual(upright, self.trajectory(plain, "-c", self.camchain_on_its_side(), "--rotate", 90))
+        self.assertGreater(upright.count("\n"), 30)
+
+    def test_360_degree_images_with_pixels_that_are_not_square(self):
+        camera = self.config("cam0:\n  camera_model: equirectangular\n  intrinsics: []\n  distortion_model: none\n"
+                             "  resolution: [640, 322]\n", "camera.yaml")
+        source = self.folder / "sphere"
+        done = waymark("simulate", "room", "--setup", "mono", "--camera", camera, "--frames", 40, "-o", source)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertEqual(self.trajectory(source).count("\n"), 40)
+        judged = waymark("eval", self.out / "trajectory.txt", source / "groundtruth.txt", "--align", "sim3", "--json")
+        self.assertLess(json.loads(judged.stdout)["ate_rmse_m"], 0.01)
 
     def test_a_video_in_the_network(self):
         video = self.make_video()
