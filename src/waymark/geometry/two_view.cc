@@ -202,10 +202,28 @@ int count_near_points(const TwoViewGeometry& geometry, double min_parallax_rad) 
   return count;
 }
 
-bool has_support(std::size_t num_inliers, std::size_t num_matches, const TwoViewOptions& options) {
-  const double enough =
-      std::max<double>(options.min_num_points, kMinInlierRatio * static_cast<double>(num_matches));
-  return static_cast<double>(num_inliers) >= enough;
+double enough_inliers(std::size_t num_matches, const TwoViewOptions& options) {
+  return std::max<double>(options.min_num_points,
+                          kMinInlierRatio * static_cast<double>(num_matches));
+}
+
+// Whether a motion has so many inliers and the parallax that it takes.
+TwoViewResult judge(const Candidate& candidate,
+                    TwoViewModel model,
+                    const BearingMatches& matches,
+                    double min_num_inliers,
+                    const TwoViewOptions& options) {
+  TwoViewGeometry geometry = make_geometry(candidate, model, matches);
+  const auto num_inliers =
+      std::count(geometry.is_inlier.begin(), geometry.is_inlier.end(), std::uint8_t{1});
+  if (static_cast<double>(num_inliers) < min_num_inliers) {
+    return {TwoViewStatus::kTooFewInliers, std::nullopt};
+  }
+  if (count_near_points(geometry, options.min_parallax_rad) < options.min_num_points ||
+      !is_determined(candidate, matches)) {
+    return {TwoViewStatus::kTooLittleParallax, std::nullopt};
+  }
+  return {TwoViewStatus::kOk, std::move(geometry)};
 }
 
 }  // namespace
@@ -221,7 +239,8 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
   const TwoViewModels models = fit_two_view_models(
       matches,
       {.seed = options.seed, .stream = options.stream, .min_inlier_ratio = kMinInlierRatio});
-  if (!has_support(models.num_inliers, num_matches, options)) {
+  const double enough = enough_inliers(num_matches, options);
+  if (static_cast<double>(models.num_inliers) < enough) {
     return {TwoViewStatus::kTooFewInliers, std::nullopt};
   }
   if (models.best == TwoViewModel::kRotation) {
@@ -230,18 +249,16 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
   const std::vector<Candidate> candidates = find_candidates(models, matches);
   if (candidates.empty()) return {TwoViewStatus::kTooLittleParallax, std::nullopt};
 
-  TwoViewGeometry geometry = make_geometry(candidates.front(), models.best, matches);
-  const auto num_inliers = static_cast<std::size_t>(
-      std::count(geometry.is_inlier.begin(), geometry.is_inlier.end(), std::uint8_t{1}));
-  if (!has_support(num_inliers, num_matches, options)) {
-    return {TwoViewStatus::kTooFewInliers, std::nullopt};
-  }
-  if (count_near_points(geometry, options.min_parallax_rad) < options.min_num_points ||
-      !is_determined(candidates.front(), matches)) {
-    return {TwoViewStatus::kTooLittleParallax, std::nullopt};
-  }
-  if (is_ambiguous(candidates)) return {TwoViewStatus::kAmbiguous, std::nullopt};
-  return {TwoViewStatus::kOk, std::move(geometry)};
+  TwoViewResult result = judge(candidates.front(), models.best, matches, enough, options);
+  if (result.geometry && is_ambiguous(candidates)) return {TwoViewStatus::kAmbiguous, std::nullopt};
+  return result;
+}
+
+TwoViewResult take_motion(const Rigid3& b_from_a,
+                          TwoViewModel model,
+                          const BearingMatches& matches,
+                          const TwoViewOptions& options) {
+  return judge(make_candidate(b_from_a, matches), model, matches, options.min_num_points, options);
 }
 
 }  // namespace waymark

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "waymark/base/median.h"
-#include "waymark/geometry/two_view.h"
+#include "waymark/geometry/world_motion.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/range_precision.h"
 #include "waymark/optimize/bundle.h"
@@ -319,7 +319,7 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
   const int enough = min_landmarks(*reference.frame.features, *frame.features);
   options.min_num_points = enough;
   options.min_parallax_rad = kMinParallaxPx * pixel_rad_;
-  const TwoViewResult two_view = estimate_two_view(bearings.view(), options);
+  const TwoViewResult two_view = estimate_world_motion(bearings.view(), options);
   if (!two_view.geometry) {
     reason_ = reason_of(two_view.status);
     return std::nullopt;
