@@ -64,9 +64,9 @@ PoseGraphResidual pose_graph_residual(const PoseGraphEdge& edge,
                                       const Sim3& to_from_world);
 
 /// Moves the nodes that are not fixed to the least cost by Levenberg-Marquardt. The linear systems
-/// are solved by a sparse Cholesky decomposition, ordered once by approximate minimum degree
-/// (Amestoy et al. 1996). Nodes without edges stay; with no node fixed, the whole stays about where
-/// it is. On the caller's thread, all sums in the order of the edges: same input, same bits.
+/// are solved by a sparse Cholesky decomposition (BlockCholesky), ordered once. Nodes without edges
+/// stay; with no node fixed, the whole stays about where it is. On the caller's thread, all sums in
+/// the order of the edges: same input, same bits.
 PoseGraphSummary optimize_pose_graph(PoseGraph& graph, const PoseGraphOptions& options);
 
 }  // namespace waymark
