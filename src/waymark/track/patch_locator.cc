@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cstddef>
+#include <numeric>
 #include <utility>
 
 #include "waymark/image/feature_geometry.h"
@@ -12,6 +13,11 @@
 
 namespace waymark {
 namespace {
+
+/// Landmarks of fewer keyframes have distances that are off by more. Errors of distances make a
+/// motion look shorter (as errors of a regressor do), and what is triangulated along it comes out
+/// nearer: in darkness the scale collapsed within a second. See docs/decisions.md.
+constexpr std::size_t kMinObservers = 4;
 
 double factor_of(const Rig& rig) {
   const Camera& camera = *rig.cameras.at(0).camera;
@@ -26,6 +32,14 @@ std::uint8_t level_of(double scale) {
 
 }  // namespace
 
+std::vector<std::uint32_t> well_known(const LandmarkSet& landmarks, const Map& map) {
+  std::vector<std::uint32_t> indices;
+  for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
+    if (num_observers(map.landmarks().at(landmarks.ids[i])) >= kMinObservers) indices.push_back(i);
+  }
+  return indices;
+}
+
 PatchLocator::PatchLocator(std::shared_ptr<const Rig> rig)
     : rig_(std::move(rig)),
       scale_(1.0 / factor_of(*rig_)),
@@ -34,6 +48,7 @@ PatchLocator::PatchLocator(std::shared_ptr<const Rig> rig)
 
 std::optional<PatchAlignment> PatchLocator::align(const LocatedPatches& before,
                                                   const LandmarkSet& around,
+                                                  const std::vector<std::uint32_t>& well_known,
                                                   const Frame& frame,
                                                   const Rigid3& predicted) {
   if (!frame.image || frame.image->detail.values.empty() || before.image.detail.values.empty()) {
@@ -41,15 +56,27 @@ std::optional<PatchAlignment> PatchLocator::align(const LocatedPatches& before,
   }
   const Rigid3& cam_from_rig = rig_->cameras[0].cam_from_rig;
   const Rigid3 cam_from_world = cam_from_rig * before.rig_from_world;
+  const Rigid3 initial_b_from_a = cam_from_rig * predicted * cam_from_world.inverse();
   points_in_cam_.clear();
   for (const Eigen::Vector3d& point : around.positions_in_world) {
     points_in_cam_.push_back(cam_from_world * point);
   }
-  PatchAlignment found = aligner_.align(before.image.detail,
-                                        points_in_cam_,
-                                        frame.image->detail,
-                                        cam_from_rig * predicted * cam_from_world.inverse());
+  if (auto found = align_some(before, well_known, frame, initial_b_from_a)) return found;
+  std::vector<std::uint32_t> all(around.size());
+  std::iota(all.begin(), all.end(), 0u);
+  return align_some(before, all, frame, initial_b_from_a);
+}
+
+std::optional<PatchAlignment> PatchLocator::align_some(const LocatedPatches& before,
+                                                       const std::vector<std::uint32_t>& chosen,
+                                                       const Frame& frame,
+                                                       const Rigid3& initial_b_from_a) {
+  chosen_points_.clear();
+  for (const std::uint32_t i : chosen) chosen_points_.push_back(points_in_cam_[i]);
+  PatchAlignment found =
+      aligner_.align(before.image.detail, chosen_points_, frame.image->detail, initial_b_from_a);
   if (!found.is_certain()) return std::nullopt;
+  for (std::uint32_t& index : found.alike) index = chosen[index];
   return found;
 }
 

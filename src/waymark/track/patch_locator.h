@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <memory>
 #include <optional>
 #include <vector>
@@ -19,6 +20,9 @@ struct LocatedPatches {
   const Rigid3& rig_from_world;
 };
 
+/// Indices of the landmarks of a set whose distance is known well: that many keyframes see.
+std::vector<std::uint32_t> well_known(const LandmarkSet& landmarks, const Map& map);
+
 /// Pose of a frame from the images around landmarks, where corners do not tell: by aligning them
 /// directly with those of the frame before. The landmarks that look alike there become features of
 /// the frame, so that keyframes, new landmarks and adjustments rest on them as on others.
@@ -26,10 +30,12 @@ class PatchLocator {
  public:
   explicit PatchLocator(std::shared_ptr<const Rig> rig);
 
-  /// around: landmarks that surround the camera; predicted: the frame's rig_from_world by the
-  /// motion before. Nothing where the images do not tell, or the frame has none.
+  /// around: landmarks that surround the camera; well_known: the indices of those that are tried
+  /// first; predicted: the frame's rig_from_world by the motion before. Nothing where the images do
+  /// not tell, or the frame has none.
   std::optional<PatchAlignment> align(const LocatedPatches& before,
                                       const LandmarkSet& around,
+                                      const std::vector<std::uint32_t>& well_known,
                                       const Frame& frame,
                                       const Rigid3& predicted);
 
@@ -44,11 +50,18 @@ class PatchLocator {
                     LocatedFrame& located) const;
 
  private:
+  /// Of the landmarks around by their indices.
+  std::optional<PatchAlignment> align_some(const LocatedPatches& before,
+                                           const std::vector<std::uint32_t>& chosen,
+                                           const Frame& frame,
+                                           const Rigid3& initial_b_from_a);
+
   std::shared_ptr<const Rig> rig_;
   double scale_ = 1.0;      ///< Pixels of the image per pixel of its detail.
   std::uint8_t level_ = 0;  ///< Of features that are known as well as these pixels tell.
   PatchAligner aligner_;
   std::vector<Eigen::Vector3d> points_in_cam_;  ///< When the image before was taken.
+  std::vector<Eigen::Vector3d> chosen_points_;
 };
 
 }  // namespace waymark
