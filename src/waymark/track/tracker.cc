@@ -163,11 +163,9 @@ std::optional<LocatedFrame> Tracker::locate_by_patches(Frame& frame, StageTimes&
     local_map_age_ = 0;
   }
   const LocatedPatches before{*last_.image(), last_.rig_from_world()};
-  const auto found = patch_locator_.align(before,
-                                          local_.landmarks,
-                                          well_known(local_.landmarks, *map_),
-                                          frame,
-                                          last_.predict(frame.timestamp_ns));
+  const auto known = well_known(local_.landmarks, *map_);
+  const Rigid3 predicted = last_.predict(frame.timestamp_ns);
+  const auto found = patch_locator_.align(before, local_.landmarks, known, frame, predicted);
   if (!found) return std::nullopt;
   LocatedFrame located = patch_locator_.pose_of(before, *found);
   located.landmarks = locator_.find(
