@@ -70,23 +70,28 @@ def shared_folder():
     return folder
 
 
-def shared_sequence(setup):
-    """A short simulated sequence, made by the first test that needs it; not to be changed."""
-    made = shared_folder() / setup
+def made_once(name, *arguments, files=()):
+    """What `waymark simulate` makes, once for all programs of tests; not to be changed. files: names and texts beside it."""
+    made = shared_folder() / name
     if not made.exists():
         own = pathlib.Path(tempfile.mkdtemp(dir=shared_folder()))
-        camera = own / "camera.yaml"
-        camera.write_text(CAMERA)
-        done = waymark("simulate", "room", "--motion", "slide", "--camera", camera, "--setup", setup,
-                       "--frames", NUM_FRAMES, "-o", own / setup)
+        for file, text in files:
+            (own / file).write_text(text)
+        done = waymark("simulate", *arguments, "-o", own / name, cwd=own)
         assert done.returncode == 0, done.stderr
         try:
-            os.rename(own / setup, made)
+            os.rename(own / name, made)
         except OSError:  # Another program has just made it, too.
             if not made.exists():
                 raise
         shutil.rmtree(own)
     return made
+
+
+def shared_sequence(setup):
+    """A short simulated sequence."""
+    return made_once(setup, "room", "--motion", "slide", "--camera", "camera.yaml", "--setup", setup,
+                     "--frames", NUM_FRAMES, files=(("camera.yaml", CAMERA),))
 
 
 class CliTest(unittest.TestCase):

@@ -10,7 +10,7 @@ import unittest
 
 import numpy as np
 
-from cli_support import CliTest, shared_folder, waymark
+from cli_support import CliTest, made_once, waymark
 
 NUM_FRAMES = 400
 RATE_HZ = 12.5
@@ -23,12 +23,8 @@ MAX_SURVEYED_ATE_M = 0.02
 
 def flat():
     """A way through a flat with markers, made once."""
-    made = shared_folder() / "flat_with_markers"
-    if not made.exists():
-        done = waymark("simulate", "apartment", "--setup", "mono", "--frames", NUM_FRAMES, "--rate", RATE_HZ,
-                       "--markers", NUM_MARKERS, "-o", made)
-        assert done.returncode == 0, done.stderr
-    return made
+    return made_once("flat_with_markers", "apartment", "--setup", "mono", "--frames", NUM_FRAMES, "--rate", RATE_HZ,
+                     "--markers", NUM_MARKERS)
 
 
 def read_trajectory(path):
