@@ -294,10 +294,8 @@ async function measuresAndScales(context) {
 
 /** Of maps in metres and of those that nobody may write. */
 async function measuresOnly(context) {
-  const metric = await serve(context, { world: "walk", skip: 700 });
-  await until(metric.page, isOpen);
-  metric.mock.hold();
-  await metric.page.click("#view-choice [data-value=orbit]");
+  const metric = await serve(context, { world: "map", skip: 700 });
+  await until(metric.page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
   await metric.page.waitForTimeout(1500);
   await metric.page.keyboard.press("m");
   assert.equal((await measureSomething(metric.page)).unit, "m");
