@@ -8,22 +8,21 @@
 namespace waymark {
 
 /// Bad input from outside (file, setting, image, argument). The message reads
-/// "WHERE: what is wrong, what was expected" on one line.
+/// "WHERE: what is wrong, what was expected" on one line: what comes from outside and is not fit
+/// for a line comes out as printable() has it.
 class InputError : public std::runtime_error {
  public:
   /// where: file and line, setting or argument; what: what is wrong and what was expected.
-  InputError(const std::string& where, const std::string& what)
-      : std::runtime_error(where + ": " + what) {}
+  InputError(const std::string& where, const std::string& what);
 };
 
 /// The results cannot be written or the work cannot be finished; same form of message.
 class OutputError : public std::runtime_error {
  public:
   /// where: the file or device; what: why it cannot be written.
-  OutputError(const std::string& where, const std::string& what)
-      : std::runtime_error(where + ": " + what) {}
+  OutputError(const std::string& where, const std::string& what);
   /// A whole message of that form.
-  explicit OutputError(const std::string& message) : std::runtime_error(message) {}
+  explicit OutputError(const std::string& message);
 };
 
 /// A broken promise of our own code.

@@ -24,5 +24,11 @@ TEST(Check, InputErrorsStartWithThePlace) {
   EXPECT_STREQ(InputError("cam.yaml:3", "no").what(), "cam.yaml:3: no");
 }
 
+TEST(Check, ErrorsAreOneLineWhateverTheyQuote) {
+  EXPECT_STREQ(InputError("a\nb.yaml:3", "has\r\x1b").what(), "a\\x0ab.yaml:3: has\\x0d\\x1b");
+  EXPECT_STREQ(OutputError("a\nb", "full").what(), "a\\x0ab: full");
+  EXPECT_STREQ(OutputError("a: b\nc").what(), "a: b\\x0ac");
+}
+
 }  // namespace
 }  // namespace waymark

@@ -119,6 +119,8 @@ TEST(Config, HostileTextsAreRefused) {
   EXPECT_THAT(parse_error("\x89PNG\r\n\x1a\n"), HasSubstr("has the byte 0x1a"));
   EXPECT_THAT(parse_error("\"a\\nb\": 1\n"),
               "a.yaml:1: has a key of several lines, expected KEY: VALUE");
+  EXPECT_THAT(parse_error("a: \"\\\rb\""),
+              "a.yaml:1: is not valid YAML (unknown escape character: \\x0d)");
 }
 
 // Openings that never close, of every kind, in the size that is allowed at most.
