@@ -61,6 +61,8 @@ class GlobalMapper {
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
   /// The end: looks for loops a last time and consolidates.
   void finish();
+  /// Drops the landmarks on what is gone (see find_seen_through()), for the end: the poses stay.
+  void drop_seen_through() { mapper_.drop_seen_through(); }
 
   /// Finds what looks like a keyframe, verifies and closes it; whether there was something.
   bool close_alike(KeyframeId query);

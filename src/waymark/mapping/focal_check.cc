@@ -251,6 +251,13 @@ bool FocalCheck::is_bent() const {
   return !is_off() && bend_sigma > 0.0 && std::abs(bend) > kMaxBend + kSigmas * bend_sigma;
 }
 
+bool has_focal_check(const Map& map, FrameId first) {
+  if (map.keyframes().size() == 0) return false;
+  const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});
+  return newest.is_valid() &&
+         map.keyframes().at(newest).frame.value >= first.value + kFramesToCheck;
+}
+
 std::optional<FocalCheck> check_focal_length(const Map& map) {
   if (map.keyframes().size() < kMinKeyframesPerLandmark) return std::nullopt;
   const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});

@@ -11,6 +11,7 @@
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"
+#include "waymark/mapping/seen_through.h"
 #include "waymark/mapping/triangulate.h"
 #include "waymark/mapping/triangulate_edges.h"
 #include "waymark/marker/detect.h"
@@ -170,6 +171,10 @@ void Mapper::set_motion(KeyframeId id, const RigMotion& motion) {
   // That of a global shutter matters only once the shutter turns out to be none.
   if (keyframe.rig->cameras[0].readout_s == 0.0) return;
   map_.measure_keyframe(id, keyframe.rig, moved(keyframe.features, *keyframe.rig, motion));
+}
+
+void Mapper::drop_seen_through() {
+  for (LandmarkId id : find_seen_through(map_)) map_.erase_landmark(id);
 }
 
 void Mapper::apply(const GlobalAdjustment& adjustment) {

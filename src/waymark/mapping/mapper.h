@@ -40,6 +40,8 @@ class Mapper {
   void set_motion(KeyframeId id, const RigMotion& motion);
   /// Takes in what adjusting a whole sub-map gave.
   void apply(const GlobalAdjustment& adjustment);
+  /// Erases the landmarks on what is gone; see find_seen_through().
+  void drop_seen_through();
 
   /// For what reaches beyond the surroundings of the newest keyframe: change(map, dirty), which
   /// says what landmarks look different after it.

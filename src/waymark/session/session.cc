@@ -181,6 +181,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   finish(system, hooks, frames);
   reserve.release();
   if (hooks.watch) hooks.watch->finish(system);
+  if (!frames.failure) system.drop_seen_through();
   malloc_trim(0);  // What frames saw is settled and gone: lists of results take its place.
   update_states(system, frames);
 

@@ -19,18 +19,6 @@
 namespace waymark {
 namespace {
 
-/// Frames until the check of the focal length: with half as many, cars that drive on are told of
-/// errors of 2 to 3 % that their calibrations do not have (KITTI 00 and 07).
-constexpr std::uint32_t kFramesToCheck = 200;
-
-/// Whether a map comes late enough for the check of the focal length.
-bool has_focal_check(const Map& map, FrameId first) {
-  if (map.keyframes().size() == 0) return false;
-  const KeyframeId newest = map.resolve(KeyframeId{map.keyframes().end_id().value - 1});
-  return newest.is_valid() &&
-         map.keyframes().at(newest).frame.value >= first.value + kFramesToCheck;
-}
-
 FrameSettings frame_settings(const Settings& settings) {
   return {settings.features, settings.stereo, settings.depth, settings.view};
 }
@@ -74,6 +62,7 @@ class System::Impl {
   }
   std::size_t max_prepared() const { return ahead_.capacity(); }
   void finish();
+  void drop_seen_through();
   void set_mapping(bool is_on);
   /// The same, from its beginning and with an empty map.
   std::unique_ptr<Impl> begin_anew() const;
@@ -336,6 +325,13 @@ void System::Impl::finish() {
   if (is_long && !is_focal_checked_) focal_check_ = check_focal_length(*map());
 }
 
+void System::Impl::drop_seen_through() {
+  WAYMARK_CHECK(is_finished_);
+  mapper_.drop_seen_through();
+  published_ = mapper_.snapshot();
+  visible_ = publish();
+}
+
 /// Of keyframes by the frames around them, of which those after them were not there yet.
 void System::Impl::tell_motions() {
   if (!settings_.calibration.is_refined() && given_rig_->cameras[0].readout_s == 0.0) return;
@@ -383,6 +379,7 @@ void System::prepare(const FrameImages& images, std::shared_ptr<const void> owne
 }
 std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
+void System::drop_seen_through() { impl_->drop_seen_through(); }
 void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }

@@ -105,6 +105,10 @@ class System {
   /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards.
   void finish();
 
+  /// After finish(): drops landmarks on what is gone (see find_seen_through()). Apart from
+  /// finish(), so that they have their part in all that the map is asked for before.
+  void drop_seen_through();
+
   /// Every frame that has a pose, in order, with what is known now. After finish(): final.
   std::vector<TrajectoryFrame> trajectory() const;
 
