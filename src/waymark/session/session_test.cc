@@ -18,6 +18,7 @@ namespace waymark {
 namespace {
 
 using ::testing::HasSubstr;
+using ::testing::IsEmpty;
 using testing::MemoryInput;
 using ::testing::SizeIs;
 
