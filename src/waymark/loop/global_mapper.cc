@@ -3,12 +3,14 @@
 #include "waymark/loop/global_mapper.h"
 
 #include <algorithm>
+#include <numeric>
 #include <utility>
 
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/join_by_markers.h"
+#include "waymark/loop/undo.h"
 #include "waymark/map/align.h"
 #include "waymark/map/parts.h"
 
@@ -31,6 +33,9 @@ constexpr int kMarkerPasses = 2;
 
 /// Keyframes of a sub-map with markers when they are surveyed first, then at a quarter more.
 constexpr std::size_t kFirstMarkerSurvey = 5;
+
+/// A loop between keyframes so near to those of another says the same again.
+constexpr std::uint32_t kBesideDisbelieved = 3;
 
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
@@ -77,20 +82,67 @@ void GlobalMapper::update_places(const Mapper::Changes& changes) {
   for (const KeyframeId id : changes.erased) places_.erase(id);
 }
 
-bool GlobalMapper::close(const std::optional<Revisit>& revisit) {
-  if (!revisit) return false;
+bool GlobalMapper::close(const Revisit& revisit) {
+  odometry_.note(mapper_.map());
+  if (!agrees_with_loops(revisit)) return false;
   bool is_join = false;
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
-    is_join = close_revisit(map, places_, *revisit, projection_, dirty);
+    is_join = close_revisit(map, places_, revisit, projection_, dirty);
   });
   num_loops_ += !is_join;
   ++num_closures_;
-  unadjusted_ = mapper_.map().keyframes().at(revisit->query).submap;
+  unadjusted_ = mapper_.map().keyframes().at(revisit.query).submap;
   return true;
 }
 
+/// Whether the loops so far leave a new one standing. If it is them that turn out to be false, they
+/// are undone.
+bool GlobalMapper::agrees_with_loops(const Revisit& revisit) {
+  const Map& map = mapper_.map();
+  const SubmapId submap = map.keyframes().at(revisit.query).submap;
+  if (map.keyframes().at(revisit.match).submap != submap) return true;
+  std::vector<LoopEdge> loops = map.measured_loop_edges();
+  const std::size_t num_of_map = loops.size();
+  loops.insert(loops.end(), disbelieved_.begin(), disbelieved_.end());
+  // Nothing but the length of the way, which has been looked at, can contradict the first.
+  if (loops.empty()) return true;
+  loops.push_back(as_measured(map, {revisit.match, revisit.query, revisit.query_from_match}));
+  std::vector<std::size_t> believed(num_of_map);
+  std::iota(believed.begin(), believed.end(), std::size_t{0});
+  const std::vector<std::uint8_t> is_on = choose_loops(map, odometry_, submap, loops, believed);
+  undo(submap, std::span(is_on).first(num_of_map));
+  if (!is_on.back()) disbelieve(loops.back());
+  return is_on.back();
+}
+
+/// is_on: 1 or 0 per loop edge of the map.
+void GlobalMapper::undo(SubmapId submap, std::span<const std::uint8_t> is_on) {
+  const auto num_off = std::ranges::count(is_on, std::uint8_t{0});
+  if (num_off == 0) return;
+  for (std::size_t i = 0; i < is_on.size(); ++i) {
+    if (!is_on[i]) disbelieve(mapper_.map().measured_loop_edges()[i]);
+  }
+  mapper_.change(
+      [&](Map& map, DirtyLandmarks& dirty) { undo_loops(map, odometry_, submap, is_on, dirty); });
+  num_loops_ = std::max(num_loops_ - static_cast<int>(num_off), 0);
+  // What is being adjusted holds what was undone.
+  ++num_placements_;
+  unadjusted_ = submap;
+}
+
+void GlobalMapper::disbelieve(const LoopEdge& loop) {
+  const auto is_beside = [](KeyframeId a, KeyframeId b) {
+    return std::max(a.value, b.value) - std::min(a.value, b.value) <= kBesideDisbelieved;
+  };
+  const bool is_known = std::ranges::any_of(disbelieved_, [&](const LoopEdge& old) {
+    return is_beside(old.from, loop.from) && is_beside(old.to, loop.to);
+  });
+  if (!is_known) disbelieved_.push_back(loop);
+}
+
 bool GlobalMapper::close_alike(KeyframeId query) {
-  if (!close(verifier_.verify_alike(mapper_.map(), places_, query))) return false;
+  const auto revisit = verifier_.verify_alike(mapper_.map(), places_, query);
+  if (!revisit || !close(*revisit)) return false;
   unconsolidated_ = all_keyframes();
   return true;
 }
@@ -102,7 +154,8 @@ std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
 }
 
 bool GlobalMapper::close_one_beside(KeyframeId query, std::span<const KeyframeId> beside) {
-  return close(verifier_.verify_beside(mapper_.map(), query, beside));
+  const auto revisit = verifier_.verify_beside(mapper_.map(), query, beside);
+  return revisit && close(*revisit);
 }
 
 void GlobalMapper::consolidate_some(std::size_t max_count) {
@@ -161,6 +214,7 @@ void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adj
     return;
   }
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
+  odometry_.note(mapper_.map());
   if (task.num_closures == num_closures_) {
     mapper_.apply(adjustment);
   } else {
@@ -178,6 +232,7 @@ void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& befor
 
 void GlobalMapper::refine_globally(bool with_calibration) {
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
+  odometry_.note(mapper_.map());
   mapper_.refine_globally(with_calibration && mapper_.is_calibrating() &&
                           mapper_.map().keyframes().size() >= kFewestInTheEnd);
   look_with_calibration(before);

@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/loop/odometry.h"
 #include "waymark/loop/settings.h"
 #include "waymark/loop/verify.h"
 #include "waymark/mapping/global_adjustment.h"
@@ -24,7 +25,7 @@ struct AdjustmentTask {
   std::shared_ptr<const Map> map;
   SubmapId submap;
   std::uint32_t num_closures = 0;    ///< Loops closed and sub-maps joined before.
-  std::uint32_t num_placements = 0;  ///< Sub-maps moved by their markers before.
+  std::uint32_t num_placements = 0;  ///< Sub-maps moved by their markers, loops undone before.
   /// What is to be adjusted along, if anything.
   std::optional<KnownCalibration> calibration = std::nullopt;
   bool is_for_calibration = false;  ///< Without a new calibration nothing is to change.
@@ -57,7 +58,7 @@ class GlobalMapper {
   /// See Mapper.
   void set_motion(KeyframeId id, const RigMotion& motion) { mapper_.set_motion(id, motion); }
   /// Takes in what a task gave, carried over where a loop was closed meanwhile, or not at all where
-  /// the map was moved by its markers: then a new task follows.
+  /// the map was moved by its markers or a loop undone: then a new task follows.
   void apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment);
   /// The end: looks for loops a last time and consolidates.
   void finish();
@@ -66,6 +67,9 @@ class GlobalMapper {
 
   /// Finds what looks like a keyframe, verifies and closes it; whether there was something.
   bool close_alike(KeyframeId query);
+  /// Closes a loop, unless those so far contradict it, or joins two sub-maps. Loops that it
+  /// contradicts together with others are undone. Whether it was closed.
+  bool close(const Revisit& revisit);
   /// See join_by_markers(); whether there was something to join.
   bool join_what_knows_the_same_markers();
   /// A closure brings parts of the map together that may touch elsewhere, too: adjusts every
@@ -83,7 +87,9 @@ class GlobalMapper {
  private:
   void update_places(const Mapper::Changes& changes);
   bool close_one_beside(KeyframeId query, std::span<const KeyframeId> beside);
-  bool close(const std::optional<Revisit>& revisit);
+  bool agrees_with_loops(const Revisit& revisit);
+  void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
+  void disbelieve(const LoopEdge& loop);
   void consolidate_some(std::size_t max_count);
   void consolidate_rest();
   std::vector<KeyframeId> all_keyframes() const;
@@ -101,6 +107,10 @@ class GlobalMapper {
   ProjectionMatcher projection_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
   std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
+  Odometry odometry_;
+  /// Loops that others contradict, in units before any correction: further ones may agree with
+  /// them.
+  std::vector<LoopEdge> disbelieved_;
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
   const std::optional<KnownMarkers> known_markers_;  ///< Nothing: none are looked for.

@@ -158,6 +158,48 @@ TEST_F(GlobalMapperTest, ConsolidatesAtTheEnd) {
   EXPECT_GE(num_known, 7u);
 }
 
+TEST_F(GlobalMapperTest, UndoesAFalseLoopOnceOthersContradictIt) {
+  LoopScene scene = walk({{0, 2 * kRound}});
+  GlobalMapper mapper(scene.rig, {}, {}, {.refine = "off"}, 1);
+  mapper.take_over(snapshot_of(scene));
+  const auto revisit = [&](int query, int match, int seen_from) {
+    Revisit revisit;
+    revisit.query = KeyframeId{static_cast<std::uint32_t>(query)};
+    revisit.match = KeyframeId{static_cast<std::uint32_t>(match)};
+    revisit.query_from_match = scene.true_motion(query, seen_from);
+    return revisit;
+  };
+  const auto error = [&] {
+    double worst = 0.0;
+    mapper.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      const Rigid3 truth = LoopScene::true_pose(scene.steps[id.value]).inverse();
+      worst = std::max(worst, (keyframe.rig_from_world * truth.inverse()).translation.norm());
+    });
+    return worst;
+  };
+  const double error_open = error();
+  // Nothing contradicts the first, nor tells it from a second that does.
+  EXPECT_TRUE(mapper.close(revisit(60, 5, 59)));
+  ASSERT_GT(error(), 5.0 * error_open);
+  std::optional<AdjustmentTask> task = mapper.take_task();
+  int num_closed = 0;
+  for (const auto& [query, match] : {std::pair(44, 4), {52, 12}, {78, 38}, {66, 26}}) {
+    num_closed += mapper.close(revisit(query, match, match));
+  }
+  EXPECT_GE(num_closed, 3);
+  EXPECT_EQ(mapper.num_loops(), num_closed);
+  EXPECT_EQ(mapper.map().loop_edges().size(), static_cast<std::size_t>(num_closed));
+  EXPECT_LT(error(), error_open);
+  EXPECT_EQ(mapper.map().broken_invariants(), "");
+  // The same again is not believed, and what was adjusted with it in place is not taken in.
+  EXPECT_FALSE(mapper.close(revisit(62, 7, 61)));
+  mapper.apply(*task, adjust_globally(*task->map, task->submap));
+  EXPECT_LT(error(), error_open);
+  mapper.finish();
+  EXPECT_LT(error(), error_open);
+  EXPECT_EQ(mapper.map().broken_invariants(), "");
+}
+
 TEST_F(GlobalMapperTest, LeavesLoopsOpenIfAskedTo) {
   take_over_round(false);
   mapper_->add(last_of(walk({{0, kRound + 1}})));

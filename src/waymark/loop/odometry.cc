@@ -1,0 +1,206 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/odometry.h"
+
+#include <algorithm>
+
+#include "waymark/loop/drift.h"
+#include "waymark/optimize/pose_graph.h"
+#include "waymark/optimize/switch_edges.h"
+
+namespace waymark {
+namespace {
+
+/// Standard deviations of a step from one keyframe to the next, that of the translation in parts of
+/// the depth of what is seen. Odometry errs for longer in one direction: three times as much as the
+/// steps of a map show.
+constexpr double kStepTranslation = 0.015;
+constexpr double kStepRotationRad = 0.006;
+constexpr double kStepLogScale = 0.015;
+/// The same of a loop.
+constexpr double kLoopTranslation = 0.01;
+constexpr double kLoopRotationRad = 0.004;
+constexpr double kLoopLogScale = 0.01;
+
+constexpr std::uint32_t kNoNode = UINT32_MAX;
+
+/// Odometry and loops of a sub-map. Lengths of a node are in its units before any correction.
+class OdometryGraph {
+ public:
+  OdometryGraph(const Map& map, const Odometry& odometry, SubmapId submap)
+      : map_(map), odometry_(odometry), node_of_keyframe_(odometry.nodes().size(), kNoNode) {
+    graph_.is_scale_free = !map.submaps()[submap.value].is_metric;
+    for (std::uint32_t i = 0; i < node_of_keyframe_.size(); ++i) {
+      if (!odometry.nodes()[i]) continue;
+      if (map.keyframes().at(map.resolve(KeyframeId{i})).submap != submap) continue;
+      node_of_keyframe_[i] = static_cast<std::uint32_t>(ids_.size());
+      ids_.push_back(KeyframeId{i});
+    }
+    graph_.node_from_world.resize(ids_.size());
+    graph_.is_fixed.assign(ids_.size(), 0);
+    const KeyframeId root = map.submaps()[submap.value].root;
+    if (node_of(root) != kNoNode) graph_.is_fixed[node_of(root)] = 1;
+    is_placed_.assign(ids_.size(), 0);
+    for (std::uint32_t node = 0; node < ids_.size(); ++node) {
+      place(node);
+      add_step(node);
+    }
+  }
+
+  /// Whether both ends are there.
+  bool add_loop(const LoopEdge& loop, bool is_robust) {
+    if (node_of(loop.from) == kNoNode || node_of(loop.to) == kNoNode) return false;
+    PoseGraphEdge edge;
+    edge.from = node_of(loop.from);
+    edge.to = node_of(loop.to);
+    edge.to_from_from = loop.to_from_from;
+    edge.sigma_translation = kLoopTranslation * odometry_.nodes()[loop.to.value]->depth;
+    edge.sigma_rotation_rad = kLoopRotationRad;
+    edge.sigma_log_scale = kLoopLogScale;
+    edge.is_robust = is_robust;
+    graph_.edges.push_back(edge);
+    return true;
+  }
+
+  PoseGraph& graph() { return graph_; }
+
+  /// Of the keyframes that are still there.
+  MapCorrection correction() const {
+    MapCorrection correction;
+    for (std::size_t i = 0; i < ids_.size(); ++i) {
+      const Keyframe* keyframe = map_.keyframes().find(ids_[i]);
+      if (!keyframe) continue;
+      const Sim3& node = graph_.node_from_world[i];
+      // A node keeps its lengths, of which one is now 1 / scale of the world's.
+      correction.keyframes.push_back({ids_[i],
+                                      {node.rotation, node.translation / node.scale},
+                                      1.0 / (node.scale * keyframe->applied_scale)});
+    }
+    return correction;
+  }
+
+ private:
+  std::uint32_t node_of(KeyframeId id) const {
+    return id.is_valid() && id.value < node_of_keyframe_.size() ? node_of_keyframe_[id.value]
+                                                                : kNoNode;
+  }
+
+  std::uint32_t parent_of(std::uint32_t node) const {
+    return node_of(odometry_.nodes()[ids_[node].value]->parent);
+  }
+
+  /// A node and what is above it, by the way from the top of its tree; that is where the map has
+  /// it.
+  void place(std::uint32_t node) {
+    std::vector<std::uint32_t> way;
+    while (!is_placed_[node] && parent_of(node) != kNoNode && !graph_.is_fixed[node]) {
+      way.push_back(node);
+      node = parent_of(node);
+    }
+    if (!is_placed_[node]) {
+      graph_.node_from_world[node] = as_mapped(ids_[node]);
+      is_placed_[node] = 1;
+    }
+    for (auto below = way.rbegin(); below != way.rend(); node = *below++) {
+      graph_.node_from_world[*below] =
+          odometry_.nodes()[ids_[*below].value]->rig_from_parent * graph_.node_from_world[node];
+      is_placed_[*below] = 1;
+    }
+  }
+
+  Sim3 as_mapped(KeyframeId id) const {
+    const Keyframe* keyframe = map_.keyframes().find(id);
+    if (!keyframe) return {};
+    const double scale = keyframe->applied_scale;
+    const Rigid3& rig_from_world = keyframe->rig_from_world;
+    return {rig_from_world.rotation, rig_from_world.translation / scale, 1.0 / scale};
+  }
+
+  void add_step(std::uint32_t node) {
+    if (parent_of(node) == kNoNode) return;
+    const Odometry::Node& noted = *odometry_.nodes()[ids_[node].value];
+    PoseGraphEdge edge;
+    edge.from = parent_of(node);
+    edge.to = node;
+    edge.to_from_from = noted.rig_from_parent;
+    edge.sigma_translation = kStepTranslation * noted.depth;
+    edge.sigma_rotation_rad = kStepRotationRad;
+    edge.sigma_log_scale = kStepLogScale;
+    graph_.edges.push_back(edge);
+  }
+
+  const Map& map_;
+  const Odometry& odometry_;
+  std::vector<std::uint32_t> node_of_keyframe_;
+  std::vector<KeyframeId> ids_;  // Ascending, one per node.
+  std::vector<std::uint8_t> is_placed_;
+  PoseGraph graph_;
+};
+
+}  // namespace
+
+void Odometry::note(const Map& map) {
+  const KeyframeId end = map.keyframes().end_id();
+  nodes_.reserve(end.value);
+  while (nodes_.size() < end.value) {
+    const KeyframeId id{static_cast<std::uint32_t>(nodes_.size())};
+    nodes_.emplace_back();
+    const Keyframe* keyframe = map.keyframes().find(id);
+    if (!keyframe) continue;
+    const double scale = keyframe->applied_scale;
+    Node node;
+    const double depth = median_depth(map, id) / scale;
+    if (depth > 0.0) node.depth = depth;
+    node.parent = keyframe->parent;
+    if (const Keyframe* parent = map.keyframes().find(node.parent)) {
+      const Rigid3 rigid = keyframe->rig_from_world * parent->rig_from_world.inverse();
+      node.rig_from_parent = {
+          rigid.rotation, rigid.translation / scale, parent->applied_scale / scale};
+    }
+    nodes_.back() = node;
+  }
+}
+
+LoopEdge as_measured(const Map& map, const LoopEdge& loop) {
+  const double from_scale = map.keyframes().at(loop.from).applied_scale;
+  const double to_scale = map.keyframes().at(loop.to).applied_scale;
+  LoopEdge measured = loop;
+  measured.to_from_from.translation /= to_scale;
+  measured.to_from_from.scale *= from_scale / to_scale;
+  return measured;
+}
+
+std::vector<std::uint8_t> choose_loops(const Map& map,
+                                       const Odometry& odometry,
+                                       SubmapId submap,
+                                       std::span<const LoopEdge> loops,
+                                       std::span<const std::size_t> believed) {
+  OdometryGraph graph(map, odometry, submap);
+  const std::size_t num_steps = graph.graph().edges.size();
+  std::vector<std::size_t> edge_of_loop;
+  SwitchOptions options;
+  for (std::size_t i = 0; i < loops.size(); ++i) {
+    const std::size_t edge = graph.graph().edges.size();
+    edge_of_loop.push_back(graph.add_loop(loops[i], true) ? edge : num_steps - 1);
+    const bool is_believed = std::ranges::find(believed, i) != believed.end();
+    if (is_believed && edge_of_loop[i] == edge) options.believed.push_back(edge);
+  }
+  const std::vector<std::uint8_t> edge_is_on = switch_edges(graph.graph(), options);
+  std::vector<std::uint8_t> is_on;
+  for (const std::size_t edge : edge_of_loop) {
+    is_on.push_back(edge < edge_is_on.size() ? edge_is_on[edge] : 1);
+  }
+  return is_on;
+}
+
+MapCorrection place_by_odometry(const Map& map,
+                                const Odometry& odometry,
+                                SubmapId submap,
+                                std::span<const LoopEdge> loops) {
+  OdometryGraph graph(map, odometry, submap);
+  for (const LoopEdge& loop : loops) graph.add_loop(loop, false);
+  optimize_pose_graph(graph.graph(), {});
+  return graph.correction();
+}
+
+}  // namespace waymark

@@ -1,0 +1,108 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/odometry.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/geometry/alignment.h"
+#include "waymark/loop/close.h"
+#include "waymark/loop/test_loop.h"
+
+namespace waymark {
+namespace {
+
+constexpr SubmapId kSubmap{0};
+
+/// Three rounds that drift, and what the images say of places seen again.
+class OdometryTest : public ::testing::TestWithParam<bool> {
+ protected:
+  OdometryTest() {
+    for (int step = 0; step < 3 * kRound; ++step) scene_.add_keyframe(step);
+    odometry_.note(scene_.map);
+  }
+
+  LoopEdge true_loop(int from, int to) const {
+    return {id(from), id(to), scene_.true_motion(to, from)};
+  }
+  /// As if the keyframe before `to` were `from`.
+  LoopEdge false_loop(int from, int to) const {
+    return {id(from), id(to), scene_.true_motion(to, to - 1)};
+  }
+  static KeyframeId id(int step) { return KeyframeId{static_cast<std::uint32_t>(step)}; }
+
+  std::vector<std::uint8_t> choose(const std::vector<LoopEdge>& loops) const {
+    std::vector<std::size_t> believed(loops.size() - 1);
+    for (std::size_t i = 0; i < believed.size(); ++i) believed[i] = i;
+    return choose_loops(scene_.map, odometry_, kSubmap, loops, believed);
+  }
+
+  /// Root mean square distance of the keyframes from the truth.
+  double error() const {
+    std::vector<Eigen::Vector3d> mapped, truth;
+    scene_.map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      mapped.push_back(keyframe.rig_from_world.origin_in_source());
+      truth.push_back(LoopScene::true_pose(scene_.steps[id.value]).translation);
+    });
+    const Sim3 truth_from_map = align_similarity(mapped, truth).value();
+    double sum = 0.0;
+    for (std::size_t i = 0; i < mapped.size(); ++i) {
+      sum += (truth_from_map * mapped[i] - truth[i]).squaredNorm();
+    }
+    return std::sqrt(sum / static_cast<double>(mapped.size()));
+  }
+
+  LoopScene scene_{cloud_all_round(1000), GetParam(), drift_of(0.2, 0.05, GetParam() ? 0.0 : 0.05)};
+  Odometry odometry_;
+};
+
+TEST_P(OdometryTest, TellsAFalseLoopByTheOthers) {
+  const std::vector<LoopEdge> loops = {true_loop(2, 42),
+                                       true_loop(10, 52),
+                                       true_loop(60, 100),
+                                       false_loop(30, 84),
+                                       true_loop(35, 117)};
+  EXPECT_EQ(choose(loops), (std::vector<std::uint8_t>{1, 1, 1, 0, 1}));
+}
+
+TEST_P(OdometryTest, StillTellsItOnceTheMapIsBent) {
+  const LoopEdge lie = false_loop(30, 84);
+  apply_correction(scene_.map, spread_drift(scene_.map, lie));
+  scene_.map.add_loop_edge({lie.from, lie.to, lie.to_from_from});
+  const double error_bent = error();
+  odometry_.note(scene_.map);
+  std::vector<LoopEdge> loops = {
+      lie, true_loop(2, 42), true_loop(10, 52), true_loop(60, 100), true_loop(35, 117)};
+  EXPECT_EQ(choose(loops), (std::vector<std::uint8_t>{0, 1, 1, 1, 1}));
+  loops.erase(loops.begin());
+  apply_correction(scene_.map, place_by_odometry(scene_.map, odometry_, kSubmap, loops));
+  EXPECT_LT(error(), 0.1);
+  EXPECT_LT(error(), 0.2 * error_bent);
+  EXPECT_EQ(scene_.map.broken_invariants(), "");
+}
+
+TEST_P(OdometryTest, WithoutLoopsKeyframesGoBackToWhereTheyWere) {
+  std::vector<Rigid3> before;
+  scene_.map.keyframes().for_each(
+      [&](KeyframeId, const Keyframe& keyframe) { before.push_back(keyframe.rig_from_world); });
+  apply_correction(scene_.map, spread_drift(scene_.map, false_loop(30, 84)));
+  apply_correction(scene_.map, place_by_odometry(scene_.map, odometry_, kSubmap, {}));
+  for (std::uint32_t i = 0; i < before.size(); ++i) {
+    const Keyframe& keyframe = scene_.map.keyframes().at(KeyframeId{i});
+    EXPECT_TRUE(keyframe.rig_from_world.matrix().isApprox(before[i].matrix(), 1e-6)) << i;
+    EXPECT_NEAR(keyframe.applied_scale, 1.0, 1e-6);
+  }
+}
+
+TEST_P(OdometryTest, RemembersWhatWasErased) {
+  for (const int step : {20, 21, 22, 50, 70}) scene_.map.erase_keyframe(id(step));
+  const std::vector<LoopEdge> loops = {
+      true_loop(2, 42), true_loop(10, 52), false_loop(30, 84), true_loop(60, 100)};
+  EXPECT_EQ(choose(loops), (std::vector<std::uint8_t>{1, 1, 0, 1}));
+  const MapCorrection correction = place_by_odometry(scene_.map, odometry_, kSubmap, {});
+  EXPECT_EQ(correction.keyframes.size(), scene_.map.keyframes().size());
+}
+
+INSTANTIATE_TEST_SUITE_P(ScaleFreeOrMetric, OdometryTest, ::testing::Bool());
+
+}  // namespace
+}  // namespace waymark

@@ -1,0 +1,93 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/undo.h"
+
+#include <gtest/gtest.h>
+
+#include "waymark/base/median.h"
+#include "waymark/image/hamming.h"
+#include "waymark/loop/close.h"
+#include "waymark/loop/test_loop.h"
+
+namespace waymark {
+namespace {
+
+/// Median length of the residuals of all observations, in pixels of the level.
+double median_residual(const Map& map) {
+  std::vector<double> residuals;
+  map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
+    for (const Observation& observation : landmark.observations) {
+      const auto squared = squared_residual(map.keyframes().at(observation.keyframe),
+                                            observation.feature,
+                                            landmark.position_in_world);
+      residuals.push_back(squared ? std::sqrt(*squared) : 1e3);
+    }
+  });
+  return median(residuals);
+}
+
+std::size_t num_observations(const Map& map) {
+  std::size_t count = 0;
+  map.landmarks().for_each(
+      [&](LandmarkId, const Landmark& landmark) { count += landmark.observations.size(); });
+  return count;
+}
+
+/// The last keyframe taken for what it looks like: the place nine stretches before.
+Revisit twin_of_last(const Map& map) {
+  Revisit lie;
+  lie.query = KeyframeId{map.keyframes().end_id().value - 1};
+  lie.match = KeyframeId{lie.query.value - 9 * kRound / 10};
+  const Keyframe& query = map.keyframes().at(lie.query);
+  const Keyframe& match = map.keyframes().at(lie.match);
+  for (std::size_t i = 0; i < query.features->num_primary; ++i) {
+    for (std::size_t j = 0; j < match.features->num_primary; ++j) {
+      constexpr int kMaxDistance = 40;
+      const int distance =
+          hamming_distance(query.features->descriptors[i], match.features->descriptors[j]);
+      const float apart = (query.features->bearings[i] - match.features->bearings[j]).norm();
+      if (distance < kMaxDistance && apart < 0.01f && query.landmarks[i].is_valid() &&
+          match.landmarks[j].is_valid()) {
+        lie.pairs.push_back({query.landmarks[i], match.landmarks[j]});
+        break;
+      }
+    }
+  }
+  return lie;
+}
+
+TEST(UndoLoops, TakesBackPosesAndMerges) {
+  for (const bool is_metric : {true, false}) {
+    LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), is_metric, Vector7d::Zero());
+    for (int step = 0; step < kRound; ++step) scene.add_keyframe(step);
+    Map& map = scene.map;
+    const double residual = median_residual(map);
+    const std::size_t num_before = num_observations(map);
+    Odometry odometry;
+    odometry.note(map);
+    const Revisit lie = twin_of_last(map);
+    ASSERT_GT(lie.pairs.size(), 30u);
+    ProjectionMatcher matcher(scene.rig);
+    DirtyLandmarks dirty;
+    close_revisit(map, scene.places, lie, matcher, dirty);
+    const std::size_t num_merged = map.landmarks().size();
+    const std::vector<std::uint8_t> none = {0};
+    undo_loops(map, odometry, SubmapId{0}, none, dirty);
+    EXPECT_EQ(map.broken_invariants(), "");
+    EXPECT_TRUE(map.measured_loop_edges().empty());
+    EXPECT_GT(map.landmarks().size(), num_merged);
+    EXPECT_LT(median_residual(map), 1.3 * residual);
+    EXPECT_GT(num_observations(map), num_before * 9 / 10);
+    for (const LandmarkId id : dirty) EXPECT_TRUE(!id.is_valid() || id < map.landmarks().end_id());
+    map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+      const Rigid3 truth = LoopScene::true_pose(scene.steps[id.value]).inverse();
+      EXPECT_LT((keyframe.rig_from_world * truth.inverse()).translation.norm(), 0.02) << id.value;
+    });
+    for (const CovisibilityEdge& edge : map.covisible(lie.query)) {
+      EXPECT_GT(edge.keyframe.value + kRound / 4, lie.query.value);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace waymark
