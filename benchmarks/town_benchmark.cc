@@ -12,7 +12,6 @@
 #include <unistd.h>
 
 #include <filesystem>
-#include <functional>
 #include <memory>
 #include <optional>
 #include <string>
@@ -20,6 +19,7 @@
 #include <vector>
 
 #include "memory.h"
+#include "town_loops.h"
 #include "waymark/base/rng.h"
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
@@ -382,6 +382,7 @@ void register_all(std::int64_t num_keyframes) {
   add("all/spread_drift", spread_drift_of_loop, 1);
   add("all/adjust", adjust_all, 1);
   add("all/close_loop", close_first_loop, 1);
+  register_loop_steps(num_keyframes);
 }
 
 }  // namespace

@@ -14,6 +14,10 @@ MOST_ADJUSTED = 10000  # Adjusting more takes hours.
 MEMORY = {"map_kb": "{}: map and index", "places_kb": "{}: index of places", "peak_kb": "{}: peak beyond the map",
           "file_kb": "{}: file"}
 
+LOOPS = {"true_on": "true ones believed", "false_on": "false ones believed", "ate_open_m": "ATE in m without loops",
+         "ate_all_m": "with all of them", "ate_true_m": "with the true ones", "ate_chosen_m": "with those believed",
+         "ate_closed_true_m": "50 true ones closed one by one", "ate_closed_m": "and 20 false ones among them"}
+
 
 def measure(size):
     """Figures by step: milliseconds of one iteration and counters. A process for each size, so that
@@ -46,6 +50,16 @@ def memory_rows(measured):
             for step, first in measured[0].items() for key, title in MEMORY.items() if key in first]
 
 
+def loop_rows(measured):
+    """Of steps that choose among true and false loops."""
+    rows = []
+    for key, title in LOOPS.items():
+        values = [next((step[key] for step in steps.values() if key in step), None) for steps in measured]
+        if any(value is not None for value in values):
+            rows.append([title, *("" if value is None else f"{value:.3g}" for value in values)])
+    return rows
+
+
 def large_table(only=None):
     sizes = sorted(int(o) for o in only or () if o.isdigit()) or list(SIZES)
     measured = []
@@ -57,5 +71,7 @@ def large_table(only=None):
             table(header, time_rows(sizes, measured, "all/")) +
             "\n\nSteps about one place: time as a multiple of that of the same map; 1 does not depend on the map:\n\n" +
             table(header, time_rows(sizes, measured, "one/")) +
+            "\n\n500 true loops and 200 false ones, in a town whose loops are open:\n\n" +
+            table(["what", *(f"{size}" for size in sizes)], loop_rows(measured)) +
             "\n\nMemory in kB per keyframe of 300 features:\n\n" +
             table(["what", *(f"{size}" for size in sizes)], memory_rows(measured)))
