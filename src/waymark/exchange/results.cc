@@ -67,6 +67,17 @@ Json to_json(const std::vector<LoopFrames>& loops) {
   return list;
 }
 
+Json to_json(const std::vector<ScaleSummary>& scales) {
+  Json list = Json::array();
+  for (const ScaleSummary& scale : scales) {
+    list.push_back({{"submap", scale.submap},
+                    {"same_as", scale.same_as},
+                    {"sigma", rounded(scale.sigma)},
+                    {"landmarks", scale.num_landmarks}});
+  }
+  return list;
+}
+
 Json to_json(const std::vector<RunAdvice>& advice) {
   Json list = Json::array();
   for (const RunAdvice& one : advice) {
@@ -213,6 +224,7 @@ std::string format_summary_json(const RunSummary& summary) {
   json["loops"] = summary.loops;
   json["relocalizations"] = summary.relocalizations;
   json["loop_frames"] = to_json(summary.loop_frames);
+  if (!summary.scales.empty()) json["scales"] = to_json(summary.scales);
   if (summary.quality) json["quality"] = to_json(*summary.quality);
   if (summary.moves_along) json["moves_along"] = *summary.moves_along;
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;

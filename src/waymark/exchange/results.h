@@ -105,6 +105,14 @@ struct LoopFrames {
   std::optional<std::uint32_t> to;    ///< That showed its place again.
 };
 
+/// A part of a map in mono whose unit of length is that of another part.
+struct ScaleSummary {
+  std::uint32_t submap = 0;       ///< That has it, as frames.csv numbers it.
+  std::uint32_t same_as = 0;      ///< Whose it is.
+  double sigma = 0.0;             ///< Of the ratio of the two units, as a part of it.
+  std::size_t num_landmarks = 0;  ///< Of both that tell it; 0: the speed of the camera does.
+};
+
 /// The markers of a run.
 struct MarkerSummary {
   /// One marker of the map.
@@ -152,7 +160,8 @@ struct RunSummary {
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
   std::vector<CalibrationEstimate> refined_calibration;  ///< Empty where it stayed as it was.
   std::vector<LoopFrames> loop_frames;                   ///< Where the map was closed or joined.
-  std::vector<std::string> input;                        ///< What was understood of it, in words.
+  std::vector<ScaleSummary> scales;  ///< Of run only; empty where no part has another's.
+  std::vector<std::string> input;    ///< What was understood of it, in words.
   /// Settings that are not as by default, "KEY: VALUE" as in a file.
   std::vector<std::string> settings;
   std::vector<RunAdvice> advice;                        ///< Empty where all went well.

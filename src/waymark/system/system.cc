@@ -74,6 +74,9 @@ class System::Impl {
     return visible_.calibration.rig ? visible_.calibration.rig : given_rig_;
   }
   std::vector<CalibrationEstimate> calibration() const;
+  std::vector<KeptScale> kept_scales() const {
+    return tracker_ ? tracker_->kept_scales(*map()) : std::vector<KeptScale>{};
+  }
   const FocalCheck* focal_check() const;
   const FrameDetails& details() const { return details_; }
   const Image& ego_mask() const { return builder_.ego_mask(); }
@@ -301,8 +304,7 @@ std::vector<CalibrationEstimate> System::Impl::calibration() const {
 const FocalCheck* System::Impl::focal_check() const {
   // The map first: seeing it is what makes the result readable here.
   if (!is_finished_ && !has_focal_check(*map(), memory_.first())) return nullptr;
-  if (!focal_check_) return nullptr;
-  return &*focal_check_;
+  return focal_check_ ? &*focal_check_ : nullptr;
 }
 
 void System::Impl::finish() {
@@ -384,6 +386,7 @@ void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
+std::vector<KeptScale> System::kept_scales() const { return impl_->kept_scales(); }
 const FocalCheck* System::focal_check() const { return impl_->focal_check(); }
 MarkerReport System::markers() const { return impl_->markers(); }
 Image System::ego_mask() const { return impl_->ego_mask(); }

@@ -19,6 +19,7 @@
 #include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
 #include "waymark/track/frame_verdict.h"
+#include "waymark/track/kept_scale.h"
 #include "waymark/track/stage_times.h"
 
 namespace waymark {
@@ -114,6 +115,10 @@ class System {
 
   /// State of every frame fed so far, including those filled in after the fact.
   std::vector<FrameState> frame_states() const;
+
+  /// In mono: parts of the map that began after a loss with the unit of length of another part.
+  /// Those that were joined to it meanwhile are not among them.
+  std::vector<KeptScale> kept_scales() const;
 
   /// What the residuals say of the calibration, once some 200 frames are mapped and where the
   /// motion tells; else null.

@@ -51,6 +51,8 @@ class PointSession {
     return outcome;
   }
 
+  std::vector<KeptScale> kept_scales() const { return tracker_.kept_scales(map()); }
+
   const Map& map() const { return *visible_.map; }
 
  private:

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <vector>
 
 #include "waymark/base/median.h"
 #include "waymark/track/last_frame.h"
@@ -15,8 +14,9 @@ namespace {
 /// So many landmarks agree on a similarity by chance hardly ever: each has two images to agree in.
 constexpr std::size_t kMinSimilar = 6;
 constexpr AppearanceOptions kSimilarAppearance{.max_distance = 64, .max_ratio = 0.85};
-/// Of landmarks that were mapped independently, as where loops are closed.
-constexpr double kSimilarNoisePx = 1.5;
+/// Of landmarks that were mapped independently, one side from two views near each other: twice as
+/// much as where loops are closed (docs/decisions.md).
+constexpr double kSimilarNoisePx = 3.0;
 
 /// The speed before is that of so many steps from keyframe to keyframe, in the median.
 constexpr std::size_t kNumSpeedSteps = 3;
@@ -99,7 +99,7 @@ std::optional<KeptScale> ScaleKeeper::by_landmarks(const Map& map,
       if (best && best->num_landmarks >= found->num_inliers) continue;
       const double log_sigma = std::sqrt(found->covariance(6, 6));
       if (!(log_sigma < kSpeedLogSigma)) continue;
-      best = {found->b_from_a.scale, log_sigma, found->num_inliers};
+      best = {{}, {}, found->b_from_a.scale, log_sigma, found->num_inliers};
     }
   }
   return best;
@@ -124,7 +124,7 @@ std::optional<KeptScale> scale_by_speed(const Map& map, KeyframeId last, const N
   const KeyframeStep after = step_between(start.keyframes.front(), start.keyframes.back());
   if (in_distances < kLeastMotion || !(after.length > 0.0)) return std::nullopt;
   const double speed_after = after.length / after.seconds;
-  return KeptScale{median(speeds) / speed_after, kSpeedLogSigma, 0};
+  return KeptScale{{}, {}, median(speeds) / speed_after, kSpeedLogSigma, 0};
 }
 
 void scale_by(double factor, Initialization& start) {
@@ -139,11 +139,27 @@ void scale_by(double factor, Initialization& start) {
 void ScaleKeeper::keep(const Map& map,
                        std::span<const KeyframeId> keyframes,
                        Initialization& start) {
+  if (keyframes.empty()) return;
+  const KeyframeId last = *std::ranges::max_element(keyframes);
   std::optional<KeptScale> kept = by_landmarks(map, keyframes, start.submap);
-  if (!kept && !keyframes.empty()) {
-    kept = scale_by_speed(map, *std::ranges::max_element(keyframes), start.submap);
+  if (!kept) kept = scale_by_speed(map, last, start.submap);
+  if (!kept) return;
+  scale_by(kept->scale, start);
+  kept->submap = SubmapId{static_cast<std::uint32_t>(map.submaps().size())};
+  kept->before = map.keyframes().at(last).submap;
+  kept_.push_back(*kept);
+}
+
+std::vector<KeptScale> ScaleKeeper::kept_in(const Map& map) const {
+  std::vector<KeptScale> found;
+  for (KeptScale kept : kept_) {
+    if (kept.submap.value >= map.submaps().size()) continue;
+    kept.submap = map.resolve(kept.submap);
+    kept.before = map.resolve(kept.before);
+    const bool is_metric = map.submaps()[kept.submap.value].is_metric;
+    if (kept.submap != kept.before && !is_metric) found.push_back(kept);
   }
-  if (kept) scale_by(kept->scale, start);
+  return found;
 }
 
 }  // namespace waymark

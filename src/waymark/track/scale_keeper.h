@@ -6,20 +6,15 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
 #include "waymark/optimize/similarity.h"
 #include "waymark/track/initializer.h"
+#include "waymark/track/kept_scale.h"
 
 namespace waymark {
-
-/// How long the unit of a new part of a map is in units of the part before.
-struct KeptScale {
-  double scale = 1.0;
-  double log_sigma = 0.0;         ///< Standard deviation of the logarithm of the scale.
-  std::size_t num_landmarks = 0;  ///< Of both parts that it rests on; 0: it rests on the motion.
-};
 
 /// Where a camera without scale was lost in a map, a new part begins in units of its own. Finds
 /// what they are in those of the part before, so that lengths of both can be compared.
@@ -29,8 +24,12 @@ class ScaleKeeper {
 
   /// Gives a new part the scale of that in which the camera was lost: by landmarks, else by its
   /// speed. What neither tells begins with a unit of its own. keyframes: where the camera was last,
-  /// the speed being that of the newest of them.
+  /// the speed being that of the newest of them. The new part is the next of the map.
   void keep(const Map& map, std::span<const KeyframeId> keyframes, Initialization& start);
+
+  /// The parts of a map whose units are told by those of another part, in the order of time. Those
+  /// that were joined to it meanwhile or know what a metre is are not among them.
+  std::vector<KeptScale> kept_in(const Map& map) const;
 
   /// By what the new part and keyframes of the old one show alike: fewer landmarks than a pose
   /// rests on tell the scale between the two, as they have to agree in both (find_similarity()).
@@ -47,6 +46,7 @@ class ScaleKeeper {
 
   std::uint64_t seed_;
   AppearanceMatcher appearance_;
+  std::vector<KeptScale> kept_;
 };
 
 /// By the speed of the newest keyframes up to `last`, which the camera should have kept up. Nothing

@@ -133,5 +133,26 @@ TEST_F(ScaleKeeperTest, LandmarksTellBeforeTheSpeedDoes) {
   EXPECT_NEAR(after.translation.norm() / before.translation.norm(), kUnit, 0.05 * kUnit);
 }
 
+TEST_F(ScaleKeeperTest, TellsWhichPartsShareAUnitUntilTheyAreOne) {
+  map_before(5);
+  ScaleKeeper keeper(1);
+  Initialization part{start(scene_, 6.0, 8.0), {}, {}};
+  keeper.keep(scene_.map, keyframes(), part);
+  EXPECT_TRUE(keeper.kept_in(scene_.map).empty());  // The map is yet to get the part.
+  const SubmapId submap = scene_.map.add_submap(false);
+  Keyframe keyframe = scene_.map.keyframes().at(KeyframeId{0});
+  keyframe.submap = submap;
+  keyframe.frame = FrameId{10};
+  keyframe.parent = {};
+  keyframe.landmarks.clear();
+  scene_.map.add_keyframe(std::move(keyframe));
+  const std::vector<KeptScale> kept = keeper.kept_in(scene_.map);
+  ASSERT_EQ(kept.size(), 1u);
+  EXPECT_EQ(kept[0].submap, submap);
+  EXPECT_EQ(kept[0].before, scene_.submap);
+  EXPECT_GE(kept[0].num_landmarks, 6u);
+  EXPECT_TRUE(keeper.kept_in(Map()).empty());
+}
+
 }  // namespace
 }  // namespace waymark

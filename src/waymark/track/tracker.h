@@ -67,6 +67,9 @@ class Tracker {
   /// How the rig should move in the frame to come; 0 where that is not known.
   RigMotion predict_motion() const;
 
+  /// Parts of a map in mono that began after a loss in the units of the part before.
+  std::vector<KeptScale> kept_scales(const Map& map) const { return scale_keeper_.kept_in(map); }
+
   /// visible: the newest map that this frame may see; empty before the first sub-map.
   TrackOutcome track(const Frame& frame, const MapSnapshot& visible, StageTimes& times);
 
