@@ -20,6 +20,8 @@ from typing import NamedTuple
 
 SPREAD = math.log(3.0) / 1.2816  # Of lengths: the 90 % quantile of a normal distribution is 1.2816.
 NUM_GROUPS = 5  # Of tiles that are adjusted at a time: those of grids, whatever their size.
+INDEX_KEYFRAMES = 131072  # As python/waymark/fleet.py has them.
+NUM_SEEKING_TASKS = 64
 LINKS_PER_TILE = 4  # To neighbours, most of them of other recordings.
 
 
@@ -48,19 +50,26 @@ def seconds_to_solve(costs, num_tiles):
     return many_s * (num_tiles / many) ** (math.log(many_s / few_s) / math.log(many / few))
 
 
+def seeking(keyframes, costs, num_workers):
+    """All recordings ask one part of the index after the other; a worker opens each part once."""
+    num_parts = math.ceil(sum(keyframes) / INDEX_KEYFRAMES)
+    count = 1 + len(keyframes) // NUM_SEEKING_TASKS
+    batches = [keyframes[first:first + count] for first in range(0, len(keyframes), count)]
+    opening_s = costs["open_places_s_per_keyframe"] * sum(keyframes) / num_parts * min(1.0, num_workers / len(batches))
+    return [opening_s + sum(batch) * costs["seek_s_per_keyframe"] for batch in batches] * num_parts
+
+
 def steps_of(size, costs, num_workers, rng):
     keyframes, tiles = tiles_of(size, costs, rng)
     total, num_tiles = sum(keyframes), sum(tiles)
     frames_per_keyframe = size.frames / size.keyframes
     solve_s = seconds_to_solve(costs, num_tiles)
-    # A worker opens the places of all tiles once.
-    opening_s = min(num_workers, size.recordings) / size.recordings * costs["open_places_s_per_keyframe"] * total
     matches = round(costs["pairs_per_tile"] * num_tiles)
     adjusting = [costs["adjust_s"]] * math.ceil(num_tiles / NUM_GROUPS)
     return [
         Step("map and cut", [count * (frames_per_keyframe * size.frame_s + costs["cut_s_per_keyframe"])
                              for count in keyframes]),
-        Step("look for shared places", [opening_s + count * costs["seek_s_per_keyframe"] for count in keyframes]),
+        Step("look for shared places", seeking(keyframes, costs, num_workers)),
         Step("verify and link", [costs["match_s"]] * matches, solve_s),
         *(Step("adjust", adjusting) for _ in range(NUM_GROUPS)),
         Step("fit links", [costs["refit_s"]] * (LINKS_PER_TILE * num_tiles), solve_s),
@@ -108,7 +117,7 @@ def main():
             slowest = max(steps, key=lambda name: steps[name][0])
             print(f"| {recordings} | {workers} | {total:.3g} | {work / 3600:.3g} | {hours:.3g} | {work / 3600 / workers / hours:.2f} | "
                   f"{slowest}: {steps[slowest][0] / 3600:.3g} h, {steps[slowest][1]:.2f} | "
-                  f"{costs['places_bytes_per_keyframe'] * total / 1e9:.3g} | {costs['tile_bytes_per_keyframe'] * total / 1e9:.3g} |")
+                  f"{costs['places_bytes_per_keyframe'] * min(total, INDEX_KEYFRAMES) / 1e9:.3g} | {costs['tile_bytes_per_keyframe'] * total / 1e9:.3g} |")
 
 
 if __name__ == "__main__":

@@ -165,14 +165,19 @@ py::dict append(const py::list& all) {
   return describe_contents(contents);
 }
 
-/// The places of all tiles, and what asks them.
+/// The places of a range of tiles, and what asks them.
 struct PythonPlaces {
   Atlas atlas;
   AtlasContents contents;
   AtlasPlaces places;
 
-  PythonPlaces(const py::object& folder, const py::dict& described)
-      : atlas(atlas_in(folder)), contents(read_contents(described)), places(atlas, contents) {}
+  PythonPlaces(const py::object& folder,
+               const py::dict& described,
+               std::uint32_t begin,
+               std::uint32_t end)
+      : atlas(atlas_in(folder)),
+        contents(read_contents(described)),
+        places(atlas, contents, {begin, end}) {}
 
   /// Of a tile: [(tile, score, queries), ...]
   py::list alike(std::uint32_t tile) const {
@@ -191,6 +196,15 @@ struct PythonPlaces {
     return described;
   }
 };
+
+/// [(begin, end), ...]
+py::list divide(const py::dict& described, std::size_t max_keyframes) {
+  py::list ranges;
+  for (const TileRange& range : divide_tiles(read_contents(described), max_keyframes)) {
+    ranges.append(py::make_tuple(range.begin, range.end));
+  }
+  return ranges;
+}
 
 py::list pairs_of(const py::list& alike) {
   std::vector<std::pair<std::uint32_t, std::vector<AlikeTile>>> by_tile;
@@ -317,8 +331,9 @@ void bind_atlas_tasks(py::module_& module) {
   module.def("_cut", &cut);
   module.def("_append", &append);
   py::class_<PythonPlaces>(module, "_Places")
-      .def(py::init<const py::object&, const py::dict&>())
+      .def(py::init<const py::object&, const py::dict&, std::uint32_t, std::uint32_t>())
       .def("alike", &PythonPlaces::alike);
+  module.def("_divide", &divide);
   module.def("_pairs", &pairs_of);
   module.def("_match", &match);
   module.def("_solve", &solve);

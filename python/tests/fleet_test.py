@@ -62,6 +62,17 @@ class Fleet(Test):
         self.assertEqual(again["num_done"], 0)
         self.assertEqual(described(again), described(first))
 
+    def test_an_index_in_parts_finds_what_the_whole_one_does(self):
+        def links(result):
+            return {(link["a"], link["b"]) for link in result["contents"]["links"]}
+
+        whole = self.run_fleet("whole")
+        parts = self.run_fleet("parts", index_keyframes=24)
+        self.assertEqual({tile["frame"] for tile in parts["contents"]["tiles"]}, {0})
+        self.assertGreaterEqual(links(parts), links(whole))
+        again = self.run_fleet("parts", index_keyframes=24, workers=1)
+        self.assertEqual(again["num_done"], 0)
+
     def test_a_damaged_recording_is_a_line(self):
         damaged = self.folder / "damaged"
         damaged.mkdir()

@@ -32,7 +32,9 @@ except ImportError as missing:
 import waymark
 from waymark import _waymark
 
-NUM_KEYFRAMES = 128
+NUM_KEYFRAMES = 128  # Of a tile, at most.
+INDEX_KEYFRAMES = 131072  # Of the part of the place index that a worker holds: 4 GB.
+NUM_SEEKING_TASKS = 64  # Per such part, at least where there are as many recordings.
 VERSION = 1  # Of the tasks: a change of what one does makes a new one.
 
 
@@ -190,13 +192,18 @@ def map_and_cut(url, recording, options, keyframes):
         return {"recording": recording, "error": " ".join(str(error).split()), "seconds": time.monotonic() - started}
 
 
-_places = {}  # Of this process: the index of all tiles, the last one that was asked for.
+_places = {}  # Of this process: the index of a range of tiles, the last one that was asked for.
 
 
-def seek(url, contents, recording):
-    """Which tiles look like those of a recording."""
+def seek(url, contents, span, recordings):
+    """Which tiles of a range look like those of some recordings, one after the other."""
+    results = [seek_one(url, contents, span, recording) for recording in recordings]
+    return [one for found, _ in results for one in found], all(was_there for _, was_there in results)
+
+
+def seek_one(url, contents, span, recording):
     workspace = Workspace(url)
-    index = [tile["places"] for tile in contents["tiles"]]
+    index = [tile["places"] for tile in contents["tiles"][slice(*span)]]
     tiles = [i for i, tile in enumerate(contents["tiles"]) if tile["recording"] == recording]
 
     def make():
@@ -205,10 +212,10 @@ def seek(url, contents, recording):
         key = key_of(url, index)
         if key not in _places:
             _places.clear()
-            _places[key] = _waymark._Places(str(workspace.folder), contents)
+            _places[key] = _waymark._Places(str(workspace.folder), contents, *span)
         return [(i, _places[key].alike(i)) for i in tiles]
 
-    inputs = [index, [tile["recording"] for tile in contents["tiles"]], tiles]
+    inputs = [span, index, [tile["recording"] for tile in contents["tiles"]], tiles]
     return workspace.once("seek", inputs, make)
 
 
@@ -325,11 +332,16 @@ def with_published(workspace, atlas, mapped):
         one["contents"]["recordings"][0]["since"] = since.get(checksum, new)
 
 
-def link_all(client, progress, url, contents, shared, seed):
+def link_all(client, progress, url, contents, shared, seed, index_keyframes):
     """Adds the places that recordings have in common."""
     [index] = client.scatter([contents], broadcast=True)
+    # Opening a range takes a worker longer than asking it for a recording does: several at a time.
+    recordings = range(len(contents["recordings"]))
+    count = 1 + len(recordings) // NUM_SEEKING_TASKS
+    batches = [list(recordings[first:first + count]) for first in recordings[::count]]
     alike = gather(client, progress, "look for shared places", seek,
-                   [(url, index, i) for i in range(len(contents["recordings"]))])
+                   [(url, index, span, batch) for span in _waymark._divide(contents, index_keyframes)
+                    for batch in batches])
     pairs = _waymark._pairs(sorted((one for of_one in alike for one in of_one), key=lambda one: one[0]))
     arguments = []
     for a, b, queries in pairs:
@@ -427,7 +439,7 @@ tr:nth-child(even) {{ background: #f0f0f0 }}</style></head><body>
 
 
 def run(recordings, atlas, *, workers=None, scheduler=None, options=(), keyframes=NUM_KEYFRAMES, seed=0, report=None,
-        work=None, say=lambda line: None):
+        work=None, index_keyframes=INDEX_KEYFRAMES, say=lambda line: None):
     """Maps recordings and makes one atlas of them; what is there already is not done again.
 
     recordings: paths that each worker can read, of whatever `waymark run` takes, or maps (.wmap).
@@ -436,6 +448,8 @@ def run(recordings, atlas, *, workers=None, scheduler=None, options=(), keyframe
     scheduler: address of a Dask scheduler.
     options: further arguments of `waymark run`, the same for all.
     work: where steps leave what they made, an fsspec URL that all workers reach; ATLAS/work if None.
+    index_keyframes: so many keyframes at most has the part of the place index that a worker holds at a time, some
+    30 kB each. Which places are found depends on it a little, not on the number of workers.
     say: hears of the progress, line by line.
 
     Gives a dict: contents (recordings, tiles, links), failed (a list of dicts with recording and
@@ -459,7 +473,7 @@ def run(recordings, atlas, *, workers=None, scheduler=None, options=(), keyframe
         ordered = [mapped[checksum] for checksum in sorted(mapped)]
         contents = _waymark._append([one["contents"] for one in ordered])
         shared = {(a, b): [a, b, landmarks] for one in ordered for a, b, landmarks in one["shared"]}
-        link_all(client, progress, url, contents, shared, seed)
+        link_all(client, progress, url, contents, shared, seed, index_keyframes)
         contents = _waymark._solve(contents)
         adjust_all(client, progress, url, contents, shared)
         contents = _waymark._solve(contents)

@@ -21,12 +21,37 @@ bool is_of_one_map(const AtlasTile& a, const AtlasTile& b) {
 
 }  // namespace
 
-AtlasPlaces::AtlasPlaces(const Atlas& atlas, const AtlasContents& contents) {
-  std::uint32_t next = 0;
+std::vector<TileRange> divide_tiles(const AtlasContents& contents, std::size_t max_keyframes) {
+  WAYMARK_CHECK(max_keyframes > 0);
+  std::size_t all = 0;
+  for (const AtlasTile& tile : contents.tiles) all += tile.num_keyframes;
+  const std::size_t num_ranges =
+      std::max<std::size_t>((all + max_keyframes - 1) / max_keyframes, 1);
+  std::vector<TileRange> ranges;
+  std::size_t before = 0;
+  std::size_t in_range = 0;
   for (std::uint32_t i = 0; i < contents.tiles.size(); ++i) {
+    const std::size_t count = contents.tiles[i].num_keyframes;
+    const bool is_full = in_range + count > max_keyframes;
+    if (ranges.empty() || is_full || before >= all * ranges.size() / num_ranges) {
+      ranges.push_back({i, i});
+      in_range = 0;
+    }
+    ranges.back().end = i + 1;
+    in_range += count;
+    before += count;
+  }
+  return ranges;
+}
+
+AtlasPlaces::AtlasPlaces(const Atlas& atlas, const AtlasContents& contents, const TileRange& range)
+    : first_id_(contents.tiles.size(), 0) {
+  std::uint32_t next = 0;
+  const auto end = std::min(range.end, static_cast<std::uint32_t>(contents.tiles.size()));
+  for (std::uint32_t i = range.begin; i < end; ++i) {
     const AtlasTile& tile = contents.tiles[i];
     if (next > UINT32_MAX / 2) throw InputError(atlas.folder().string(), "has too many keyframes");
-    first_id_.push_back(next);
+    first_id_[i] = next;
     for (const auto& descriptors :
          load_places(atlas.places_path(tile.places), tile.num_keyframes)) {
       index_.add(KeyframeId{next++}, SubmapId{i}, descriptors);
@@ -81,9 +106,13 @@ std::vector<AlikeTile> find_alike_tiles(const AtlasContents& contents,
     std::ranges::sort(ranked);
     for (const auto& [score, id] : ranked) one.queries.push_back(id);
   }
+  keep_best(alike, max_count);
+  return alike;
+}
+
+void keep_best(std::vector<AlikeTile>& alike, std::size_t max_count) {
   std::ranges::stable_sort(alike, std::ranges::greater(), &AlikeTile::score);
   if (alike.size() > max_count) alike.resize(max_count);
-  return alike;
 }
 
 }  // namespace waymark

@@ -19,12 +19,22 @@ struct AtlasCandidate {
   double score = 0.0;      ///< See PlaceCandidate.
 };
 
-/// The place index of all tiles, without opening them.
+/// Consecutive tiles.
+struct TileRange {
+  std::uint32_t begin = 0;         ///< Index of the first tile.
+  std::uint32_t end = UINT32_MAX;  ///< One past the last; beyond the end: to the end.
+};
+
+/// Cuts the tiles into as few ranges as have at most so many keyframes each, but for single tiles
+/// that have more; their sizes differ as little as the tiles allow, so that scores compare.
+std::vector<TileRange> divide_tiles(const AtlasContents& contents, std::size_t max_keyframes);
+
+/// The place index of all tiles, or of some, without opening them.
 class AtlasPlaces {
  public:
   explicit AtlasPlaces(const Atlas& atlas) : AtlasPlaces(atlas, atlas.contents()) {}
   /// Of contents that are not committed yet.
-  AtlasPlaces(const Atlas& atlas, const AtlasContents& contents);
+  AtlasPlaces(const Atlas& atlas, const AtlasContents& contents, const TileRange& range = {});
 
   /// The best, best first; those of tiles that are not wanted are left out.
   std::vector<AtlasCandidate> find(
@@ -44,12 +54,15 @@ struct AlikeTile {
   std::vector<KeyframeId> queries;  ///< Keyframes of the other one that say so, likeliest first.
 };
 
-/// The tiles of other maps that look most like a tile of this index, at most so many, best first.
+/// The tiles of other maps in this index that look most like a tile, at most so many, best first.
 /// Depends on what the atlas holds, not on when it came.
 std::vector<AlikeTile> find_alike_tiles(const AtlasContents& contents,
                                         const AtlasPlaces& places,
                                         std::uint32_t tile,
                                         const Map& map,
                                         std::size_t max_count);
+
+/// Best first, at most so many; of equal ones those that come first.
+void keep_best(std::vector<AlikeTile>& alike, std::size_t max_count);
 
 }  // namespace waymark

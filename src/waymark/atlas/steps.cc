@@ -123,8 +123,13 @@ void append_contents(AtlasContents& contents, const AtlasContents& more) {
 
 std::vector<TilePair> choose_pairs(
     const std::vector<std::pair<std::uint32_t, std::vector<AlikeTile>>>& by_tile) {
-  std::map<std::pair<std::uint32_t, std::uint32_t>, TilePair> pairs;
+  std::map<std::uint32_t, std::vector<AlikeTile>> best;
   for (const auto& [tile, alike] : by_tile) {
+    best[tile].insert(best[tile].end(), alike.begin(), alike.end());
+  }
+  std::map<std::pair<std::uint32_t, std::uint32_t>, TilePair> pairs;
+  for (auto& [tile, alike] : best) {
+    keep_best(alike, kMaxLinksSought);
     for (const AlikeTile& other : alike) {
       const bool is_later = tile > other.tile;
       const auto key = std::minmax({tile, other.tile});

@@ -44,7 +44,8 @@ CutRecording cut_recording(const Atlas& atlas,
 void append_contents(AtlasContents& contents, const AtlasContents& more);
 
 /// What find_alike_tiles() gave of tiles, as pairs, each once, ascending. by_tile: by the index of
-/// the tile that was looked for.
+/// the tile that was looked for; one that was looked for in several ranges of tiles is there once
+/// per range, and the best kMaxLinksSought of all count.
 std::vector<TilePair> choose_pairs(
     const std::vector<std::pair<std::uint32_t, std::vector<AlikeTile>>>& by_tile);
 
