@@ -13,8 +13,10 @@
 #include "live_control.h"
 #include "numbers.h"
 #include "reporter.h"
+#include "run_messages.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/disk_memory.h"
 #include "waymark/report/advice.h"
 #include "waymark/report/report.h"
 #include "waymark/session/another_pass.h"
@@ -37,61 +39,13 @@ struct RunOptions {
   ReportOptions report;
   std::filesystem::path map_out;  ///< Empty: the map is not saved.
   double autosave_s = 60.0;
-  double pace = 0.0;              ///< Times the input's own rate; 0: as fast as possible.
-  std::optional<Timing> timing;   ///< Nothing: what suits the input.
-  std::string viewer;             ///< [HOST:]PORT; empty: off.
-  std::filesystem::path overlay;  ///< Video to make; empty: none.
-  bool has_report = false;        ///< Whether a page on it is among the results.
+  double pace = 0.0;                    ///< Times the input's own rate; 0: as fast as possible.
+  std::optional<Timing> timing;         ///< Nothing: what suits the input.
+  std::string viewer;                   ///< [HOST:]PORT; empty: off.
+  std::filesystem::path overlay;        ///< Video to make; empty: none.
+  std::optional<double> max_memory_gb;  ///< Nothing: no limit.
+  bool has_report = false;              ///< Whether a page on it is among the results.
 };
-
-/// A line for all, and one for each that was left out.
-void report_markers(Reporter& reporter, const MarkerSummary& markers) {
-  const auto used = std::ranges::count(markers.markers, "used", &MarkerSummary::Entry::verdict);
-  std::string line = fmt::format("{} markers found, {} used", markers.markers.size(), used);
-  if (markers.frame == "none") line += "; they do not tell the scale of the map";
-  if (markers.frame == "scale") line += "; the map is in metres by them";
-  if (markers.frame == "marker 0") line += "; the map is in metres, in the frame of marker 0";
-  if (markers.frame == "surveyed") {
-    line += fmt::format("; the map is where the surveyed ones are, these {:.3f} m off (rms)",
-                        markers.survey_rms_m);
-  }
-  reporter.info(line);
-  for (const MarkerSummary::Entry& entry : markers.markers) {
-    if (!entry.fault.empty()) reporter.info(entry.fault);
-  }
-}
-
-void report_results(Reporter& reporter, const SessionResults& results, const RunOptions& options) {
-  const RunSummary& summary = results.summary;
-  const FrameCounts& counts = summary.counts;
-  reporter.info(
-      fmt::format("{} of {} frames have a pose ({} unreadable, {} dropped), lost {} times; {} "
-                  "keyframes, {} landmarks, {} sub-maps",
-                  counts.tracked,
-                  counts.frames,
-                  counts.unreadable,
-                  counts.dropped,
-                  counts.lost_count,
-                  summary.keyframes,
-                  summary.landmarks,
-                  summary.submaps));
-  report_reasons(reporter, results.table, summary);
-  if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
-  if (summary.markers) report_markers(reporter, *summary.markers);
-  if (!results.ego_mask.values.empty()) {
-    reporter.info(
-        fmt::format("{:.1f} % of the image moves along with the camera and has no features: {}",
-                    100.0 * summary.moves_along.value_or(0.0),
-                    (options.report.out / "view_mask.png").string()));
-  }
-  const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
-  reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
-                            format_duration(summary.wall_s),
-                            1e3 * summary.wall_s / num_frames,
-                            summary.tracking_ms.mean,
-                            options.report.out.string()));
-  report_advice(reporter, summary);
-}
 
 /// Tells the user, the autosave and the viewer (null: none) of each frame.
 FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, Reporter& reporter) {
@@ -241,7 +195,7 @@ std::optional<int> finish(const RunOptions& options,
                           Reporter& reporter) {
   const auto report = [&](const SessionResults& told) {
     if (live) live->finish();
-    report_results(reporter, told, options);
+    report_results(reporter, told, options.report.out);
     report_calibration(reporter, told.summary);
     check_finished(told);  // What ended the session early is told with what could not be saved.
   };
@@ -273,6 +227,10 @@ std::optional<int> map_once(const RunOptions& options,
   }
   warn_unless_sure(reporter, session, "expect a bent map");
   prepare_results(options.report.out);
+  if (options.max_memory_gb) {
+    session.system->keep_map_in(std::make_shared<DiskMemory>(
+        options.report.out, static_cast<std::size_t>(*options.max_memory_gb * 1e9)));
+  }
   const bool has_map_out = !options.map_out.empty();
   if (has_map_out) {
     AtomicFile{options.map_out};  // Fails now rather than in the end.
@@ -353,6 +311,12 @@ void add_map_options(CLI::App& command, RunOptions& options) {
                 options.session.reading.has_jpeg,
                 "Keep the images of keyframes in the map, for export and the viewer [off]")
       ->needs(&map_out);
+  command
+      .add_option("--max-memory",
+                  options.max_memory_gb,
+                  "From so much memory on, what the map rarely needs lies in a file in --out [off]")
+      ->type_name("GB")
+      ->check(number_between(0.0, 1e6));
 }
 
 }  // namespace

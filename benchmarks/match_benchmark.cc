@@ -102,7 +102,7 @@ BENCHMARK(match_along_epipolar_curves)->Unit(benchmark::kMicrosecond);
 
 /// One descriptor against all of a view.
 void compare_descriptors(benchmark::State& state) {
-  const std::vector<Descriptor>& all = views().b.features->descriptors;
+  const FeatureArray<Descriptor>& all = views().b.features->descriptors;
   const Descriptor query = views().a.features->descriptors.front();
   std::vector<std::uint16_t> out(all.size());
   for (auto _ : state) {

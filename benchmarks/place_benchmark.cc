@@ -48,7 +48,7 @@ using namespace waymark;
 
 /// What a keyframe looked like, and where its camera truly was.
 struct RecordedPlace {
-  std::vector<Descriptor> descriptors;
+  FeatureArray<Descriptor> descriptors;
   Rigid3 world_from_camera;
 };
 
@@ -220,7 +220,7 @@ void measure_recall(const std::vector<Places>& sequences, const Places& queries)
   }
 }
 
-void flip_bits(std::vector<Descriptor>& descriptors, Rng& rng) {
+void flip_bits(FeatureArray<Descriptor>& descriptors, Rng& rng) {
   for (Descriptor& descriptor : descriptors) {
     for (std::uint64_t& word : descriptor) {
       word ^= rng.next() & rng.next() & rng.next() & rng.next();
@@ -228,7 +228,8 @@ void flip_bits(std::vector<Descriptor>& descriptors, Rng& rng) {
   }
 }
 
-void reorder_bits(std::vector<Descriptor>& descriptors, const std::array<std::size_t, 256>& order) {
+void reorder_bits(FeatureArray<Descriptor>& descriptors,
+                  const std::array<std::size_t, 256>& order) {
   for (Descriptor& descriptor : descriptors) {
     Descriptor reordered = {};
     for (std::size_t bit = 0; bit < order.size(); ++bit) {
@@ -247,10 +248,10 @@ std::array<std::size_t, 256> random_order(Rng& rng) {
 }
 
 /// Prints what the index costs besides its answers.
-PlaceIndex build(const std::vector<std::vector<Descriptor>>& keyframes) {
+PlaceIndex build(const std::vector<FeatureArray<Descriptor>>& keyframes) {
   PlaceIndex index;
   std::vector<double> times_ms;
-  for (const std::vector<Descriptor>& descriptors : keyframes) {
+  for (const FeatureArray<Descriptor>& descriptors : keyframes) {
     const double start = thread_time_ms();
     add(index, descriptors);
     times_ms.push_back(thread_time_ms() - start);
@@ -270,10 +271,10 @@ PlaceIndex build(const std::vector<std::vector<Descriptor>>& keyframes) {
 }
 
 /// The sequences once, then again and again, changed each time.
-std::vector<std::vector<Descriptor>> grow(const std::vector<Places>& sequences,
-                                          std::size_t count,
-                                          bool is_elsewhere) {
-  std::vector<std::vector<Descriptor>> keyframes;
+std::vector<FeatureArray<Descriptor>> grow(const std::vector<Places>& sequences,
+                                           std::size_t count,
+                                           bool is_elsewhere) {
+  std::vector<FeatureArray<Descriptor>> keyframes;
   for (std::uint64_t round = 0; keyframes.size() < count; ++round) {
     Rng rng(round, 0);
     const std::array<std::size_t, 256> order = random_order(rng);

@@ -126,6 +126,24 @@ class Autosave(CliTest):
         self.assertEqual((self.out / "trajectory.txt").read_bytes(), trajectory)
 
 
+class MaxMemory(CliTest):
+    def test_does_not_change_the_results(self):
+        source, before = self.sequence("stereo"), self.folder / "before.wmap"
+        self.assertEqual(self.run_on(source, "--map-out", before, "--frames", 20).returncode, 0)
+        for arguments in ((), ("--map-in", before)):
+            results = []
+            for limit in ((), ("--max-memory", "0")):
+                saved = self.folder / f"map{len(limit)}.wmap"
+                done = self.run_on(source, "--map-out", saved, *arguments, *limit)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                results.append(((self.out / "trajectory.txt").read_bytes(), saved.read_bytes()))
+            self.assertEqual(results[0], results[1])
+        self.assertEqual([path for path in self.out.iterdir() if "memory" in path.name], [])
+
+    def test_wrong_usage(self):
+        self.assert_fails(self.run_on(self.sequence("stereo"), "--max-memory", "-1"), 2, "--max-memory")
+
+
 class Readers(CliTest):
     """The programs of docs/map-format.md are run as they stand there."""
 

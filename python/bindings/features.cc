@@ -3,6 +3,8 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <span>
+
 #include "arrays.h"
 #include "bindings.h"
 #include "waymark/system/system.h"
@@ -14,7 +16,7 @@ static_assert(sizeof(LandmarkId) == sizeof(std::uint32_t));
 static_assert(sizeof(Eigen::Vector3f) == 3 * sizeof(float));
 static_assert(offsetof(Keypoint, y_px) == offsetof(Keypoint, x_px) + sizeof(float));
 
-py::ssize_t count(const std::vector<Keypoint>& keypoints) {
+py::ssize_t count(std::span<const Keypoint> keypoints) {
   return static_cast<py::ssize_t>(keypoints.size());
 }
 
@@ -36,9 +38,9 @@ auto keypoint_column(T Keypoint::*member) {
 
 /// An array of the features.
 template <class T>
-auto feature_column(std::vector<T> Features::*member) {
+auto feature_column(FeatureArray<T> Features::*member) {
   return [member](const PythonFeatures& self) {
-    const std::vector<T>& values = (*self.features).*member;
+    const FeatureArray<T>& values = (*self.features).*member;
     return view_of(values.data(), {static_cast<py::ssize_t>(values.size())}, self.features);
   };
 }

@@ -163,7 +163,7 @@ class SceneBuilder {
       const Keyframe& keyframe = map_.keyframes().at(observation.keyframe);
       const std::uint32_t first_view = first_view_.at(observation.keyframe);
       add_sighting(keyframe, first_view, observation.feature, point);
-      const std::vector<std::uint32_t>& partner = keyframe.features->partner;
+      const FeatureArray<std::uint32_t>& partner = keyframe.features->partner;
       if (observation.feature < partner.size() && partner[observation.feature] != kNoFeature) {
         add_sighting(keyframe, first_view, partner[observation.feature], point);
       }

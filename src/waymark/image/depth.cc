@@ -181,8 +181,8 @@ void sample_depth(DepthView depth,
                   std::span<const Eigen::Vector3f> bearings,
                   std::span<const Matrix23f> level_pixel_from_bearing,
                   std::size_t num_edges,
-                  std::vector<float>& range_m,
-                  std::vector<float>& inverse_range_sigma) {
+                  FeatureArray<float>& range_m,
+                  FeatureArray<float>& inverse_range_sigma) {
   WAYMARK_CHECK(bearings.size() == keypoints.size());
   WAYMARK_CHECK(level_pixel_from_bearing.size() == keypoints.size());
   range_m.assign(keypoints.size(), 0.0f);

@@ -23,7 +23,7 @@ void sample_depth(DepthView depth,
                   std::span<const Eigen::Vector3f> bearings,
                   std::span<const Matrix23f> level_pixel_from_bearing,
                   std::size_t num_edges,
-                  std::vector<float>& range_m,
-                  std::vector<float>& inverse_range_sigma);
+                  FeatureArray<float>& range_m,
+                  FeatureArray<float>& inverse_range_sigma);
 
 }  // namespace waymark

@@ -43,8 +43,8 @@ Measured measure(const DepthImage& image, float x_px, float y_px, Eigen::Vector3
   const std::vector<Keypoint> keypoints = {{.x_px = x_px, .y_px = y_px}};
   const std::vector<Eigen::Vector3f> bearings = {bearing.normalized()};
   const std::vector<Matrix23f> derivatives = {derivative(bearings[0])};
-  std::vector<float> range_m;
-  std::vector<float> sigma;
+  FeatureArray<float> range_m;
+  FeatureArray<float> sigma;
   sample_depth(
       image.view(), {.factor = kFactor}, keypoints, bearings, derivatives, 0, range_m, sigma);
   return {range_m[0], sigma[0]};
@@ -113,8 +113,8 @@ TEST(Depth, AllocatesNothingOnceWarm) {
   const std::vector<Keypoint> keypoints(50, {.x_px = 20.3f, .y_px = 17.8f});
   const std::vector<Eigen::Vector3f> bearings(50, Eigen::Vector3f::UnitZ());
   const std::vector<Matrix23f> derivatives(50, derivative(bearings[0]));
-  std::vector<float> range_m;
-  std::vector<float> sigma;
+  FeatureArray<float> range_m;
+  FeatureArray<float> sigma;
   sample_depth(
       slanted.view(), {.factor = kFactor}, keypoints, bearings, derivatives, 0, range_m, sigma);
   const long before = testing::num_allocations();

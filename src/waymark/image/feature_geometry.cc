@@ -175,7 +175,7 @@ std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
 namespace {
 
 template <class T>
-void insert_at(std::vector<T>& values, std::size_t at, std::size_t count, const T& value) {
+void insert_at(FeatureArray<T>& values, std::size_t at, std::size_t count, const T& value) {
   values.insert(values.begin() + static_cast<std::ptrdiff_t>(at), count, value);
 }
 

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <memory_resource>
 #include <vector>
 
 namespace waymark {
@@ -19,6 +20,19 @@ class FeatureGrid {
   /// pixel(i) gives the pixel of point i of count. wrap_width_px: see Camera.
   template <class PixelOf>
   FeatureGrid(int width_px, int height_px, double wrap_width_px, std::size_t count, PixelOf pixel);
+
+  /// A copy in this memory, of num_bytes().
+  FeatureGrid(const FeatureGrid& other, std::pmr::memory_resource* memory)
+      : columns_(other.columns_),
+        rows_(other.rows_),
+        wrap_width_px_(other.wrap_width_px_),
+        cell_begin_(other.cell_begin_, memory),
+        indices_(other.indices_, memory) {}
+
+  /// Of its arrays.
+  std::size_t num_bytes() const {
+    return (cell_begin_.size() + indices_.size()) * sizeof(std::uint32_t);
+  }
 
   /// Calls visit(index) for each point in the cells that touch the square of half side radius_px
   /// around (x, y): a superset of the points within it.
@@ -52,8 +66,8 @@ class FeatureGrid {
   int columns_ = 0;
   int rows_ = 0;
   double wrap_width_px_ = 0.0;
-  std::vector<std::uint32_t> cell_begin_;  ///< Row-major cells, one more for the end.
-  std::vector<std::uint32_t> indices_;
+  std::pmr::vector<std::uint32_t> cell_begin_;  ///< Row-major cells, one more for the end.
+  std::pmr::vector<std::uint32_t> indices_;
 };
 
 template <class PixelOf>

@@ -7,6 +7,8 @@
 #include <cmath>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -54,29 +56,34 @@ inline Matrix23f across_edge(const Matrix23f& level_pixel_from_bearing, float an
   return normal * (normal.transpose() * level_pixel_from_bearing).eval();
 }
 
+/// One of the arrays of features.
+template <class T>
+using FeatureArray = std::pmr::vector<T>;
+
 /// The immutable data of a frame. Arrays run in parallel: first the num_primary features of
 /// camera 0, which have descriptors, then those that stereo search found in camera 1, which have
 /// none and belong to a primary feature. Where corners are few the last of the primary features are
-/// points on edges, which tell their place across the edge only.
+/// points on edges, which tell their place across the edge only. A copy lies on the heap, wherever
+/// what it is of does; see stored_in().
 struct Features {
-  std::size_t num_primary = 0;            ///< Features of camera 0.
-  std::size_t num_edges = 0;              ///< The last of these are points on edges.
-  std::vector<Keypoint> keypoints;        ///< All features; pixels are those of each one's camera.
-  std::vector<Descriptor> descriptors;    ///< num_primary entries.
-  std::vector<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
+  std::size_t num_primary = 0;             ///< Features of camera 0.
+  std::size_t num_edges = 0;               ///< The last of these are points on edges.
+  FeatureArray<Keypoint> keypoints;        ///< All features; pixels are those of each one's camera.
+  FeatureArray<Descriptor> descriptors;    ///< num_primary entries.
+  FeatureArray<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
   /// Derivative of the pixel of the feature's level by the bearing, at the measured bearing (W).
   /// The residual of a landmark is W * (predicted bearing - measured bearing). On edges W has rank
   /// 1: what it gives is across.
-  std::vector<Matrix23f> level_pixel_from_bearing;
-  std::vector<float> size_rad;  ///< Angle of one pixel of the feature's level.
+  FeatureArray<Matrix23f> level_pixel_from_bearing;
+  FeatureArray<float> size_rad;  ///< Angle of one pixel of the feature's level.
   /// The feature of camera 1 that belongs to a primary feature, and back; kNoFeature where none.
-  std::vector<std::uint32_t> partner;
+  FeatureArray<std::uint32_t> partner;
   /// Distance along the bearing in metres, from stereo or the depth image; 0 where unknown,
   /// negative where the two cameras see the feature beyond infinity, as noise makes them do with
   /// what is far away. num_primary entries.
-  std::vector<float> range_m;
+  FeatureArray<float> range_m;
   /// Standard deviation of the inverse range in 1/m; 0 where there is no range.
-  std::vector<float> inverse_range_sigma;
+  FeatureArray<float> inverse_range_sigma;
   float inverse_depth_offset = 0.0f;  ///< Rig::inverse_depth_offset that the ranges were freed of.
   RigMotion motion;                   ///< At the frame's time.
   /// Per camera the readout that the keypoints are corrected for: they are where all of them would
@@ -110,5 +117,9 @@ struct Features {
     return measured;
   }
 };
+
+/// A copy with all arrays one behind the other in a block of this memory.
+std::shared_ptr<const Features> stored_in(std::shared_ptr<std::pmr::memory_resource> memory,
+                                          const Features& features);
 
 }  // namespace waymark

@@ -20,8 +20,8 @@ void move_to_depth(const RigCamera& camera,
                    const RigMotion& motion,
                    float lag_s,
                    const Features& features,
-                   std::vector<Keypoint>& keypoints,
-                   std::vector<Eigen::Vector3f>& bearings) {
+                   std::span<Keypoint> keypoints,
+                   std::span<Eigen::Vector3f> bearings) {
   const auto readout_s = static_cast<float>(camera.readout_s);
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
     Keypoint& keypoint = keypoints[i];
@@ -104,8 +104,8 @@ void FrameBuilder::add_depth(const FrameImages& images,
   const RigCamera& camera = rig_->cameras[0];
   const float lag_s =
       1e-9f * static_cast<float>(images.depth_lag_ns) + 1e-3f * static_cast<float>(depth_.lag_ms);
-  keypoints_ = features.keypoints;
-  std::vector<Eigen::Vector3f> bearings = features.bearings;
+  keypoints_.assign(features.keypoints.begin(), features.keypoints.end());
+  FeatureArray<Eigen::Vector3f> bearings = features.bearings;
   if (motion != RigMotion{}) move_to_depth(camera, motion, lag_s, features, keypoints_, bearings);
   sample_depth(images.depth,
                depth_,

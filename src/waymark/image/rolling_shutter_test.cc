@@ -110,7 +110,7 @@ TEST_F(RollingShutterTest, ReplacesACorrectionByAnother) {
 }
 
 TEST_F(RollingShutterTest, AGlobalShutterBendsNothing) {
-  const std::vector<Keypoint> before = seen_.keypoints;
+  const FeatureArray<Keypoint> before = seen_.keypoints;
   EXPECT_FALSE(correct_rolling(global_, motion_, seen_));
   for (std::size_t i = 0; i < before.size(); ++i) {
     EXPECT_EQ(before[i].x_px, seen_.keypoints[i].x_px);

@@ -62,6 +62,11 @@ void GlobalMapper::take_over(const MapSnapshot& before) {
   places_ = *before.places;
 }
 
+void GlobalMapper::keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory) {
+  mapper_.keep_features_in(memory);
+  places_.keep_tables_in(memory);
+}
+
 void GlobalMapper::add(const NewSubmap& message) { update_places(mapper_.add(message)); }
 
 void GlobalMapper::add(const NewKeyframe& message) {

@@ -48,6 +48,9 @@ class GlobalMapper {
 
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const MapSnapshot& before);
+  /// Keeps in this memory what only searching and joining need: the features and the index of
+  /// places. After take_over().
+  void keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
   /// The adjustment that a loop made necessary, once for each, or that may tell the calibration;

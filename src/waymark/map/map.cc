@@ -119,6 +119,16 @@ Rigid3 Map::rig_from_world(KeyframeId reference,
   return rig_from_reference * keyframe->rig_from_world;
 }
 
+void Map::keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+  feature_memory_ = std::move(memory);
+  std::vector<KeyframeId> ids;
+  keyframes_.for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
+  for (const KeyframeId id : ids) {
+    Keyframe& keyframe = keyframes_.edit(id);
+    keyframe.features = kept(std::move(keyframe.features));
+  }
+}
+
 SubmapId Map::add_submap(bool is_metric) {
   submaps_.push_back({is_metric, {}, {}});
   return SubmapId{static_cast<std::uint32_t>(submaps_.size() - 1)};
@@ -127,6 +137,7 @@ SubmapId Map::add_submap(bool is_metric) {
 KeyframeId Map::add_keyframe(Keyframe keyframe) {
   WAYMARK_CHECK(keyframe.features && keyframe.rig && keyframe.submap.value < submaps_.size());
   WAYMARK_CHECK(!keyframe.parent.is_valid() || keyframes_.find(keyframe.parent));
+  keyframe.features = kept(std::move(keyframe.features));
   keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
   Submap& submap = submaps_[keyframe.submap.value];
   const bool is_root = !submap.root.is_valid();
@@ -231,7 +242,11 @@ void Map::measure_keyframe(KeyframeId id,
   WAYMARK_CHECK(rig && features && features->size() == keyframes_.at(id).features->size());
   Keyframe& keyframe = keyframes_.edit(id);
   keyframe.rig = std::move(rig);
-  keyframe.features = std::move(features);
+  keyframe.features = kept(std::move(features));
+}
+
+std::shared_ptr<const Features> Map::kept(std::shared_ptr<const Features> features) const {
+  return feature_memory_ ? stored_in(feature_memory_, *features) : std::move(features);
 }
 
 void Map::rescale_keyframe(KeyframeId id, double factor) {

@@ -7,6 +7,7 @@
 #include <compare>
 #include <cstdint>
 #include <memory>
+#include <memory_resource>
 #include <optional>
 #include <string>
 #include <utility>
@@ -252,6 +253,9 @@ class Map {
   /// The living keyframe that stands for a possibly erased one.
   KeyframeId resolve(KeyframeId id) const;
 
+  /// Features, those that come in later, too, are copied into this memory; null: they stay where
+  /// they are. Frozen copies share what there is, maps thawed from them start without.
+  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory);
   /// Adds an empty sub-map.
   SubmapId add_submap(bool is_metric);
   /// Adds a keyframe without observations; the first of a sub-map becomes its root.
@@ -309,6 +313,7 @@ class Map {
   /// Drops what was merged so long ago that nobody asks any more.
   void forget_old_merges();
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
+  std::shared_ptr<const Features> kept(std::shared_ptr<const Features> features) const;
   /// From scratch; what is associated but not there is passed over.
   CowTable<KeyframeId, Covisibility> count_covisibility() const;
 
@@ -317,7 +322,8 @@ class Map {
   CowTable<KeyframeId, Covisibility> covisibility_;
   CowTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
   CowTable<LandmarkId, LandmarkForwarding> landmark_forwarding_;
-  FrameId newest_frame_{0};  ///< Of all keyframes that ever were.
+  std::shared_ptr<std::pmr::memory_resource> feature_memory_;  ///< Null: where they come from.
+  FrameId newest_frame_{0};                                    ///< Of all keyframes that ever were.
   std::vector<Submap> submaps_;
   std::vector<LoopEdge> loop_edges_;        ///< Lengths in the units before any correction.
   std::vector<MapMarker> markers_;          ///< By number.

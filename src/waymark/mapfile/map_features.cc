@@ -17,14 +17,22 @@ namespace {
 constexpr double kMaxUnitError = 1e-3;  // Of bearings, which are single floats.
 constexpr double kMaxOutsidePx = 2.0;   // Noise and rounding may leave the image a little.
 
-std::vector<Keypoint> read_keypoints(MapRecord& record) {
+template <class T>
+FeatureArray<T> array_of(MapRecord& record,
+                         std::string_view key,
+                         std::optional<std::size_t> count,
+                         const NumberRange& range = {}) {
+  return record.array<T, FeatureArray<T>>(key, count, range);
+}
+
+FeatureArray<Keypoint> read_keypoints(MapRecord& record) {
   const auto pixels = record.array<Eigen::Vector2f>("pixel", std::nullopt);
   const std::size_t count = pixels.size();
   const auto angles = record.array<float>("angle_rad", count, kAngleRange);
   const auto responses = record.array<float>("response", count);
   const auto levels = record.array<std::uint8_t>("level", count);
   const auto cameras = record.array<std::uint8_t>("camera", count);
-  std::vector<Keypoint> keypoints(count);
+  FeatureArray<Keypoint> keypoints(count);
   for (std::size_t i = 0; i < count; ++i) {
     keypoints[i] = {pixels[i].x(), pixels[i].y(), angles[i], responses[i], levels[i], cameras[i]};
   }
@@ -103,7 +111,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
   auto features = std::make_shared<Features>();
   features->keypoints = read_keypoints(record);
   const std::size_t count = features->size();
-  features->descriptors = record.array<Descriptor>("descriptor", std::nullopt);
+  features->descriptors = array_of<Descriptor>(record, "descriptor", std::nullopt);
   const std::size_t num_primary = features->descriptors.size();
   features->num_primary = num_primary;
   if (num_primary > count) {
@@ -111,14 +119,14 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
         "has {} descriptors, expected at most {}, one per feature", num_primary, count));
   }
   if (record.has("num_edges")) features->num_edges = record.whole("num_edges", num_primary);
-  features->bearings = record.array<Eigen::Vector3f>("bearing", count);
+  features->bearings = array_of<Eigen::Vector3f>(record, "bearing", count);
   features->level_pixel_from_bearing =
-      record.array<Matrix23f>("level_pixel_from_bearing", count, kSlopeRange);
-  features->size_rad = record.array<float>("size_rad", count, kFeatureSizeRange);
-  features->partner = record.array<std::uint32_t>("partner", count);
-  features->range_m = record.array<float>("range_m", num_primary, kLengthRange);
+      array_of<Matrix23f>(record, "level_pixel_from_bearing", count, kSlopeRange);
+  features->size_rad = array_of<float>(record, "size_rad", count, kFeatureSizeRange);
+  features->partner = array_of<std::uint32_t>(record, "partner", count);
+  features->range_m = array_of<float>(record, "range_m", num_primary, kLengthRange);
   features->inverse_range_sigma =
-      record.array<float>("inverse_range_sigma", num_primary, kNotNegative);
+      array_of<float>(record, "inverse_range_sigma", num_primary, kNotNegative);
   for (std::size_t i = 0; i < count; ++i) {
     check_keypoint(record, rig, *features, i);
     check_partner(record, *features, i);

@@ -65,8 +65,9 @@ struct OutsideNumber {
 
 /// The first number of an array's elements that is outside of the range; nothing if none is, or
 /// they hold no floating-point numbers.
-template <class T>
-std::optional<OutsideNumber> find_outside(const std::vector<T>& values, const NumberRange& range) {
+template <class Array>
+std::optional<OutsideNumber> find_outside(const Array& values, const NumberRange& range) {
+  using T = typename Array::value_type;
   if constexpr (std::is_floating_point_v<T>) {
     for (std::size_t i = 0; i < values.size(); ++i) {
       const auto number = static_cast<double>(values[i]);

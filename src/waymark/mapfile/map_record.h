@@ -47,10 +47,10 @@ class MapRecord {
   template <class IdType>
   IdType id(std::string_view key, std::uint64_t end);
   /// An array; of `count` elements if that is given. Numbers are finite and within the range.
-  template <class T>
-  std::vector<T> array(std::string_view key,
-                       std::optional<std::size_t> count,
-                       const NumberRange& range = {});
+  template <class T, class Array = std::vector<T>>
+  Array array(std::string_view key,
+              std::optional<std::size_t> count,
+              const NumberRange& range = {});
 
   /// Fails if there is anything that was not asked for.
   void expect_no_more() const;
@@ -89,12 +89,12 @@ IdType MapRecord::id(std::string_view key, std::uint64_t end) {
   return IdType{static_cast<std::uint32_t>(whole(key, end - 1))};
 }
 
-template <class T>
-std::vector<T> MapRecord::array(std::string_view key,
-                                std::optional<std::size_t> count,
-                                const NumberRange& range) {
+template <class T, class Array>
+Array MapRecord::array(std::string_view key,
+                       std::optional<std::size_t> count,
+                       const NumberRange& range) {
   const std::string_view bytes = array_bytes(key, map_array_layout<T>(), count);
-  std::vector<T> values(bytes.size() / sizeof(T));
+  Array values(bytes.size() / sizeof(T));
   if (!bytes.empty()) std::memcpy(static_cast<void*>(values.data()), bytes.data(), bytes.size());
   if (const auto bad = find_outside(values, range)) fail_element(key, bad->index, bad->number);
   return values;

@@ -49,10 +49,9 @@ class MapRecordWriter {
   void add_id(std::string_view key, Id<Tag> id) {
     id.is_valid() ? add(key, id.value) : pack_nil(add_key(key));
   }
-  template <class T>
-  void add_array(std::string_view key,
-                 const std::vector<T>& values,
-                 const NumberRange& range = {}) {
+  template <class Array>
+  void add_array(std::string_view key, const Array& values, const NumberRange& range = {}) {
+    using T = typename Array::value_type;
     if (const auto bad = find_outside(values, range)) fail(key, bad->number);
     add_raw_array(key,
                   map_array_layout<T>(),

@@ -16,7 +16,7 @@ namespace {
 
 /// A member of every keypoint.
 template <class T>
-std::vector<T> column(const std::vector<Keypoint>& keypoints, T Keypoint::*member) {
+std::vector<T> column(const FeatureArray<Keypoint>& keypoints, T Keypoint::*member) {
   std::vector<T> values;
   for (const Keypoint& keypoint : keypoints) values.push_back(keypoint.*member);
   return values;
@@ -31,7 +31,7 @@ void add_features(MapRecordWriter& writer, const Features& features) {
                 features.descriptors.size() == features.num_primary &&
                 features.range_m.size() == features.num_primary &&
                 features.inverse_range_sigma.size() == features.num_primary);
-  const std::vector<Keypoint>& keypoints = features.keypoints;
+  const FeatureArray<Keypoint>& keypoints = features.keypoints;
   std::vector<Eigen::Vector2f> pixels;
   for (const Keypoint& keypoint : keypoints) pixels.emplace_back(keypoint.x_px, keypoint.y_px);
   writer.add_array("pixel", pixels);

@@ -24,6 +24,10 @@ class Mapper {
          const MappingSettings& settings,
          const CalibrationSettings& calibration = {});
 
+  /// See Map.
+  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+    map_.keep_features_in(std::move(memory));
+  }
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const Map& frozen) { map_ = Map::thaw(frozen); }
 

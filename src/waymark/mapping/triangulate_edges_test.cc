@@ -54,7 +54,7 @@ class TriangulateEdges : public ::testing::Test {
     features->num_edges = features->size() - 1;
     features->descriptors.resize(features->size());
     features->partner.assign(features->size(), kNoFeature);
-    features->range_m = features->inverse_range_sigma = std::vector(features->size(), 0.0f);
+    features->range_m = features->inverse_range_sigma = FeatureArray<float>(features->size(), 0.0f);
     derive_geometry(*rig_, *features);
     Keyframe keyframe;
     keyframe.frame = FrameId{static_cast<std::uint32_t>(map_.keyframes().size())};

@@ -123,7 +123,7 @@ LandmarkSet edge_landmark() {
   return set;
 }
 
-Features edge_features(const Rig& rig, std::vector<Keypoint> keypoints) {
+Features edge_features(const Rig& rig, FeatureArray<Keypoint> keypoints) {
   Features features;
   features.num_primary = features.num_edges = keypoints.size();
   features.descriptors.resize(keypoints.size());

@@ -110,20 +110,29 @@ std::span<const KeyframeId> PlaceIndex::erased_in(const PlaceSegment& segment) c
   return {begin, std::upper_bound(begin, erased_.end(), rows.back().keyframe)};
 }
 
+std::shared_ptr<const PlaceSegment> PlaceIndex::merged(const PlaceSegment& a,
+                                                       const PlaceSegment& b) const {
+  // What is made anew with every keyframe would be written to a disk in vain.
+  const bool is_young = a.rows().size() + b.rows().size() < kFullRows;
+  return std::make_shared<const PlaceSegment>(
+      a,
+      b,
+      [this](KeyframeId keyframe) { return is_erased(keyframe); },
+      is_young ? nullptr : memory_);
+}
+
 void PlaceIndex::merge_last_two() {
   const std::shared_ptr<const PlaceSegment> younger = segments_.back();
   segments_.pop_back();
   const std::shared_ptr<const PlaceSegment> elder = segments_.back();
-  segments_.back() = std::make_shared<const PlaceSegment>(
-      *elder, *younger, [this](KeyframeId keyframe) { return is_erased(keyframe); });
+  segments_.back() = merged(*elder, *younger);
   forget_erased(*elder);
   forget_erased(*younger);
 }
 
 void PlaceIndex::compact(std::size_t segment) {
   const std::shared_ptr<const PlaceSegment> old = segments_[segment];
-  segments_[segment] = std::make_shared<const PlaceSegment>(
-      *old, PlaceSegment(), [this](KeyframeId keyframe) { return is_erased(keyframe); });
+  segments_[segment] = merged(*old, PlaceSegment());
   forget_erased(*old);
   if (segments_[segment]->rows().empty()) {
     segments_.erase(segments_.begin() + static_cast<std::ptrdiff_t>(segment));

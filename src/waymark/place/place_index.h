@@ -5,7 +5,9 @@
 #include <cstddef>
 #include <functional>
 #include <memory>
+#include <memory_resource>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include "waymark/base/id.h"
@@ -39,6 +41,12 @@ struct PlaceQuery {
 /// Thread safety: copies are independent; any number of threads may query one index.
 class PlaceIndex {
  public:
+  /// Tables that are made from now on lie in this memory, but for those of the youngest keyframes;
+  /// null: on the heap.
+  void keep_tables_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+    memory_ = std::move(memory);
+  }
+
   /// Adds a keyframe; ids must ascend. Now and then merges segments, which takes some nanoseconds
   /// per descriptor of each.
   void add(KeyframeId keyframe, SubmapId submap, std::span<const Descriptor> descriptors);
@@ -76,6 +84,9 @@ class PlaceIndex {
   /// Forgets about the erased keyframes of a segment that is about to be made anew without them.
   void forget_erased(const PlaceSegment& segment);
 
+  std::shared_ptr<const PlaceSegment> merged(const PlaceSegment& a, const PlaceSegment& b) const;
+
+  std::shared_ptr<std::pmr::memory_resource> memory_;
   std::vector<std::shared_ptr<const PlaceSegment>> segments_;  // Older first.
   std::vector<KeyframeId> erased_;  // Ascending; those that segments still hold.
   std::vector<Join> joins_;         // In the order they happened.

@@ -46,8 +46,10 @@ struct MovingEntries {
 
 /// The entries of rows that stay, under their new rows, in ascending order. The rows of b are above
 /// those of a. Without branches that depend on the entries: which comes next cannot be predicted.
-std::vector<std::uint64_t> merge_entries(const MovingEntries& a, const MovingEntries& b) {
-  std::vector<std::uint64_t> merged(a.entries.size() + b.entries.size());
+std::pmr::vector<std::uint64_t> merge_entries(const MovingEntries& a,
+                                              const MovingEntries& b,
+                                              std::pmr::memory_resource* memory) {
+  std::pmr::vector<std::uint64_t> merged(a.entries.size() + b.entries.size(), memory);
   std::size_t count = 0;
   const auto put = [&](std::uint64_t entry, std::uint16_t target) {
     merged[count] = (entry & ~kPlaceRowMask) | target;
@@ -104,7 +106,7 @@ std::array<PlaceKey, kNumPlaceTables> place_keys(const Descriptor& descriptor) {
 }
 
 PlaceSegment::PlaceSegment(const PlaceRow& row, std::span<const Descriptor> descriptors)
-    : rows_{row} {
+    : rows_{row}, tables_(kNumPlaceTables) {
   WAYMARK_CHECK(descriptors.size() <= kMaxDescriptors);
   for (Table& table : tables_) table.entries.reserve(descriptors.size());
   for (const Descriptor& descriptor : descriptors) {
@@ -121,17 +123,26 @@ PlaceSegment::PlaceSegment(const PlaceRow& row, std::span<const Descriptor> desc
 
 PlaceSegment::PlaceSegment(const PlaceSegment& a,
                            const PlaceSegment& b,
-                           const std::function<bool(KeyframeId)>& is_gone) {
+                           const std::function<bool(KeyframeId)>& is_gone,
+                           std::shared_ptr<std::pmr::memory_resource> memory)
+    : memory_(std::move(memory)) {
   WAYMARK_CHECK(a.rows_.empty() || b.rows_.empty() ||
                 a.rows_.back().keyframe < b.rows_.front().keyframe);
   const std::vector<std::uint16_t> targets_a = keep_rows(a.rows_, is_gone, rows_);
   const std::vector<std::uint16_t> targets_b = keep_rows(b.rows_, is_gone, rows_);
   WAYMARK_CHECK(rows_.size() <= kMaxRows);
-  for (std::size_t i = 0; i < tables_.size(); ++i) {
-    tables_[i].entries =
-        merge_entries({a.tables_[i].entries, targets_a}, {b.tables_[i].entries, targets_b});
-    tables_[i].index();
+  std::pmr::memory_resource* const place =
+      memory_ ? memory_.get() : std::pmr::get_default_resource();
+  tables_.reserve(kNumPlaceTables);
+  for (std::size_t i = 0; i < kNumPlaceTables; ++i) {
+    tables_.emplace_back(
+        merge_entries({a.tables_[i].entries, targets_a}, {b.tables_[i].entries, targets_b}, place));
   }
+}
+
+PlaceSegment::Table::Table(std::pmr::vector<std::uint64_t> ascending)
+    : entries(std::move(ascending)), directory(entries.get_allocator()) {
+  index();
 }
 
 void PlaceSegment::Table::index() {
@@ -159,7 +170,7 @@ std::size_t PlaceSegment::look_around(std::size_t table,
                                       PlaceKey key,
                                       std::size_t window,
                                       Window& differences) const {
-  const std::vector<std::uint64_t>& entries = tables_[table].entries;
+  const std::pmr::vector<std::uint64_t>& entries = tables_[table].entries;
   const std::uint64_t entry = key << kPlaceRowBits;
   const std::size_t place = tables_[table].lower_bound(entry);
   const std::size_t count = std::min(window, entries.size());

@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <memory_resource>
 #include <span>
 #include <vector>
 
@@ -57,14 +58,16 @@ class PlaceSegment {
   using Window = std::array<PlaceDifference, kMaxWindow>;
 
   /// Of no keyframe.
-  PlaceSegment() = default;
+  PlaceSegment() : tables_(kNumPlaceTables) {}
 
   PlaceSegment(const PlaceRow& row, std::span<const Descriptor> descriptors);
 
-  /// The rows of a, then those of b, which are younger, without those that are gone.
+  /// The rows of a, then those of b, which are younger, without those that are gone. The tables lie
+  /// in memory; null: on the heap.
   PlaceSegment(const PlaceSegment& a,
                const PlaceSegment& b,
-               const std::function<bool(KeyframeId)>& is_gone);
+               const std::function<bool(KeyframeId)>& is_gone,
+               std::shared_ptr<std::pmr::memory_resource> memory = nullptr);
 
   /// Ascending by keyframe.
   std::span<const PlaceRow> rows() const { return rows_; }
@@ -80,17 +83,22 @@ class PlaceSegment {
 
  private:
   struct Table {
-    std::vector<std::uint64_t> entries;
+    Table() = default;
+    /// The directory lies where the entries do.
+    explicit Table(std::pmr::vector<std::uint64_t> ascending);
+
+    std::pmr::vector<std::uint64_t> entries;
     /// Where the entries of each prefix of directory_bits begin, and where the last one's end.
-    std::vector<std::uint32_t> directory = {0, 0};
+    std::pmr::vector<std::uint32_t> directory = {0, 0};
     int directory_bits = 0;
 
     void index();
     std::size_t lower_bound(std::uint64_t entry) const;
   };
 
+  std::shared_ptr<std::pmr::memory_resource> memory_;  ///< Of the tables; null: the heap.
   std::vector<PlaceRow> rows_;
-  std::array<Table, kNumPlaceTables> tables_;
+  std::vector<Table> tables_;  ///< kNumPlaceTables.
 };
 
 /// Every k-th descriptor where there are more than a segment takes.

@@ -136,7 +136,7 @@ TEST(SettingsEffect, MinRangeBaselinesLeavesOutWhatIsNear) {
     input.depth = {};
     input.image1 = frame.images[1].view();
     system.feed(input);
-    const std::vector<float>& ranges = system.details().features->range_m;
+    const FeatureArray<float>& ranges = system.details().features->range_m;
     return std::count_if(ranges.begin(), ranges.end(), [](float range) { return range > 0.0f; });
   };
   // All of the room is nearer than 200 times 0.1 m.
@@ -181,12 +181,12 @@ TEST(SettingsEffect, DepthLagAddsToThatOfTheTimeStamps) {
     }
     return system.details().features->range_m;
   };
-  const auto share_alike = [](const std::vector<float>& a, const std::vector<float>& b) {
+  const auto share_alike = [](const FeatureArray<float>& a, const FeatureArray<float>& b) {
     int num_alike = 0;
     for (std::size_t i = 0; i < a.size(); ++i) num_alike += std::abs(a[i] - b.at(i)) < 1e-4f;
     return num_alike / static_cast<double>(a.size());
   };
-  const std::vector<float> later = ranges_m("depth.lag_ms=20", 0);
+  const FeatureArray<float> later = ranges_m("depth.lag_ms=20", 0);
   EXPECT_GT(share_alike(later, ranges_m("depth.lag_ms=0", 20'000'000)), 0.95);
   EXPECT_LT(share_alike(later, ranges_m("depth.lag_ms=0", 0)), 0.5);
 }

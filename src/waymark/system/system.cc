@@ -2,7 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/system/system.h"
 
-#include <algorithm>
 #include <chrono>
 
 #include "waymark/base/check.h"
@@ -63,6 +62,7 @@ class System::Impl {
   std::size_t max_prepared() const { return ahead_.capacity(); }
   void finish();
   void drop_seen_through();
+  void keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory);
   void set_mapping(bool is_on);
   /// The same, from its beginning and with an empty map.
   std::unique_ptr<Impl> begin_anew() const;
@@ -116,6 +116,7 @@ class System::Impl {
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   int num_relocalizations_ = 0;
   bool is_finished_ = false;
+  std::shared_ptr<std::pmr::memory_resource> map_memory_;  ///< Null: the heap.
 
   // The mapper's thread, and the caller's once that has ended.
   GlobalMapper mapper_;
@@ -209,6 +210,12 @@ void System::Impl::make_tracker(bool has_range) {
   tracker_->set_purpose(purpose_);
 }
 
+void System::Impl::keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+  WAYMARK_CHECK(!tracker_);  // The mapper's thread has nothing to do yet.
+  mapper_.keep_in(memory);
+  map_memory_ = std::move(memory);
+}
+
 void System::Impl::set_mapping(bool is_on) {
   purpose_ = is_on ? TrackingPurpose::kMapping : TrackingPurpose::kLocalizing;
   if (tracker_) tracker_->set_purpose(purpose_);
@@ -218,6 +225,7 @@ std::unique_ptr<System::Impl> System::Impl::begin_anew() const {
   WAYMARK_CHECK(!is_finished_);
   auto anew = std::make_unique<Impl>(*given_rig_, settings_, timing_, nullptr, num_threads_);
   anew->purpose_ = purpose_;
+  anew->keep_map_in(map_memory_);
   return anew;
 }
 
@@ -334,18 +342,11 @@ void System::Impl::drop_seen_through() {
   visible_ = publish();
 }
 
-/// Of keyframes by the frames around them, of which those after them were not there yet.
 void System::Impl::tell_motions() {
   if (!settings_.calibration.is_refined() && given_rig_->cameras[0].readout_s == 0.0) return;
-  const std::shared_ptr<const Map> map = mapper_.snapshot().map;
-  map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.frame < memory_.first()) return;
-    if (auto motion = memory_.motion_in(keyframe.frame, *map)) {
-      motion->inverse_range =
-          median_inverse_range(*map, keyframe.rig_from_world, keyframe.landmarks);
-      mapper_.set_motion(id, *motion);
-    }
-  });
+  for (const auto& [id, motion] : list_motions(memory_, *mapper_.snapshot().map)) {
+    mapper_.set_motion(id, motion);
+  }
 }
 
 MarkerReport System::Impl::markers() const {
@@ -382,6 +383,9 @@ void System::prepare(const FrameImages& images, std::shared_ptr<const void> owne
 std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
 void System::drop_seen_through() { impl_->drop_seen_through(); }
+void System::keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+  impl_->keep_map_in(std::move(memory));
+}
 void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }

@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <memory>
+#include <memory_resource>
 #include <optional>
 #include <string>
 #include <thread>
@@ -96,6 +97,10 @@ class System {
 
   /// Of the frame fed last; empty before the first.
   const FrameDetails& details() const;
+
+  /// Has the map keep what only searching and joining need (features, the index of places) in this
+  /// memory, such as a DiskMemory. Before the first frame. No result depends on it.
+  void keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory);
 
   /// Mapping off: the camera is followed in the map, which stays as it is. On at first.
   void set_mapping(bool is_on);

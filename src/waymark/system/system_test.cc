@@ -7,6 +7,8 @@
 #include <algorithm>
 
 #include "waymark/base/check.h"
+#include "waymark/base/disk_memory.h"
+#include "waymark/base/testing/temporary_folder.h"
 #include "waymark/system/test_sequence.h"
 
 namespace waymark {
@@ -96,6 +98,25 @@ TEST(System, InlineAndLockstepGiveTheSameBits) {
               threaded.trajectory[i].world_from_rig.matrix());
   }
   EXPECT_EQ(alone.statistics.num_landmarks, threaded.statistics.num_landmarks);
+}
+
+TEST(System, MapsThatLieOnDiskGiveTheSameBits) {
+  const Played alone = play(Timing::kInline);
+  const testing::TemporaryFolder folder;
+  const auto memory = std::make_shared<DiskMemory>(folder.path(), 0);
+  System system(small_rig(), small_settings(), Timing::kLockstep);
+  system.keep_map_in(memory);
+  for (const SimulatedFrame& frame : frames()) {
+    system.feed(input_of(frame));
+    memory->let_go();
+  }
+  EXPECT_GT(memory->num_bytes(), std::size_t{30'000} * system.map()->keyframes().size());
+  system.finish();
+  const std::vector<TrajectoryFrame> trajectory = system.trajectory();
+  ASSERT_EQ(trajectory.size(), alone.trajectory.size());
+  for (std::size_t i = 0; i < trajectory.size(); ++i) {
+    EXPECT_EQ(trajectory[i].world_from_rig.matrix(), alone.trajectory[i].world_from_rig.matrix());
+  }
 }
 
 TEST(System, FollowsInRealTime) {

@@ -4,6 +4,8 @@
 
 #include <cstdint>
 
+#include "waymark/track/last_frame.h"
+
 namespace waymark {
 
 std::vector<TrajectoryFrame> list_poses(const TrajectoryMemory& memory, const Map& map) {
@@ -30,6 +32,19 @@ std::vector<FrameState> list_states(const TrajectoryMemory& memory) {
   std::vector<FrameState> states;
   for (const TrajectoryMemory::Entry& entry : memory.entries()) states.push_back(entry.state);
   return states;
+}
+
+std::vector<std::pair<KeyframeId, RigMotion>> list_motions(const TrajectoryMemory& memory,
+                                                           const Map& map) {
+  std::vector<std::pair<KeyframeId, RigMotion>> motions;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (keyframe.frame < memory.first()) return;
+    auto motion = memory.motion_in(keyframe.frame, map);
+    if (!motion) return;
+    motion->inverse_range = median_inverse_range(map, keyframe.rig_from_world, keyframe.landmarks);
+    motions.emplace_back(id, *motion);
+  });
+  return motions;
 }
 
 }  // namespace waymark

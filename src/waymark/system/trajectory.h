@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <utility>
 #include <vector>
 
 #include "waymark/map/map.h"
@@ -15,5 +16,10 @@ std::vector<TrajectoryFrame> list_poses(const TrajectoryMemory& memory, const Ma
 
 /// That of each frame so far, as it is known by now.
 std::vector<FrameState> list_states(const TrajectoryMemory& memory);
+
+/// How the rig moved at the keyframes of this session, by the frames around them, of which those
+/// after them were not there when they became keyframes.
+std::vector<std::pair<KeyframeId, RigMotion>> list_motions(const TrajectoryMemory& memory,
+                                                           const Map& map);
 
 }  // namespace waymark

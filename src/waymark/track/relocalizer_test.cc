@@ -80,7 +80,7 @@ TEST_F(RelocalizerTest, PrefersThePlaceThatExplainsMore) {
   scene_.landmark_of_point.clear();
   places_ = PlaceIndex();
   for (const std::uint32_t id : {0u, 1u, 2u, 3u}) {
-    const std::vector<Descriptor>& all = scene_.seen[id].features->descriptors;
+    const FeatureArray<Descriptor>& all = scene_.seen[id].features->descriptors;
     places_.add(KeyframeId{id}, SubmapId{0}, std::span(all).first(all.size() / 4));
   }
   add_keyframes();

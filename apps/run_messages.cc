@@ -1,0 +1,69 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "run_messages.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <string>
+
+#include "waymark/report/advice.h"
+#include "waymark/session/quality.h"
+
+namespace waymark {
+namespace {
+
+/// A line for all, and one for each that was left out.
+void report_markers(Reporter& reporter, const MarkerSummary& markers) {
+  const auto used = std::ranges::count(markers.markers, "used", &MarkerSummary::Entry::verdict);
+  std::string line = fmt::format("{} markers found, {} used", markers.markers.size(), used);
+  if (markers.frame == "none") line += "; they do not tell the scale of the map";
+  if (markers.frame == "scale") line += "; the map is in metres by them";
+  if (markers.frame == "marker 0") line += "; the map is in metres, in the frame of marker 0";
+  if (markers.frame == "surveyed") {
+    line += fmt::format("; the map is where the surveyed ones are, these {:.3f} m off (rms)",
+                        markers.survey_rms_m);
+  }
+  reporter.info(line);
+  for (const MarkerSummary::Entry& entry : markers.markers) {
+    if (!entry.fault.empty()) reporter.info(entry.fault);
+  }
+}
+
+}  // namespace
+
+void report_results(Reporter& reporter,
+                    const SessionResults& results,
+                    const std::filesystem::path& out) {
+  const RunSummary& summary = results.summary;
+  const FrameCounts& counts = summary.counts;
+  reporter.info(
+      fmt::format("{} of {} frames have a pose ({} unreadable, {} dropped), lost {} times; {} "
+                  "keyframes, {} landmarks, {} sub-maps",
+                  counts.tracked,
+                  counts.frames,
+                  counts.unreadable,
+                  counts.dropped,
+                  counts.lost_count,
+                  summary.keyframes,
+                  summary.landmarks,
+                  summary.submaps));
+  report_reasons(reporter, results.table, summary);
+  if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
+  if (summary.markers) report_markers(reporter, *summary.markers);
+  if (!results.ego_mask.values.empty()) {
+    reporter.info(
+        fmt::format("{:.1f} % of the image moves along with the camera and has no features: {}",
+                    100.0 * summary.moves_along.value_or(0.0),
+                    (out / "view_mask.png").string()));
+  }
+  const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
+  reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
+                            format_duration(summary.wall_s),
+                            1e3 * summary.wall_s / num_frames,
+                            summary.tracking_ms.mean,
+                            out.string()));
+  report_advice(reporter, summary);
+}
+
+}  // namespace waymark
