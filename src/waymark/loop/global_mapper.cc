@@ -76,7 +76,7 @@ void GlobalMapper::add(const NewKeyframe& message) {
   update_places(changes);
   look_at_markers(changes.added.back());
   if (!settings_.enabled || close_alike(changes.added.back())) return;
-  if (!unadjusted_.is_valid()) consolidate_some(kNumConsolidatedPerKeyframe);
+  if (!has_loop_task()) consolidate_some(kNumConsolidatedPerKeyframe);
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {
@@ -195,12 +195,13 @@ GlobalAdjustment AdjustmentTask::adjust() const {
 std::optional<AdjustmentTask> GlobalMapper::take_task() {
   const bool is_calibration_due =
       mapper_.is_calibrating() && mapper_.map().keyframes().size() >= next_calibration_;
-  if (!unadjusted_.is_valid() && !is_calibration_due) return std::nullopt;
+  if (!has_loop_task() && !is_calibration_due) return std::nullopt;
   AdjustmentTask task;
   task.is_for_calibration = !unadjusted_.is_valid();
   task.submap = task.is_for_calibration
                     ? submaps_by_size(mapper_.map()).front()
                     : mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
+  if (!task.is_for_calibration) pace_.note(mapper_.map().keyframes().size());
   task.num_closures = num_closures_;
   task.num_placements = num_placements_;
   if (mapper_.is_calibrating()) {
@@ -215,6 +216,7 @@ void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adj
   if (task.num_placements != num_placements_) {
     if (!task.is_for_calibration && !unadjusted_.is_valid()) {
       unadjusted_ = mapper_.map().resolve(task.submap);
+      pace_.hurry();
     }
     return;
   }
@@ -269,6 +271,7 @@ void GlobalMapper::look_at_markers(KeyframeId newest) {
   // What is being adjusted is of another frame; what comes next has the markers with it.
   ++num_placements_;
   unadjusted_ = submap;
+  pace_.hurry();
 }
 
 /// The end: places all sub-maps, the largest first, whose markers then are known to the others, and

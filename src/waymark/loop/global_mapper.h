@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/loop/adjustment_pace.h"
 #include "waymark/loop/odometry.h"
 #include "waymark/loop/settings.h"
 #include "waymark/loop/verify.h"
@@ -53,11 +54,13 @@ class GlobalMapper {
   void keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
-  /// The adjustment that a loop made necessary, once for each, or that may tell the calibration;
-  /// nothing where there is none.
+  /// The adjustment that a loop made necessary, see AdjustmentPace, or that may tell the
+  /// calibration; nothing where there is none.
   std::optional<AdjustmentTask> take_task();
   /// Whether there is one that a loop made necessary.
-  bool has_loop_task() const { return unadjusted_.is_valid(); }
+  bool has_loop_task() const {
+    return unadjusted_.is_valid() && pace_.is_due(mapper_.map().keyframes().size());
+  }
   /// See Mapper.
   void set_motion(KeyframeId id, const RigMotion& motion) { mapper_.set_motion(id, motion); }
   /// Takes in what a task gave, carried over where a loop was closed meanwhile, or not at all where
@@ -108,6 +111,7 @@ class GlobalMapper {
   PlaceIndex places_;
   RevisitVerifier verifier_;
   ProjectionMatcher projection_;
+  AdjustmentPace pace_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
   std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   Odometry odometry_;

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <algorithm>
+#include <ctime>
 #include <memory>
+#include <memory_resource>
 #include <optional>
 #include <utility>
 #include <variant>
@@ -18,6 +20,13 @@ namespace waymark {
 /// behind extraction, on one thread. What is found out shows in the next frame.
 class TownSession {
  public:
+  /// Processor time of a frame in seconds, of all threads.
+  struct Times {
+    double track_s = 0.0;
+    double map_s = 0.0;     ///< 0 where it became no keyframe.
+    double adjust_s = 0.0;  ///< Of everything; 0 where that was not due.
+  };
+
   TownSession(std::shared_ptr<const Rig> rig, bool has_range)
       : tracker_(rig, has_range, TrackingSettings{}, 1),
         mapper_(rig, MappingSettings{}, LoopSettings{}, {.refine = "off"}, 1),
@@ -37,14 +46,25 @@ class TownSession {
     StageTimes times;
     const Frame frame{FrameId{num_frames_}, 50'000'000 * std::int64_t{num_frames_}, seen.features};
     ++num_frames_;
-    TrackOutcome outcome = tracker_.track(frame, visible_, times);
+    TrackOutcome outcome;
+    times_ = {};
+    add_time(times_.track_s, [&] { outcome = tracker_.track(frame, visible_, times); });
     if (!outcome.message) return outcome;
-    std::visit([&](const auto& message) { mapper_.add(message); }, *outcome.message);
+    add_time(times_.map_s, [&] {
+      std::visit([&](const auto& message) { mapper_.add(message); }, *outcome.message);
+    });
     if (const std::optional<AdjustmentTask> task = mapper_.take_task()) {
-      mapper_.apply(*task, task->adjust());
+      add_time(times_.adjust_s, [&] { mapper_.apply(*task, task->adjust()); });
     }
-    visible_ = mapper_.snapshot();
+    add_time(times_.map_s, [&] { visible_ = mapper_.snapshot(); });
     return outcome;
+  }
+
+  /// Of the frame that was tracked last.
+  const Times& times() const { return times_; }
+  /// See GlobalMapper; before the first frame.
+  void keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory) {
+    mapper_.keep_in(memory);
   }
 
   void finish() {
@@ -57,9 +77,17 @@ class TownSession {
   int num_loops() const { return mapper_.num_loops(); }
 
  private:
+  template <class Step>
+  static void add_time(double& seconds, const Step& step) {
+    const std::clock_t before = std::clock();
+    step();
+    seconds += static_cast<double>(std::clock() - before) / CLOCKS_PER_SEC;
+  }
+
   Tracker tracker_;
   GlobalMapper mapper_;
   MapSnapshot visible_;
+  Times times_;
   std::uint32_t num_frames_ = 0;
 };
 
