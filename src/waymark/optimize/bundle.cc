@@ -57,26 +57,30 @@ double squared_residual(const BundleProblem& problem, std::size_t index) {
   return is_ahead(seen, observation.bearing) ? squared : kGrossSquaredResidual;
 }
 
+/// What observations are worth where the problem has got to.
+struct JudgedObservations {
+  std::vector<double> squared_residuals;
+  std::vector<std::uint8_t> is_used;
+};
+
 /// Standard deviation of a residual component as the used observations show it: the median length
 /// of Gaussian residuals in the plane is 1.177 sigma. Robust as a median is, so that the loss
 /// narrows on what is noise and leaves out what is wrong.
-std::optional<double> measured_noise_px(const BundleProblem& problem,
-                                        const std::vector<std::uint8_t>& is_used) {
+std::optional<double> measured_noise_px(const JudgedObservations& judged) {
   std::vector<double> squared;
-  for (std::size_t i = 0; i < is_used.size(); ++i) {
-    if (is_used[i]) squared.push_back(squared_residual(problem, i));
+  squared.reserve(judged.squared_residuals.size());
+  for (std::size_t i = 0; i < judged.is_used.size(); ++i) {
+    if (judged.is_used[i]) squared.push_back(judged.squared_residuals[i]);
   }
   if (squared.empty()) return std::nullopt;
   return std::sqrt(median(squared)) / 1.177;
 }
 
 /// Options of a round: the loss as narrow as the noise allows.
-BundleOptions narrowed(const BundleOptions& options,
-                       const BundleProblem& problem,
-                       const std::vector<std::uint8_t>& is_used) {
+BundleOptions narrowed(const BundleOptions& options, const JudgedObservations& judged) {
   BundleOptions result = options;
   if (!options.follows_noise) return result;
-  if (const auto noise_px = measured_noise_px(problem, is_used)) {
+  if (const auto noise_px = measured_noise_px(judged)) {
     result.huber_px = std::min(kHuberSigmas * std::max(*noise_px, kMinNoisePx), options.huber_px);
   }
   return result;
@@ -130,28 +134,31 @@ Rigid3 BundleCalibration::cam_from_rig(std::size_t camera, const Eigen::VectorXd
 BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options) {
   check(problem);
   const std::size_t num_observations = problem.observations.size();
-  std::vector<std::uint8_t> is_used(num_observations);
+  JudgedObservations judged{std::vector<double>(num_observations),
+                            std::vector<std::uint8_t>(num_observations)};
   const auto judge = [&](double max_squared_residual) {
     for (std::size_t i = 0; i < num_observations; ++i) {
-      const BundleObservation& observation = problem.observations[i];
-      is_used[i] =
-          squared_residual(problem, i) <= max_squared_residual && has_usable_range(observation);
+      judged.squared_residuals[i] = squared_residual(problem, i);
+      judged.is_used[i] = judged.squared_residuals[i] <= max_squared_residual &&
+                          has_usable_range(problem.observations[i]);
     }
   };
   judge(std::numeric_limits<double>::max());
   BundleResult result;
   for (int round = 0; round < options.num_rounds; ++round) {
-    BundleOptions round_options = narrowed(options, problem, is_used);
+    BundleOptions round_options = narrowed(options, judged);
     round_options.with_evidence = round + 1 == options.num_rounds;
-    const BundleRound done = minimize_with_schur(problem, is_used, round_options);
+    const BundleRound done = minimize_with_schur(problem, judged.is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
     result.final_cost = done.final_cost;
     result.num_iterations += done.num_iterations;
     judge(options.gate_px * options.gate_px);
   }
-  result.noise_px = measured_noise_px(problem, is_used).value_or(0.0);
+  result.noise_px = measured_noise_px(judged).value_or(0.0);
   result.is_outlier.resize(num_observations);
-  for (std::size_t i = 0; i < num_observations; ++i) result.is_outlier[i] = !is_used[i];
+  for (std::size_t i = 0; i < num_observations; ++i) {
+    result.is_outlier[i] = !judged.is_used[i];
+  }
   return result;
 }
 

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/optimize/bundle_kernel.h"
 #include "waymark/optimize/calibration_border.h"
 #include "waymark/optimize/residual.h"
 #include "waymark/optimize/schur_solver.h"
@@ -88,6 +89,8 @@ class SchurSolver {
     }
     candidate_ = state_;
     allocate();
+    // A calibration that is unknown is for one observation after the other.
+    if (!border_) arrays_ = gather_bundle_observations(problem, plan_.observations, first_camera_);
   }
 
   BundleRound minimize();
@@ -128,6 +131,8 @@ class SchurSolver {
   double loss(std::size_t i, const BundleState& state) const;
   double cost(const BundleState& state);
   void linearize();
+  void linearize_one_by_one();
+  static BundlePlaces places_of(const BundleState& state);
   template <int kRows>
   void accumulate(const ResidualRows<kRows>& rows,
                   std::size_t entry,
@@ -163,6 +168,8 @@ class SchurSolver {
   const BundleOptions& options_;
   const SchurPlan plan_;
   std::vector<std::size_t> first_camera_;  // Of the rig of each pose, in BundleState::cameras.
+  BundleArrays arrays_;                    // Of the observations, where there is no border_.
+  std::vector<double> padded_poses_;
   BundleState state_;
   BundleState candidate_;
   NormalBlocks blocks_;

@@ -1,10 +1,24 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <type_traits>
 #include <utility>
 
 #include "waymark/optimize/schur_equations.h"
 
 namespace waymark {
+namespace {
+
+/// Of matrices one behind the other.
+template <class Matrices>
+auto numbers(Matrices& matrices) {
+  using Matrix = typename Matrices::value_type;
+  using Number = std::conditional_t<std::is_const_v<Matrices>, const double, double>;
+  static_assert(std::is_same_v<Matrix, RigidMatrix> ? sizeof(Matrix) == 12 * sizeof(double)
+                                                    : sizeof(Matrix) % sizeof(double) == 0);
+  return reinterpret_cast<Number*>(matrices.data());
+}
+
+}  // namespace
 
 void SchurSolver::list_cameras() {
   std::vector<std::pair<const Rig*, std::size_t>> listed;
@@ -61,8 +75,16 @@ double SchurSolver::loss(std::size_t i, const BundleState& state) const {
   return sum;
 }
 
+BundlePlaces SchurSolver::places_of(const BundleState& state) {
+  return {numbers(state.matrices), numbers(state.cameras), numbers(state.points)};
+}
+
 double SchurSolver::cost(const BundleState& state) {
   double sum = sum_over(plan_.observations.size(), [&](std::size_t begin, std::size_t end) {
+    if (!border_) {
+      const BundleLoss loss{options_.huber_px, options_.range_huber};
+      return sum_bundle_losses(arrays_, places_of(state), loss, begin, end);
+    }
     double part = 0.0;
     for (std::size_t k = begin; k < end; ++k) part += loss(plan_.observations[k], state);
     return part;
@@ -125,10 +147,29 @@ void SchurSolver::accumulate(const ResidualRows<kRows>& rows,
 }
 
 void SchurSolver::linearize() {
+  for (Matrix63d& link : blocks_.links) link.setZero();
+  if (border_) return linearize_one_by_one();
+  padded_poses_.assign(kPaddedPoseSize * plan_.num_slots, 0.0);
+  sum_bundle_equations(arrays_,
+                       places_of(state_),
+                       {options_.huber_px, options_.range_huber},
+                       {plan_.first_observation, plan_.link_of_observation, plan_.slot_of_link},
+                       {padded_poses_.data(),
+                        numbers(blocks_.points),
+                        numbers(blocks_.point_gradient),
+                        numbers(blocks_.links)});
+  using Padded = Eigen::Map<const Eigen::Matrix<double, kPaddedPoseRows, 7>>;
+  for (std::size_t slot = 0; slot < plan_.num_slots; ++slot) {
+    const Padded sums(padded_poses_.data() + kPaddedPoseSize * slot);
+    blocks_.poses[slot] << sums.topLeftCorner<3, 6>(), sums.block<3, 6>(4, 0);
+    blocks_.pose_gradient[slot] << sums.col(6).head<3>(), sums.col(6).segment<3>(4);
+  }
+}
+
+void SchurSolver::linearize_one_by_one() {
   for (Matrix6d& block : blocks_.poses) block.setZero();
   for (Vector6d& gradient : blocks_.pose_gradient) gradient.setZero();
-  for (Matrix63d& link : blocks_.links) link.setZero();
-  if (border_) border_->begin(*problem_.calibration, state_.calibration);
+  border_->begin(*problem_.calibration, state_.calibration);
   for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) {
     blocks_.points[entry].setZero();
     blocks_.point_gradient[entry].setZero();
