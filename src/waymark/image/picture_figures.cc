@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <cstdlib>
 #include <vector>
 
@@ -16,31 +17,33 @@ constexpr std::size_t kMeanOver = 9;
 
 /// Sums over pixels of 2 x 2 along a line, in four times grey values.
 struct LineSums {
-  double num = 0.0;
-  double sum = 0.0;
-  double squares = 0.0;
-  double steps = 0.0;    ///< Of neighbours.
-  double smeared = 0.0;  ///< What a mean along the line takes of these.
+  std::int64_t num = 0;
+  std::int64_t sum = 0;
+  std::int64_t squares = 0;
+  std::int64_t steps = 0;    ///< Of neighbours, times kMeanOver.
+  std::int64_t smeared = 0;  ///< What a mean along the line takes of these.
 
   void add(const std::vector<int>& line);
-  double blur() const { return steps > 0.0 ? std::clamp(1.0 - smeared / steps, 0.0, 1.0) : 1.0; }
+  double blur() const {
+    if (steps == 0) return 1.0;
+    const double left = static_cast<double>(smeared) / static_cast<double>(steps);
+    return std::clamp(1.0 - left, 0.0, 1.0);
+  }
 };
 
 void LineSums::add(const std::vector<int>& line) {
   for (const int value : line) {
     sum += value;
-    squares += static_cast<double>(value) * value;
+    squares += value * value;
   }
-  num += static_cast<double>(line.size());
+  num += static_cast<std::int64_t>(line.size());
   // The difference of neighbouring means over a window is that of what enters and what leaves it.
   constexpr std::size_t kBefore = kMeanOver / 2 + 1;
   constexpr std::size_t kAfter = kMeanOver / 2;
   for (std::size_t i = kBefore; i + kAfter < line.size(); ++i) {
-    const double step = std::abs(line[i] - line[i - 1]);
-    const double mean_step =
-        std::abs(line[i + kAfter] - line[i - kBefore]) / static_cast<double>(kMeanOver);
+    const int step = static_cast<int>(kMeanOver) * std::abs(line[i] - line[i - 1]);
     steps += step;
-    smeared += std::max(0.0, step - mean_step);
+    smeared += std::max(0, step - std::abs(line[i + kAfter] - line[i - kBefore]));
   }
 }
 
@@ -73,9 +76,9 @@ PictureFigures measure_picture(ImageView image) {
     for (int row = 0; row < height; ++row) line.push_back(sum_of_four(image, x, 2 * row));
     columns.add(line);
   }
-  const double num = rows.num + columns.num;
-  const double mean = (rows.sum + columns.sum) / num;
-  const double variance = (rows.squares + columns.squares) / num - mean * mean;
+  const auto num = static_cast<double>(rows.num + columns.num);
+  const double mean = static_cast<double>(rows.sum + columns.sum) / num;
+  const double variance = static_cast<double>(rows.squares + columns.squares) / num - mean * mean;
   figures.brightness = rounded_to_byte(0.25 * mean);
   figures.contrast = rounded_to_byte(0.25 * std::sqrt(std::max(0.0, variance)));
   figures.blur_percent = rounded_to_byte(100.0 * std::max(rows.blur(), columns.blur()));
