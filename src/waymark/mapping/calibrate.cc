@@ -29,6 +29,8 @@ constexpr double kMinChange = 2.0;
 constexpr double kMaxDisagreement = 6.0;
 /// By less than this part of its standard deviation.
 constexpr double kStill = 0.1;
+/// What is below this part of what is asked for, and moves by less than is left, will stay there.
+constexpr double kPlainly = 0.5;
 /// More tell hardly more, and take longer.
 constexpr std::size_t kMaxObservations = 12000;
 
@@ -127,10 +129,12 @@ bool adjust_once(const CalibrationParameters& parameters,
   return true;
 }
 
-/// Adjusts until the calibration moves no more; whether there is one.
+/// Adjusts until the calibration moves no more, or until it is plain that no change comes near to
+/// so many standard deviations; whether there is one.
 bool adjust(const CalibrationParameters& parameters,
             const std::vector<CameraMeasurements>& cameras,
             const std::vector<std::uint8_t>& is_free,
+            double min_sigmas,
             BundleProblem& problem,
             Trial& trial) {
   for (int pass = 0; pass < kMaxPasses; ++pass) {
@@ -138,6 +142,9 @@ bool adjust(const CalibrationParameters& parameters,
     if (!adjust_once(parameters, cameras, is_free, problem, trial)) return false;
     const Eigen::ArrayXd moved = (trial.change - before).array().abs() / trial.sigma.array();
     if (moved.maxCoeff() < kStill) break;
+    // The first pass knows nothing of the noise yet.
+    const Eigen::ArrayXd changed = trial.change.array().abs() / trial.sigma.array();
+    if (pass > 0 && (changed + moved).maxCoeff() < kPlainly * min_sigmas) break;
   }
   return trial.variance < std::pow(kMaxDisagreement * trial.noise_px, 2);
 }
@@ -292,14 +299,15 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   const double inflation = std::max(1.0, kManyKeyframes / num_keyframes);
   Trial trial = start;
   BundleProblem adjusted = part.problem;
-  if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
+  const double min_sigmas = known.is_always_refined ? 0.0 : kMinSigmas * inflation;
+  if (!adjust(parameters, cameras, is_free, min_sigmas, adjusted, trial)) return std::nullopt;
   // What the images do not tell stays as given, or it would take up errors of other kinds.
   if (!known.is_always_refined) {
-    is_free = contradicted(known.parameters, trial, kMinSigmas * inflation, is_free);
+    is_free = contradicted(known.parameters, trial, min_sigmas, is_free);
     if (std::ranges::count(is_free, 1) == 0) return std::nullopt;
     adjusted = part.problem;
     trial = start;
-    if (!adjust(parameters, cameras, is_free, adjusted, trial)) return std::nullopt;
+    if (!adjust(parameters, cameras, is_free, 0.0, adjusted, trial)) return std::nullopt;
   }
   if (largest_change(trial, known, is_free) < kMinChange) return std::nullopt;
   problem.rig_from_world = adjusted.rig_from_world;

@@ -45,15 +45,15 @@ void CalibrationBorder::eliminate_point(std::size_t point,
   for (Eigen::Index i = 0; i < eliminated.cols(); ++i) {
     eliminated.col(i) = half * eliminated.col(i).eval();
   }
-  reduced_information_.noalias() -= eliminated.transpose() * eliminated;
-  reduced_gradient_.noalias() -= eliminated.transpose() * gradient;
+  reduced_information_ -= eliminated.transpose().lazyProduct(eliminated);
+  reduced_gradient_ -= eliminated.transpose().lazyProduct(gradient);
 }
 
 void CalibrationBorder::eliminate_link(std::size_t slot,
                                        std::size_t point,
                                        const Eigen::Matrix<double, 6, 3>& eliminated) {
-  reduced_poses_.middleRows<6>(static_cast<Eigen::Index>(6 * slot)).noalias() -=
-      eliminated * points_.middleCols(column(point), gradient_.size());
+  reduced_poses_.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) -=
+      eliminated.lazyProduct(points_.middleCols(column(point), gradient_.size()));
 }
 
 bool CalibrationBorder::solve(const BlockCholesky& poses, Eigen::VectorXd& gradient) {

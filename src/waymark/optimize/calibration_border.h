@@ -35,11 +35,12 @@ class CalibrationBorder {
            const ByPoint& by_point) {
     const auto first = static_cast<Eigen::Index>(first_parameter);
     const Eigen::Index count = by_calibration.cols();
-    information_.block(first, first, count, count).noalias() +=
-        by_calibration.transpose() * by_calibration;
-    gradient_.segment(first, count).noalias() += by_calibration.transpose() * residual;
-    points_.middleCols(column(point) + first, count).noalias() +=
-        by_point.transpose() * by_calibration;
+    // Of two or three rows: what makes large products fast makes these slow.
+    information_.block(first, first, count, count) +=
+        by_calibration.transpose().lazyProduct(by_calibration);
+    gradient_.segment(first, count) += by_calibration.transpose().lazyProduct(residual);
+    points_.middleCols(column(point) + first, count) +=
+        by_point.transpose().lazyProduct(by_calibration);
   }
   template <class ByPose>
   void add_pose(std::size_t first_parameter,
@@ -50,8 +51,7 @@ class CalibrationBorder {
         .block(static_cast<Eigen::Index>(6 * slot),
                static_cast<Eigen::Index>(first_parameter),
                6,
-               by_calibration.cols())
-        .noalias() += by_pose.transpose() * by_calibration;
+               by_calibration.cols()) += by_pose.transpose().lazyProduct(by_calibration);
   }
 
   /// Copies the equations for elimination, damped.
