@@ -119,16 +119,6 @@ Rigid3 Map::rig_from_world(KeyframeId reference,
   return rig_from_reference * keyframe->rig_from_world;
 }
 
-void Map::keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
-  feature_memory_ = std::move(memory);
-  std::vector<KeyframeId> ids;
-  keyframes_.for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
-  for (const KeyframeId id : ids) {
-    Keyframe& keyframe = keyframes_.edit(id);
-    keyframe.features = kept(std::move(keyframe.features));
-  }
-}
-
 SubmapId Map::add_submap(bool is_metric) {
   submaps_.push_back({is_metric, {}, {}});
   return SubmapId{static_cast<std::uint32_t>(submaps_.size() - 1)};

@@ -253,9 +253,11 @@ class Map {
   /// The living keyframe that stands for a possibly erased one.
   KeyframeId resolve(KeyframeId id) const;
 
-  /// Features, those that come in later, too, are copied into this memory; null: they stay where
-  /// they are. Frozen copies share what there is, maps thawed from them start without.
-  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory);
+  /// Features that come in from now on are copied into this memory; null: they stay where they are.
+  /// Frozen copies share what there is; maps thawed or restored start without.
+  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+    feature_memory_ = std::move(memory);
+  }
   /// Adds an empty sub-map.
   SubmapId add_submap(bool is_metric);
   /// Adds a keyframe without observations; the first of a sub-map becomes its root.

@@ -40,6 +40,17 @@ Mapper::Mapper(std::shared_ptr<const Rig> rig,
   calibration_.min_keyframes = kMinCalibrationKeyframes;
 }
 
+void Mapper::keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
+  feature_memory_ = std::move(memory);
+  map_.keep_features_in(feature_memory_);
+  std::vector<KeyframeId> ids;
+  map_.keyframes().for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
+  for (const KeyframeId id : ids) {
+    const Keyframe& keyframe = map_.keyframes().at(id);
+    map_.measure_keyframe(id, keyframe.rig, keyframe.features);
+  }
+}
+
 Mapper::Changes Mapper::add(const NewSubmap& message) {
   const SubmapId submap = map_.add_submap(message.is_metric);
   std::vector<KeyframeId> ids;

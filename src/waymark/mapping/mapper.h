@@ -24,10 +24,8 @@ class Mapper {
          const MappingSettings& settings,
          const CalibrationSettings& calibration = {});
 
-  /// See Map.
-  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory) {
-    map_.keep_features_in(std::move(memory));
-  }
+  /// Features, those that come in later, too, are copied into this memory.
+  void keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory);
   /// Goes on with a map made before, by whatever cameras; before the first message.
   void take_over(const Map& frozen) { map_ = Map::thaw(frozen); }
 
@@ -52,6 +50,7 @@ class Mapper {
   template <class Change>
   void change(Change&& change) {
     change(map_, dirty_);
+    map_.keep_features_in(feature_memory_);  // It may have been made anew.
     refresh_appearances();
   }
 
@@ -75,6 +74,7 @@ class Mapper {
   const MappingSettings settings_;
   const bool is_calibrating_;
   KnownCalibration calibration_;
+  std::shared_ptr<std::pmr::memory_resource> feature_memory_;  ///< Null: where they come from.
   Map map_;
   DirtyLandmarks dirty_;
   Probation probation_;

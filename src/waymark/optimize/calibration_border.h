@@ -47,11 +47,10 @@ class CalibrationBorder {
                 const ByCalibration& by_calibration,
                 std::size_t slot,
                 const ByPose& by_pose) {
-    poses_
-        .block(static_cast<Eigen::Index>(6 * slot),
-               static_cast<Eigen::Index>(first_parameter),
-               6,
-               by_calibration.cols()) += by_pose.transpose().lazyProduct(by_calibration);
+    poses_.block(static_cast<Eigen::Index>(6 * slot),
+                 static_cast<Eigen::Index>(first_parameter),
+                 6,
+                 by_calibration.cols()) += by_pose.transpose().lazyProduct(by_calibration);
   }
 
   /// Copies the equations for elimination, damped.
