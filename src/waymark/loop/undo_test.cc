@@ -13,7 +13,7 @@ namespace waymark {
 namespace {
 
 /// Median length of the residuals of all observations, in pixels of the level.
-double median_residual(const Map& map) {
+double median_residual_px(const Map& map) {
   std::vector<double> residuals;
   map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
     for (const Observation& observation : landmark.observations) {
@@ -61,7 +61,7 @@ TEST(UndoLoops, TakesBackPosesAndMerges) {
     LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), is_metric, Vector7d::Zero());
     for (int step = 0; step < kRound; ++step) scene.add_keyframe(step);
     Map& map = scene.map;
-    const double residual = median_residual(map);
+    const double residual = median_residual_px(map);
     const std::size_t num_before = num_observations(map);
     Odometry odometry;
     odometry.note(map);
@@ -76,7 +76,7 @@ TEST(UndoLoops, TakesBackPosesAndMerges) {
     EXPECT_EQ(map.broken_invariants(), "");
     EXPECT_TRUE(map.measured_loop_edges().empty());
     EXPECT_GT(map.landmarks().size(), num_merged);
-    EXPECT_LT(median_residual(map), 1.3 * residual);
+    EXPECT_LT(median_residual_px(map), 1.3 * residual);
     EXPECT_GT(num_observations(map), num_before * 9 / 10);
     for (const LandmarkId id : dirty) EXPECT_TRUE(!id.is_valid() || id < map.landmarks().end_id());
     map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {

@@ -10,8 +10,10 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
+#include "waymark/mapping/markers.h"
 #include "waymark/marker/detect.h"
 #include "waymark/marker/settings.h"
+#include "waymark/system/system.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/frame_verdict.h"
 #include "waymark/track/messages.h"
@@ -28,6 +30,11 @@ class MarkerFinder {
   bool is_on() const { return detector_.has_value(); }
   /// Name of the family that is looked for; empty: none.
   std::string family() const { return detector_ ? detector_->family().name() : ""; }
+
+  /// What a survey found of what is looked for; empty where nothing is.
+  MarkerReport report(const MarkerSurvey& survey) const {
+    return is_on() ? MarkerReport{family(), survey.markers, survey.frame} : MarkerReport{};
+  }
 
   /// A search in the images of a frame, those of a pair both, done once when it is called first;
   /// the images must be there then. Empty where nothing is looked for.

@@ -80,7 +80,9 @@ class System::Impl {
   const FocalCheck* focal_check() const;
   const FrameDetails& details() const { return details_; }
   const Image& ego_mask() const { return builder_.ego_mask(); }
-  MarkerReport markers() const;
+  MarkerReport markers() const {
+    return is_finished_ ? marker_finder_.report(mapper_.marker_survey()) : MarkerReport{};
+  }
 
  private:
   void make_tracker(bool has_range);
@@ -347,12 +349,6 @@ void System::Impl::tell_motions() {
   for (const auto& [id, motion] : list_motions(memory_, *mapper_.snapshot().map)) {
     mapper_.set_motion(id, motion);
   }
-}
-
-MarkerReport System::Impl::markers() const {
-  if (!is_finished_ || !marker_finder_.is_on()) return {};
-  const MarkerSurvey& survey = mapper_.marker_survey();
-  return {marker_finder_.family(), survey.markers, survey.frame};
 }
 
 SystemStatistics System::Impl::statistics() const {
