@@ -9,7 +9,7 @@ namespace waymark {
 
 /// Bad input from outside (file, setting, image, argument). The message reads
 /// "WHERE: what is wrong, what was expected" on one line: control characters that a name or a
-/// quotation brings along come out as \xNN.
+/// quotation brings along come out as their hexadecimal codes.
 class InputError : public std::runtime_error {
  public:
   /// where: file and line, setting or argument; what: what is wrong and what was expected.
