@@ -119,7 +119,7 @@ void choose_among_loops(benchmark::State& state) {
   Odometry odometry;
   odometry.note(map);
   std::vector<std::uint8_t> is_on;
-  for (auto _ : state) is_on = choose_loops(map, odometry, SubmapId{0}, loops.all, {});
+  for (auto _ : state) is_on = choose_loops(map, odometry, SubmapId{0}, loops.all, 0);
   std::vector<LoopEdge> chosen;
   double num_true = 0.0;
   for (std::size_t i = 0; i < is_on.size(); ++i) {

@@ -23,7 +23,7 @@ namespace {
 constexpr std::size_t kPageSize = 4096;
 /// The file grows by as much: more would take disk that is never used, less many mappings.
 constexpr std::size_t kGrowth = std::size_t{64} << 20;
-/// Between two looks at how much is in RAM. In this time some 10 MB are read back at most.
+/// Between two looks at how much is in RAM: short, as in this time what is read back has no limit.
 constexpr std::chrono::milliseconds kWatchPeriod(10);
 /// All is let go again only when this part of the limit has come back, or a process that needs more
 /// than the limit for other things would do nothing else.
@@ -41,8 +41,9 @@ int open_nameless_file(const std::filesystem::path& folder) {
     if (file >= 0) ::unlink(name.c_str());
   }
   if (file < 0) {
-    throw OutputError(folder.string(),
-                      std::string("cannot hold a file for --max-memory: ") + std::strerror(errno));
+    throw OutputError(
+        folder.string(),
+        std::string("cannot hold a file without a name, for memory: ") + std::strerror(errno));
   }
   return file;
 }
@@ -123,7 +124,7 @@ void DiskMemory::add_mapping(std::size_t min_size) {
   if (error != 0) {
     throw OutputError(
         folder_.string(),
-        std::string("no room for what --max-memory keeps out of memory: ") + std::strerror(error));
+        std::string("no room for a file that memory lies in: ") + std::strerror(error));
   }
   void* const begin = ::mmap(nullptr, size, PROT_READ | PROT_WRITE, MAP_SHARED, file_, offset);
   if (begin == MAP_FAILED) {

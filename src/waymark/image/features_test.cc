@@ -11,7 +11,7 @@
 namespace waymark {
 namespace {
 
-/// Counts what is in use, and gives each block a page of its own.
+/// Counts what is in use, and knows the last block.
 class CountingMemory : public std::pmr::memory_resource {
  public:
   std::size_t num_bytes = 0;

@@ -4,8 +4,6 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/base/median.h"
-#include "waymark/geometry/alignment.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/test_loop.h"
 #include "waymark/loop/verify.h"
@@ -21,35 +19,6 @@ Revisit walk_until_found(LoopScene& scene, int from_step) {
     if (step < from_step + 4) continue;
     if (const auto found = verifier.verify_alike(scene.map, scene.places, id)) return *found;
   }
-}
-
-/// Root mean square distance of the keyframes from the truth after the best similarity.
-double error_of(const LoopScene& scene) {
-  std::vector<Eigen::Vector3d> mapped, truth;
-  scene.map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    mapped.push_back(keyframe.rig_from_world.origin_in_source());
-    truth.push_back(LoopScene::true_pose(scene.steps[id.value]).translation);
-  });
-  const Sim3 truth_from_map = align_similarity(mapped, truth).value();
-  double sum = 0.0;
-  for (std::size_t i = 0; i < mapped.size(); ++i) {
-    sum += (truth_from_map * mapped[i] - truth[i]).squaredNorm();
-  }
-  return std::sqrt(sum / static_cast<double>(mapped.size()));
-}
-
-/// Median length of the residuals of all observations, in pixels of the level.
-double median_residual(const Map& map) {
-  std::vector<double> residuals;
-  map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
-    for (const Observation& observation : landmark.observations) {
-      const auto squared = squared_residual(map.keyframes().at(observation.keyframe),
-                                            observation.feature,
-                                            landmark.position_in_world);
-      residuals.push_back(squared ? std::sqrt(*squared) : 1e3);
-    }
-  });
-  return median(residuals);
 }
 
 Vector7d whole_drift(const Eigen::Vector3d& translation,
@@ -76,11 +45,11 @@ TEST_F(LoopClosingTest, ClosesALoopWithDriftOfTheScale) {
       cloud_all_round(kNumPoints), false, whole_drift({0.3, 0.1, 0.0}, {0.02, 0.1, -0.02}, 1.3));
   const Revisit revisit = walk_until_found(scene, 0);
   const double error_before = error_of(scene);
-  const double residual_before = median_residual(scene.map);
+  const double residual_before = median_residual_px(scene.map);
   ASSERT_GT(error_before, 0.2);
   close(scene, revisit);
   EXPECT_LT(error_of(scene), 0.25 * error_before);
-  EXPECT_LT(median_residual(scene.map), 1.2 * residual_before);
+  EXPECT_LT(median_residual_px(scene.map), 1.2 * residual_before);
   // One unit is as long where the round ends as where it began.
   const Rigid3 measured =
       scene.map.keyframes().at(revisit.query).rig_from_world *
@@ -175,7 +144,7 @@ TEST(JoinSubmapsTest, MovesTheYoungerToTheOlder) {
       EXPECT_LT(error.translation.norm(), 0.05) << id.value;
       EXPECT_NEAR(keyframe.applied_scale, id.value < 12 ? 1.0 : 2.5, 0.03);
     });
-    EXPECT_LT(median_residual(map), 1.0);
+    EXPECT_LT(median_residual_px(map), 1.0);
     EXPECT_LT(map.landmarks().size(), num_landmarks - revisit.pairs.size() / 2);
     const auto found =
         scene.places.find(map.keyframes().at(revisit.match).features->descriptors, {});

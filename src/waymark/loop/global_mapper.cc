@@ -3,7 +3,6 @@
 #include "waymark/loop/global_mapper.h"
 
 #include <algorithm>
-#include <numeric>
 #include <utility>
 
 #include "waymark/loop/beside.h"
@@ -112,9 +111,7 @@ bool GlobalMapper::agrees_with_loops(const Revisit& revisit) {
   // Nothing but the length of the way, which has been looked at, can contradict the first.
   if (loops.empty()) return true;
   loops.push_back(as_measured(map, {revisit.match, revisit.query, revisit.query_from_match}));
-  std::vector<std::size_t> believed(num_of_map);
-  std::iota(believed.begin(), believed.end(), std::size_t{0});
-  const std::vector<std::uint8_t> is_on = choose_loops(map, odometry_, submap, loops, believed);
+  const std::vector<std::uint8_t> is_on = choose_loops(map, odometry_, submap, loops, num_of_map);
   undo(submap, std::span(is_on).first(num_of_map));
   if (!is_on.back()) disbelieve(loops.back());
   return is_on.back();
@@ -132,7 +129,13 @@ void GlobalMapper::undo(SubmapId submap, std::span<const std::uint8_t> is_on) {
   num_loops_ = std::max(num_loops_ - static_cast<int>(num_off), 0);
   // What is being adjusted holds what was undone.
   ++num_placements_;
+  adjust_soon(submap);
+}
+
+/// The pose graph does not do for now, however large the map is.
+void GlobalMapper::adjust_soon(SubmapId submap) {
   unadjusted_ = submap;
+  pace_.hurry();
 }
 
 void GlobalMapper::disbelieve(const LoopEdge& loop) {
@@ -215,8 +218,7 @@ std::optional<AdjustmentTask> GlobalMapper::take_task() {
 void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adjustment) {
   if (task.num_placements != num_placements_) {
     if (!task.is_for_calibration && !unadjusted_.is_valid()) {
-      unadjusted_ = mapper_.map().resolve(task.submap);
-      pace_.hurry();
+      adjust_soon(mapper_.map().resolve(task.submap));
     }
     return;
   }
@@ -270,8 +272,7 @@ void GlobalMapper::look_at_markers(KeyframeId newest) {
   placed_[submap] = basis;
   // What is being adjusted is of another frame; what comes next has the markers with it.
   ++num_placements_;
-  unadjusted_ = submap;
-  pace_.hurry();
+  adjust_soon(submap);
 }
 
 /// The end: places all sub-maps, the largest first, whose markers then are known to the others, and

@@ -96,6 +96,7 @@ class GlobalMapper {
   bool agrees_with_loops(const Revisit& revisit);
   void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
   void disbelieve(const LoopEdge& loop);
+  void adjust_soon(SubmapId submap);
   void consolidate_some(std::size_t max_count);
   void consolidate_rest();
   std::vector<KeyframeId> all_keyframes() const;

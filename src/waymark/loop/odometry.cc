@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/loop/odometry.h"
 
-#include <algorithm>
-
 #include "waymark/loop/drift.h"
 #include "waymark/optimize/pose_graph.h"
 #include "waymark/optimize/switch_edges.h"
@@ -174,22 +172,19 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
                                        const Odometry& odometry,
                                        SubmapId submap,
                                        std::span<const LoopEdge> loops,
-                                       std::span<const std::size_t> believed) {
+                                       std::size_t num_believed) {
   OdometryGraph graph(map, odometry, submap);
   const std::size_t num_steps = graph.graph().edges.size();
-  std::vector<std::size_t> edge_of_loop;
+  std::vector<std::size_t> is_there;  // The loops that have edges, in their order.
   SwitchOptions options;
   for (std::size_t i = 0; i < loops.size(); ++i) {
-    const std::size_t edge = graph.graph().edges.size();
-    edge_of_loop.push_back(graph.add_loop(loops[i], true) ? edge : num_steps - 1);
-    const bool is_believed = std::ranges::find(believed, i) != believed.end();
-    if (is_believed && edge_of_loop[i] == edge) options.believed.push_back(edge);
+    if (!graph.add_loop(loops[i], true)) continue;
+    if (i < num_believed) options.believed.push_back(num_steps + is_there.size());
+    is_there.push_back(i);
   }
   const std::vector<std::uint8_t> edge_is_on = switch_edges(graph.graph(), options);
-  std::vector<std::uint8_t> is_on;
-  for (const std::size_t edge : edge_of_loop) {
-    is_on.push_back(edge < edge_is_on.size() ? edge_is_on[edge] : 1);
-  }
+  std::vector<std::uint8_t> is_on(loops.size(), 1);
+  for (std::size_t k = 0; k < is_there.size(); ++k) is_on[is_there[k]] = edge_is_on[num_steps + k];
   return is_on;
 }
 

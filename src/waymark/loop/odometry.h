@@ -40,13 +40,13 @@ LoopEdge as_measured(const Map& map, const LoopEdge& loop);
 
 /// Which loops of a sub-map agree with each other and with the odometry, 1 or 0 per loop: see
 /// switch_edges(). All keyframes must be noted.
-/// \param loops     as Map::measured_loop_edges() gives them; of other sub-maps: 1.
-/// \param believed  those that were believed before, by index.
+/// \param loops         as Map::measured_loop_edges() gives them; of other sub-maps: 1.
+/// \param num_believed  the first so many were believed before.
 std::vector<std::uint8_t> choose_loops(const Map& map,
                                        const Odometry& odometry,
                                        SubmapId submap,
                                        std::span<const LoopEdge> loops,
-                                       std::span<const std::size_t> believed);
+                                       std::size_t num_believed);
 
 /// Where odometry and loops that agree put the keyframes of a sub-map, whatever the map says now.
 /// The root stays.

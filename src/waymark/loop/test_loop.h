@@ -7,6 +7,8 @@
 #include <numbers>
 #include <vector>
 
+#include "waymark/base/median.h"
+#include "waymark/geometry/alignment.h"
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/match/test_scene.h"
@@ -170,5 +172,34 @@ class LoopScene {
 
 constexpr int kNumPoints = 4000;
 constexpr int kRound = LoopScene::kStepsPerRound;
+
+/// Root mean square distance of the keyframes from the truth after the best similarity.
+inline double error_of(const LoopScene& scene) {
+  std::vector<Eigen::Vector3d> mapped, truth;
+  scene.map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    mapped.push_back(keyframe.rig_from_world.origin_in_source());
+    truth.push_back(LoopScene::true_pose(scene.steps[id.value]).translation);
+  });
+  const Sim3 truth_from_map = align_similarity(mapped, truth).value();
+  double sum = 0.0;
+  for (std::size_t i = 0; i < mapped.size(); ++i) {
+    sum += (truth_from_map * mapped[i] - truth[i]).squaredNorm();
+  }
+  return std::sqrt(sum / static_cast<double>(mapped.size()));
+}
+
+/// Median length of the residuals of all observations, in pixels of the level.
+inline double median_residual_px(const Map& map) {
+  std::vector<double> residuals;
+  map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
+    for (const Observation& observation : landmark.observations) {
+      const auto squared = squared_residual(map.keyframes().at(observation.keyframe),
+                                            observation.feature,
+                                            landmark.position_in_world);
+      residuals.push_back(squared ? std::sqrt(*squared) : 1e3);
+    }
+  });
+  return median(residuals);
+}
 
 }  // namespace waymark

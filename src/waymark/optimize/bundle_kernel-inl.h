@@ -13,49 +13,28 @@
 
 #include "waymark/optimize/bundle_kernel.h"
 #include "waymark/optimize/residual.h"
+#include "waymark/optimize/vec3-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace waymark {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
 using BundleTag = hn::CappedTag<double, kBundleLanes>;
 using IndexTag = hn::RebindToSigned<BundleTag>;
 using BundleVec = hn::Vec<BundleTag>;
 using IndexVec = hn::Vec<IndexTag>;
 using BundleMask = hn::Mask<BundleTag>;
+using BundleVec3 = Vec3Of<BundleVec>;
 
-struct Triple {
-  BundleVec x, y, z;
-};
-
-HWY_INLINE BundleVec dot(const Triple& a, const Triple& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-
-HWY_INLINE Triple times(const Triple& a, BundleVec factor) {
-  return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
-}
-
-HWY_INLINE Triple minus(const Triple& a, const Triple& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-HWY_INLINE Triple product(const Triple& a, const Triple& b) {
-  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
-          hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
-
-HWY_INLINE Triple load_triple(const BundleArrays& arrays, BundleField first, std::size_t i) {
+HWY_INLINE BundleVec3 load_vec3(const BundleArrays& arrays, BundleField first, std::size_t i) {
   const BundleTag tag;
   return {hn::LoadU(tag, arrays.fields[first].data() + i),
           hn::LoadU(tag, arrays.fields[first + 1].data() + i),
           hn::LoadU(tag, arrays.fields[first + 2].data() + i)};
 }
 
-HWY_INLINE Triple gather_triple(const double* table, IndexVec at, std::int64_t offset) {
+HWY_INLINE BundleVec3 gather_vec3(const double* table, IndexVec at, std::int64_t offset) {
   const BundleTag tag;
   return {hn::GatherIndex(tag, table + offset, at),
           hn::GatherIndex(tag, table + offset + 1, at),
@@ -64,35 +43,36 @@ HWY_INLINE Triple gather_triple(const double* table, IndexVec at, std::int64_t o
 
 /// A transform of each lane.
 struct Transforms {
-  Triple column0, column1, column2, translation;
+  BundleVec3 column0, column1, column2, translation;
 };
 
 HWY_INLINE Transforms gather_transforms(const double* table, IndexVec at) {
-  return {gather_triple(table, at, 0),
-          gather_triple(table, at, 3),
-          gather_triple(table, at, 6),
-          gather_triple(table, at, 9)};
+  return {gather_vec3(table, at, 0),
+          gather_vec3(table, at, 3),
+          gather_vec3(table, at, 6),
+          gather_vec3(table, at, 9)};
 }
 
-HWY_INLINE BundleVec move_one(BundleVec a, BundleVec b, BundleVec c, BundleVec d, const Triple& p) {
+HWY_INLINE BundleVec
+move_one(BundleVec a, BundleVec b, BundleVec c, BundleVec d, const BundleVec3& p) {
   return hn::Add(hn::Add(hn::Add(hn::Mul(a, p.x), hn::Mul(b, p.y)), hn::Mul(c, p.z)), d);
 }
 
-HWY_INLINE Triple move(const Transforms& t, const Triple& p) {
+HWY_INLINE BundleVec3 move(const Transforms& t, const BundleVec3& p) {
   return {move_one(t.column0.x, t.column1.x, t.column2.x, t.translation.x, p),
           move_one(t.column0.y, t.column1.y, t.column2.y, t.translation.y, p),
           move_one(t.column0.z, t.column1.z, t.column2.z, t.translation.z, p)};
 }
 
 /// A row vector times the rotation.
-HWY_INLINE Triple times(const Triple& row, const Transforms& t) {
+HWY_INLINE BundleVec3 times(const BundleVec3& row, const Transforms& t) {
   return {dot(row, t.column0), dot(row, t.column1), dot(row, t.column2)};
 }
 
 /// As in residual.h.
 struct SeenPoint {
   Transforms rig_from_world, cam_from_rig;
-  Triple in_rig, direction, w0, w1;
+  BundleVec3 in_rig, direction, w0, w1;
   BundleVec inverse_range, residual0, residual1, squared;
   BundleMask is_ahead;
 };
@@ -108,16 +88,16 @@ HWY_INLINE SeenPoint see_point(const BundleArrays& arrays,
   SeenPoint seen;
   seen.rig_from_world = gather_transforms(places.rig_from_world, place(0));
   seen.cam_from_rig = gather_transforms(places.cam_from_rig, place(1));
-  seen.in_rig = move(seen.rig_from_world, gather_triple(places.points, place(2), 0));
-  const Triple in_cam = move(seen.cam_from_rig, seen.in_rig);
+  seen.in_rig = move(seen.rig_from_world, gather_vec3(places.points, place(2), 0));
+  const BundleVec3 in_cam = move(seen.cam_from_rig, seen.in_rig);
   const BundleVec squared_range = hn::Max(dot(in_cam, in_cam), hn::Set(tag, 1e-24));
   seen.inverse_range = hn::Div(hn::Set(tag, 1.0), hn::Sqrt(squared_range));
-  seen.direction = times(in_cam, seen.inverse_range);
-  const Triple bearing = load_triple(arrays, kSeenBearingX, i);
+  seen.direction = scale(in_cam, seen.inverse_range);
+  const BundleVec3 bearing = load_vec3(arrays, kSeenBearingX, i);
   seen.is_ahead = hn::Gt(dot(seen.direction, bearing), hn::Zero(tag));
-  const Triple off = minus(seen.direction, bearing);
-  seen.w0 = load_triple(arrays, kSeenW00, i);
-  seen.w1 = load_triple(arrays, kSeenW10, i);
+  const BundleVec3 off = subtract(seen.direction, bearing);
+  seen.w0 = load_vec3(arrays, kSeenW00, i);
+  seen.w1 = load_vec3(arrays, kSeenW10, i);
   seen.residual0 = dot(seen.w0, off);
   seen.residual1 = dot(seen.w1, off);
   seen.squared =

@@ -58,21 +58,21 @@ struct RowBlock {
   alignas(64) double point[3][kGroup];  // 3 numbers, and 0.
 };
 
-HWY_INLINE void store_group(const Triple& a, BundleVec last, double* group) {
+HWY_INLINE void store_group(const BundleVec3& a, BundleVec last, double* group) {
   hn::StoreInterleaved4(a.x, a.y, a.z, last, BundleTag(), group);
 }
 
 /// by_cam: derivative by the point in the camera.
 HWY_INLINE void store_row(const SeenPoint& seen,
-                          const Triple& by_cam,
+                          const BundleVec3& by_cam,
                           BundleVec residual,
                           std::size_t row,
                           std::size_t lane,
                           RowBlock& rows) {
   const BundleVec zero = hn::Zero(BundleTag());
-  const Triple by_rig = times(by_cam, seen.cam_from_rig);
+  const BundleVec3 by_rig = times(by_cam, seen.cam_from_rig);
   store_group(by_rig, residual, rows.shift[row] + 4 * lane);
-  store_group(product(seen.in_rig, by_rig), zero, rows.turn[row] + 4 * lane);
+  store_group(cross(seen.in_rig, by_rig), zero, rows.turn[row] + 4 * lane);
   store_group(times(by_rig, seen.rig_from_world), zero, rows.point[row] + 4 * lane);
 }
 
@@ -87,9 +87,9 @@ HWY_INLINE void compute_rows(const BundleArrays& arrays,
     const SeenPoint seen = see_point(arrays, places, i);
     const BundleVec root =
         hn::IfThenElseZero(seen.is_ahead, huber_root(seen.squared, loss.huber_px));
-    const BundleVec scale = hn::Mul(root, seen.inverse_range);
-    const auto by_cam = [&](const Triple& w) {
-      return times(minus(w, times(seen.direction, dot(w, seen.direction))), scale);
+    const BundleVec weight = hn::Mul(root, seen.inverse_range);
+    const auto by_cam = [&](const BundleVec3& w) {
+      return scale(subtract(w, scale(seen.direction, dot(w, seen.direction))), weight);
     };
     store_row(seen, by_cam(seen.w0), hn::Mul(root, seen.residual0), 0, lane, rows);
     store_row(seen, by_cam(seen.w1), hn::Mul(root, seen.residual1), 1, lane, rows);
@@ -100,7 +100,7 @@ HWY_INLINE void compute_rows(const BundleArrays& arrays,
     const BundleVec slope =
         hn::Mul(hn::Mul(hn::Mul(seen.inverse_range, seen.inverse_range), range_root),
                 hn::LoadU(tag, arrays.fields[kSeenInverseSigma].data() + i));
-    const Triple by_range = times(seen.direction, hn::Neg(slope));
+    const BundleVec3 by_range = scale(seen.direction, hn::Neg(slope));
     store_row(seen, by_range, hn::Mul(off, range_root), 2, lane, rows);
   }
 }

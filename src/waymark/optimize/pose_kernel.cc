@@ -12,37 +12,17 @@
 // After foreach_target.h.
 #include <hwy/highway.h>
 
+#include "waymark/optimize/vec3-inl.h"
+
 HWY_BEFORE_NAMESPACE();
 namespace waymark {
 namespace HWY_NAMESPACE {
 namespace {
 
-namespace hn = hwy::HWY_NAMESPACE;
 using Tag = hn::CappedTag<double, kPoseLanes>;
 using Vec = hn::Vec<Tag>;
 using Mask = hn::Mask<Tag>;
-
-struct Vec3 {
-  Vec x, y, z;
-};
-
-HWY_INLINE Vec dot(const Vec3& a, const Vec3& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-
-HWY_INLINE Vec3 scale(const Vec3& a, Vec factor) {
-  return {hn::Mul(a.x, factor), hn::Mul(a.y, factor), hn::Mul(a.z, factor)};
-}
-
-HWY_INLINE Vec3 subtract(const Vec3& a, const Vec3& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-
-HWY_INLINE Vec3 cross(const Vec3& a, const Vec3& b) {
-  return {hn::Sub(hn::Mul(a.y, b.z), hn::Mul(a.z, b.y)),
-          hn::Sub(hn::Mul(a.z, b.x), hn::Mul(a.x, b.z)),
-          hn::Sub(hn::Mul(a.x, b.y), hn::Mul(a.y, b.x))};
-}
+using Vec3 = Vec3Of<Vec>;
 
 HWY_INLINE Vec load(const PoseWorkspace::Arrays& arrays, PoseField field, std::size_t index) {
   return hn::LoadU(Tag(), arrays.fields[field].data() + index);

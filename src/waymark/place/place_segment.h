@@ -49,8 +49,8 @@ inline constexpr PlaceDifference kPlaceRowMask = (PlaceDifference{1} << kPlaceRo
 /// with it, however many descriptors there are.
 class PlaceSegment {
  public:
-  /// Bounds the pause of a merge, to about a second. Queries take longer the more segments there
-  /// are.
+  /// Bounds the pause of a merge, to 1.1 s at 1000 features. Queries take longer the more segments
+  /// there are.
   static constexpr std::size_t kMaxRows = 16384;
   /// More descriptors of a keyframe are thinned evenly, which bounds memory and time.
   static constexpr std::size_t kMaxDescriptors = 2048;
