@@ -157,6 +157,22 @@ void write_ego_mask(const std::filesystem::path& path, const Image& mask) {
   }
 }
 
+/// Fills in the trajectories of all sub-maps, and what follows from them.
+void add_trajectories(const Map& map,
+                      const std::vector<std::pair<SubmapId, StampedPose>>& poses,
+                      SessionResults& results) {
+  for (auto& [submap, trajectory] : split_by_submap(poses)) {
+    if (results.trajectories.empty()) {
+      results.keyframes = keyframe_trajectory(map, submap);
+      results.points = choose_points(map, submap);
+    }
+    results.trajectories.push_back(std::move(trajectory));
+  }
+  if (!results.trajectories.empty()) {
+    results.summary.num_trajectory_lines = results.trajectories.front().size();
+  }
+}
+
 }  // namespace
 
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
@@ -204,21 +220,6 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   return results;
 }
 
-void add_trajectories(const Map& map,
-                      const std::vector<std::pair<SubmapId, StampedPose>>& poses,
-                      SessionResults& results) {
-  for (auto& [submap, trajectory] : split_by_submap(poses)) {
-    if (results.trajectories.empty()) {
-      results.keyframes = keyframe_trajectory(map, submap);
-      results.points = choose_points(map, submap);
-    }
-    results.trajectories.push_back(std::move(trajectory));
-  }
-  if (!results.trajectories.empty()) {
-    results.summary.num_trajectory_lines = results.trajectories.front().size();
-  }
-}
-
 void prepare_results(const std::filesystem::path& folder) {
   make_output_folder(folder);
   for (const char* name :
@@ -252,17 +253,16 @@ std::string_view to_string(Timing timing) {
   return "unknown";
 }
 
-SessionResults localize_input(Input& input,
-                              Localizer& localizer,
-                              ImageOrder order,
-                              const std::function<bool()>& should_stop,
-                              const FrameObserver& observer) {
+SessionResults locate_all(Input& input,
+                          const LocateFrame& locate,
+                          const Map& map,
+                          const std::function<bool()>& should_stop,
+                          const FrameObserver& observer) {
   const UsageMeter usage;
   MemoryReserve reserve;
   std::vector<std::pair<SubmapId, StampedPose>> poses;
   const auto feed = [&](const FrameImages& frame) {
-    const TrackingResult result =
-        order == ImageOrder::kStream ? localizer.track(frame) : localizer.locate(frame);
+    const TrackingResult result = locate(frame);
     if (result.world_from_rig) {
       poses.push_back({result.submap, {frame.timestamp_ns, *result.world_from_rig}});
     }
@@ -272,19 +272,32 @@ SessionResults localize_input(Input& input,
   reserve.release();
 
   SessionResults results;
-  const Map& map = localizer.map();
   RunSummary& summary = results.summary;
   summary.counts = count_frames(frames.table.frames);
   summary.localized = poses.size();
-  summary.keyframes = map.keyframes().size();
-  summary.landmarks = map.landmarks().size();
-  for (const Submap& submap : map.submaps()) summary.submaps += !submap.joined_into.is_valid();
   summary.tracking_ms = summarize_times({frames.tracking_ms.begin(), frames.tracking_ms.end()});
   summary.stages_ms = summarize_stages(frames.table);
   add_trajectories(map, poses, results);
   results.table = std::move(frames.table);
   results.failure = frames.failure;
   usage.write_to(summary);
+  return results;
+}
+
+SessionResults localize_input(Input& input,
+                              Localizer& localizer,
+                              ImageOrder order,
+                              const std::function<bool()>& should_stop,
+                              const FrameObserver& observer) {
+  const auto locate = [&](const FrameImages& frame) {
+    return order == ImageOrder::kStream ? localizer.track(frame) : localizer.locate(frame);
+  };
+  const Map& map = localizer.map();
+  SessionResults results = locate_all(input, locate, map, should_stop, observer);
+  RunSummary& summary = results.summary;
+  summary.keyframes = map.keyframes().size();
+  summary.landmarks = map.landmarks().size();
+  for (const Submap& submap : map.submaps()) summary.submaps += !submap.joined_into.is_valid();
   return results;
 }
 

@@ -57,11 +57,6 @@ struct SessionHooks {
 /// session, whose results until then come with that failure.
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks = {});
 
-/// Fills in the trajectories of all sub-maps, and what follows from them.
-void add_trajectories(const Map& map,
-                      const std::vector<std::pair<SubmapId, StampedPose>>& poses,
-                      SessionResults& results);
-
 /// Makes the folder and tries its files, so that write_results() will not be the first to find out
 /// that they cannot be written. Throws OutputError.
 void prepare_results(const std::filesystem::path& folder);
@@ -85,5 +80,16 @@ SessionResults localize_input(Input& input,
                               ImageOrder order,
                               const std::function<bool()>& should_stop,
                               const FrameObserver& observer);
+
+/// Finds a frame in whatever it is looked for.
+using LocateFrame = std::function<TrackingResult(const FrameImages&)>;
+
+/// The same of anything that finds frames. Keyframes and points are those of the map; how much is
+/// in it is left to the caller, too.
+SessionResults locate_all(Input& input,
+                          const LocateFrame& locate,
+                          const Map& map,
+                          const std::function<bool()>& should_stop,
+                          const FrameObserver& observer);
 
 }  // namespace waymark
