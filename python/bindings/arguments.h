@@ -9,6 +9,7 @@
 #include <string>
 #include <vector>
 
+#include "waymark/base/timing.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/depth.h"
@@ -44,6 +45,9 @@ CameraChain read_cameras(py::handle cameras);
 
 /// "mono", "stereo", "rgbd" or None; ValueError for others.
 std::optional<Setup> setup_argument(py::handle setup);
+
+/// "inline", "lockstep" or "realtime"; ValueError for others.
+Timing timing_argument(const std::string& name);
 
 /// The images of a moment as Python gives them; any but the first may be None.
 struct ImageArguments {

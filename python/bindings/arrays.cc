@@ -44,6 +44,15 @@ std::int64_t integer_argument(const char* name, py::handle argument) {
   return value;
 }
 
+double number_argument(const char* name, py::handle argument) {
+  const double value = PyFloat_AsDouble(argument.ptr());
+  if (PyErr_Occurred()) {
+    PyErr_Clear();
+    fail_type(name, argument, "a number");
+  }
+  return value;
+}
+
 std::vector<double> numbers_argument(const char* name, py::handle argument, int columns) {
   const std::string expected = "numbers in an array of shape (N, " + std::to_string(columns) + ")";
   const auto numbers =

@@ -58,6 +58,9 @@ bool holds(const py::array& array) {
 /// Whole numbers are needed as such: TypeError for a float, ValueError for one that is too large.
 std::int64_t integer_argument(const char* name, py::handle argument);
 
+/// TypeError for what is no number.
+double number_argument(const char* name, py::handle argument);
+
 /// A pose from an array of shape (4, 4): TypeError, ValueError or InputError where it is none.
 Rigid3 pose_argument(const char* name, py::handle argument);
 

@@ -110,6 +110,14 @@ std::optional<Setup> setup_argument(py::handle setup) {
                         ", expected mono, stereo, rgbd or None");
 }
 
+Timing timing_argument(const std::string& name) {
+  if (name == "inline") return Timing::kInline;
+  if (name == "lockstep") return Timing::kLockstep;
+  if (name == "realtime") return Timing::kRealtime;
+  throw py::value_error("timing: is " + quote_for_message(name) +
+                        ", expected inline, lockstep or realtime");
+}
+
 CameraChain read_cameras(py::handle cameras) {
   if (py::isinstance<CameraChain>(cameras)) return py::cast<CameraChain>(cameras);
   std::vector<ConfigSource> sources;

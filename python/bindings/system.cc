@@ -15,19 +15,14 @@
 #include "bindings.h"
 #include "texts.h"
 #include "viewer.h"
+#include "waymark/base/disk_memory.h"
 #include "waymark/base/text.h"
 #include "waymark/session/session.h"
 
 namespace waymark::python {
 namespace {
 
-Timing timing_argument(const std::string& name) {
-  if (name == "inline") return Timing::kInline;
-  if (name == "lockstep") return Timing::kLockstep;
-  if (name == "realtime") return Timing::kRealtime;
-  throw py::value_error("timing: is " + quote_for_message(name) +
-                        ", expected inline, lockstep or realtime");
-}
+constexpr double kMaxMemoryGb = 1e6;
 
 /// A System with what the arguments of Python need to be understood. Methods that take long let
 /// other threads of Python run.
@@ -61,6 +56,32 @@ class PythonSystem {
       system_.finish();
     }
     is_finished_ = true;
+    if (viewer_) viewer_->finish(system_);
+  }
+
+  void keep_map_in(const std::filesystem::path& folder, double max_memory_gb) {
+    const Turn turn = take();
+    if (is_finished_ || !system_.frame_states().empty()) {
+      throw std::runtime_error("System: keep_map_in() after feed(), expected before");
+    }
+    // Also false for what is no number.
+    if (!(max_memory_gb >= 0.0 && max_memory_gb <= kMaxMemoryGb)) {
+      throw py::value_error("max_memory_gb: is " + std::string(py::str(py::float_(max_memory_gb))) +
+                            ", expected 0 to 1e6");
+    }
+    system_.keep_map_in(
+        std::make_shared<DiskMemory>(folder, static_cast<std::size_t>(max_memory_gb * 1e9)));
+  }
+
+  void drop_seen_through() {
+    const Turn turn = take();
+    if (!is_finished_) {
+      throw std::runtime_error("System: drop_seen_through() before finish(), expected after");
+    }
+    {
+      const ReleasedGil released;
+      system_.drop_seen_through();
+    }
     if (viewer_) viewer_->finish(system_);
   }
 
@@ -270,6 +291,33 @@ Shows the frames fed from now on, and the map, in the browser: a Viewer at a por
       });
 }
 
+void bind_memory(SystemClass& system) {
+  system
+      .def("drop_seen_through",
+           &PythonSystem::drop_seen_through,
+           R"(drop_seen_through(self)
+--
+
+After finish(): drops landmarks on what is gone from the map, as later keyframes looked through
+them. `waymark run` does so before it saves. RuntimeError before finish().)")
+      .def(
+          "keep_map_in",
+          [](PythonSystem& self, const py::object& folder, const py::object& max_memory_gb) {
+            self.keep_map_in(path_argument("folder", folder),
+                             number_argument("max_memory_gb", max_memory_gb));
+          },
+          py::arg("folder"),
+          py::kw_only(),
+          py::arg("max_memory_gb"),
+          R"(keep_map_in(self, folder, *, max_memory_gb)
+--
+
+Limits the memory of a large map: whenever the process has more than max_memory_gb (0 to 1e6, of
+10^9 bytes) in memory, what only searching and joining need lies in a file without a name in this
+folder, which is gone with the System. Results are the same bits; see docs/performance.md. Before
+the first feed(), else RuntimeError. OutputError where the file cannot be made.)");
+}
+
 void bind_reading(SystemClass& system) {
   system
       .def("map", &PythonSystem::map, R"(map(self)
@@ -342,6 +390,7 @@ map: a Map to go on in; a copy is extended.
 InputError for cameras or settings that are malformed or cannot work together.)");
   bind_feed(system);
   bind_control(system);
+  bind_memory(system);
   bind_reading(system);
 }
 

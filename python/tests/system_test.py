@@ -190,6 +190,39 @@ class Results(Test):
         system.set_mapping(True)
         self.assertEqual(system.feed(0, some[0].image0, some[0].image1).frame, 0)
 
+    def test_a_map_in_a_file_gives_the_same(self):
+        def positions(limit_gb):
+            system = waymark.System(camchain())
+            if limit_gb is not None:
+                system.keep_map_in(self.folder, max_memory_gb=limit_gb)
+            for frame in frames()[:20]:
+                system.feed(frame.timestamp_ns, frame.image0, frame.image1)
+            self.assert_raises(RuntimeError, "expected before", system.keep_map_in, self.folder, max_memory_gb=1)
+            system.finish()
+            return system.map().landmarks().positions_in_world
+
+        np.testing.assert_array_equal(positions(0), positions(None))
+        self.assertEqual(list(self.folder.iterdir()), [])
+
+    def test_a_map_in_no_file(self):
+        system = waymark.System(camchain())
+        self.assert_raises(waymark.OutputError, "missing", system.keep_map_in, self.folder / "missing", max_memory_gb=1)
+        self.assert_raises(ValueError, "max_memory_gb", system.keep_map_in, self.folder, max_memory_gb=-1)
+        self.assert_raises(ValueError, "max_memory_gb", system.keep_map_in, self.folder, max_memory_gb=float("nan"))
+        self.assert_raises(TypeError, "max_memory_gb", system.keep_map_in, self.folder, max_memory_gb="much")
+        self.assert_raises(TypeError, "folder", system.keep_map_in, 3, max_memory_gb=1)
+
+    def test_drops_what_was_seen_through_at_the_end(self):
+        system = waymark.System(camchain())
+        for frame in frames()[:10]:
+            system.feed(frame.timestamp_ns, frame.image0, frame.image1)
+        self.assert_raises(RuntimeError, "before finish", system.drop_seen_through)
+        system.finish()
+        before = set(system.map().landmarks().ids)
+        system.drop_seen_through()
+        self.assertLessEqual(set(system.map().landmarks().ids), before)
+        self.assertGreater(len(system.map().landmarks()), 0.9 * len(before))
+
     def test_goes_on_in_a_map(self):
         saved = waymark.Map.load(DATA / "stereo_out/map.wmap")
         system = waymark.System(camchain(), map=saved)
