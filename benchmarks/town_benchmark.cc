@@ -9,75 +9,27 @@
 // allocator is memory of the next.
 #include <benchmark/benchmark.h>
 #include <malloc.h>
-#include <unistd.h>
 
-#include <filesystem>
 #include <memory>
 #include <optional>
-#include <string>
 #include <utility>
 #include <vector>
 
 #include "memory.h"
 #include "town_loops.h"
+#include "town_saving.h"
+#include "town_scene.h"
 #include "waymark/base/rng.h"
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/global_mapper.h"
 #include "waymark/map/parts.h"
-#include "waymark/mapfile/map_file.h"
-#include "waymark/mapfile/map_journal.h"
 #include "waymark/simulate/testing/town_map.h"
 #include "waymark/simulate/testing/town_session.h"
 
 namespace waymark {
 namespace {
-
-/// A town with all that the steps need, the last one that was asked for.
-struct TownScene {
-  TownMapSettings settings;
-  TownMap town;
-  MapSnapshot snapshot;
-};
-
-const TownScene& scene_of(std::size_t num_keyframes, bool is_closed) {
-  static std::unique_ptr<TownScene> scene;
-  if (scene && scene->settings.num_keyframes == num_keyframes &&
-      scene->settings.is_closed == is_closed) {
-    return *scene;
-  }
-  scene = std::make_unique<TownScene>();
-  scene->settings = {.num_keyframes = num_keyframes, .is_closed = is_closed};
-  scene->town = make_town_map(scene->settings);
-  scene->snapshot = index_map(scene->town.map);
-  malloc_trim(0);
-  return *scene;
-}
-
-const TownScene& closed_scene(const benchmark::State& state) {
-  return scene_of(static_cast<std::size_t>(state.range(0)), true);
-}
-
-/// The peak of memory during a step beyond what was there before it.
-class PeakCounter {
- public:
-  explicit PeakCounter(benchmark::State& state) : state_(state) {
-    malloc_trim(0);
-    reset_peak();
-    before_mb_ = memory_mb("VmRSS");
-  }
-  ~PeakCounter() {
-    state_.counters["peak_kb"] =
-        1024.0 * (memory_mb("VmHWM") - before_mb_) / static_cast<double>(state_.range(0));
-  }
-  PeakCounter(const PeakCounter&) = delete;
-  PeakCounter& operator=(const PeakCounter&) = delete;
-
- private:
-  benchmark::State& state_;
-  double before_mb_;
-};
 
 /// Keyframes here and there, the same in every run.
 class SomeKeyframes {
@@ -226,14 +178,6 @@ void spread_drift_of_loop(benchmark::State& state) {
   }
 }
 
-MapCorrection small_correction(const Map& map) {
-  MapCorrection correction;
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    correction.keyframes.push_back({id, keyframe.rig_from_world});
-  });
-  return correction;
-}
-
 void apply_correction_to_all(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
   const MapCorrection correction = small_correction(*scene.town.map);
@@ -275,66 +219,6 @@ void check_map(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(scene.town.map->broken_invariants());
 }
 
-std::filesystem::path temporary_file() {
-  return std::filesystem::temp_directory_path() / ("waymark_town." + std::to_string(getpid()));
-}
-
-void save_town(benchmark::State& state) {
-  const TownScene& scene = closed_scene(state);
-  const StoredMap stored{.map = scene.town.map, .settings = {}, .images = {}};
-  {
-    const PeakCounter peak(state);
-    for (auto _ : state) save_map(temporary_file(), stored);
-  }
-  state.counters["file_kb"] = static_cast<double>(std::filesystem::file_size(temporary_file())) /
-                              1024.0 / static_cast<double>(state.range(0));
-}
-
-/// The last keyframes of a map once more, as if the camera had stood there again.
-void repeat_last_keyframes(Map& map, std::uint32_t count) {
-  const std::uint32_t end = map.keyframes().end_id().value;
-  for (std::uint32_t i = end - std::min(end, count); i < end; ++i) {
-    const Keyframe* last = map.keyframes().find(KeyframeId{i});
-    if (!last) continue;
-    Keyframe keyframe = *last;
-    keyframe.frame = FrameId{keyframe.frame.value + (1u << 24)};
-    keyframe.parent = KeyframeId{i};
-    const std::vector<LandmarkId> landmarks = std::exchange(keyframe.landmarks, {});
-    const KeyframeId id = map.add_keyframe(std::move(keyframe));
-    for (std::uint32_t f = 0; f < landmarks.size(); ++f) {
-      if (landmarks[f].is_valid()) map.observe(id, f, landmarks[f]);
-    }
-  }
-}
-
-/// What autosaving costs after 100 new keyframes.
-void save_new_keyframes(benchmark::State& state) {
-  const TownScene& scene = closed_scene(state);
-  constexpr std::uint64_t kNoFileIsSmall = 0;
-  MapJournal journal(temporary_file(), kNoFileIsSmall);
-  journal.save({.map = scene.town.map, .settings = {}, .images = {}});
-  Map map = Map::thaw(*scene.town.map);
-  repeat_last_keyframes(map, 100);
-  const StoredMap grown{.map = map.freeze(), .settings = {}, .images = {}};
-  {
-    const PeakCounter peak(state);
-    for (auto _ : state) journal.save(grown);
-  }
-  std::filesystem::path changes = temporary_file();
-  changes += ".journal";
-  state.counters["saved_kb"] = static_cast<double>(std::filesystem::file_size(changes)) / 1024.0;
-  std::filesystem::remove(changes);
-}
-
-/// After save_town().
-void load_town(benchmark::State& state) {
-  {
-    const PeakCounter peak(state);
-    for (auto _ : state) benchmark::DoNotOptimize(load_map(temporary_file()).map);
-  }
-  std::filesystem::remove(temporary_file());
-}
-
 /// The revisit that ends the way of a map whose loops are open, found by looks: all that the mapper
 /// does before it takes the next keyframe.
 void close_first_loop(benchmark::State& state) {
@@ -355,12 +239,9 @@ void close_first_loop(benchmark::State& state) {
   state.counters["loops"] = num_loops;
 }
 
-/// num_iterations: 0 for as many as it takes to know.
 void register_all(std::int64_t num_keyframes) {
-  const auto add = [&](const char* name, void (*step)(benchmark::State&), int num_iterations) {
-    auto* registered = benchmark::RegisterBenchmark(name, step);
-    registered->Arg(num_keyframes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
-    if (num_iterations > 0) registered->Iterations(num_iterations);
+  const auto add = [&](const char* name, TownStep step, int num_iterations) {
+    add_step(name, step, num_keyframes, num_iterations);
   };
   add("all/make_map", make_map, 1);
   add("one/make_frame", make_frame, 0);
@@ -375,9 +256,7 @@ void register_all(std::int64_t num_keyframes) {
   add("all/apply_correction", apply_correction_to_all, 1);
   add("all/restore", restore_map, 1);
   add("all/check", check_map, 1);
-  add("all/save", save_town, 1);
-  add("one/save_new", save_new_keyframes, 1);
-  add("all/load", load_town, 1);
+  register_saving_steps(num_keyframes);
   add("all/fuse_overlaps", fuse_all_overlaps, 1);
   add("all/spread_drift", spread_drift_of_loop, 1);
   add("all/adjust", adjust_all, 1);
@@ -389,7 +268,7 @@ void register_all(std::int64_t num_keyframes) {
 }  // namespace waymark
 
 int main(int argc, char** argv) {
-  for (const std::int64_t size : {1'000, 3'000, 10'000, 30'000, 100'000}) {
+  for (const std::int64_t size : {1'000, 3'000, 10'000, 30'000, 50'000, 100'000}) {
     waymark::register_all(size);
   }
   benchmark::Initialize(&argc, argv);

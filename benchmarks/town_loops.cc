@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "town_scene.h"
 #include "waymark/base/rng.h"
 #include "waymark/geometry/alignment.h"
 #include "waymark/loop/find.h"
@@ -155,14 +156,9 @@ void close_mixed_loops(benchmark::State& state) {
 }  // namespace
 
 void register_loop_steps(std::int64_t num_keyframes) {
-  const auto add = [&](const char* name, void (*step)(benchmark::State&)) {
-    auto* registered = benchmark::RegisterBenchmark(name, step);
-    registered->Arg(num_keyframes)->Unit(benchmark::kMillisecond)->MeasureProcessCPUTime();
-    registered->Iterations(1);
-  };
-  add("all/choose_loops", choose_among_loops);
+  add_step("all/choose_loops", choose_among_loops, num_keyframes, 1);
   // Each loop is spread over all of the map.
-  if (num_keyframes <= 1000) add("all/close_mixed", close_mixed_loops);
+  if (num_keyframes <= 1000) add_step("all/close_mixed", close_mixed_loops, num_keyframes, 1);
 }
 
 }  // namespace waymark

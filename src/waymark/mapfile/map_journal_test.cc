@@ -3,10 +3,18 @@
 #include "waymark/mapfile/map_journal.h"
 
 #include <gmock/gmock.h>
+#include <signal.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
+#include <array>
+#include <chrono>
 #include <fstream>
+#include <thread>
+#include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/rng.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
 #include "waymark/map/testing/random_map.h"
@@ -111,6 +119,54 @@ TEST_F(MapJournalTest, EndsWithTheLastWholeChange) {
     EXPECT_EQ(reloaded(), expected[num_whole]) << size << " bytes of " << bytes.size();
   }
   EXPECT_EQ(num_whole, 2u);
+}
+
+/// Saves one map after the other in a process of its own, which is killed (SIGKILL) so long after
+/// the first save; how many saves it had told of.
+std::size_t save_until_killed(const std::filesystem::path& path,
+                              const std::vector<StoredMap>& maps,
+                              std::chrono::microseconds delay) {
+  std::array<int, 2> pipe = {};
+  WAYMARK_CHECK(::pipe(pipe.data()) == 0);
+  const pid_t child = ::fork();
+  if (child == 0) {
+    MapJournal journal(path, 0);
+    for (const StoredMap& map : maps) {
+      journal.save(map);
+      if (::write(pipe[1], "s", 1) != 1) break;
+    }
+    ::_exit(0);
+  }
+  ::close(pipe[1]);
+  std::size_t num_saved = 0;
+  char told = 0;
+  if (::read(pipe[0], &told, 1) == 1) ++num_saved;
+  std::this_thread::sleep_for(delay);
+  ::kill(child, SIGKILL);
+  ::waitpid(child, nullptr, 0);
+  while (::read(pipe[0], &told, 1) == 1) ++num_saved;
+  ::close(pipe[0]);
+  return num_saved;
+}
+
+TEST_F(MapJournalTest, HoldsTheLastSaveWheneverKilled) {
+  constexpr int kNumKills = 20;
+  RandomMap random(3, 300);
+  std::vector<StoredMap> maps;
+  for (int i = 0; i < 200; ++i) {
+    maps.push_back(freeze(random));
+    random.go_on(5);
+  }
+  Rng rng(1, 0);
+  for (int i = 0; i < kNumKills; ++i) {
+    const std::chrono::microseconds delay(rng.below(100'000));
+    const std::size_t num_saved = save_until_killed(path_, maps, delay);
+    ASSERT_GE(num_saved, 1u);
+    // What was under way may have been on the disk already.
+    const std::string found = reloaded();
+    const bool is_last = found == saved(maps[num_saved - 1]);
+    EXPECT_TRUE(is_last || found == saved(maps.at(num_saved))) << num_saved << " saves";
+  }
 }
 
 TEST_F(MapJournalTest, OfTheFileBeforeCountsForNothing) {
