@@ -212,7 +212,7 @@ def map_all(client, progress, url, recordings, options, keyframes):
                       "seconds": 0.0}
         results.append(result)
         what = result.get("error") or ("was there" if result["was_there"] else f"{result['seconds']:.1f} s")
-        progress.say(f"[{count}/{len(recordings)}] {name}: {what}")
+        progress.say(f"[{count}/{len(recordings)}] {name}: {what.removeprefix(f'{name}: ')}")
     progress.recordings = sorted(results, key=lambda result: result["recording"])
     progress.failed = [result for result in progress.recordings if "error" in result]
     mapped = [result for result in progress.recordings if "error" not in result]

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <cstdint>
 #include <ctime>
 #include <memory>
 #include <memory_resource>
@@ -20,6 +21,8 @@ namespace waymark {
 /// behind extraction, on one thread. What is found out shows in the next frame.
 class TownSession {
  public:
+  static constexpr std::int64_t kFramePeriodNs = 50'000'000;
+
   /// Processor time of a frame in seconds, of all threads.
   struct Times {
     double track_s = 0.0;
@@ -27,10 +30,12 @@ class TownSession {
     double adjust_s = 0.0;  ///< Of everything; 0 where that was not due.
   };
 
-  TownSession(std::shared_ptr<const Rig> rig, bool has_range)
+  /// first_ns: timestamp of the first frame; one comes every kFramePeriodNs.
+  TownSession(std::shared_ptr<const Rig> rig, bool has_range, std::int64_t first_ns = 0)
       : tracker_(rig, has_range, TrackingSettings{}, 1),
         mapper_(rig, MappingSettings{}, LoopSettings{}, {.refine = "off"}, 1),
-        visible_(mapper_.snapshot()) {}
+        visible_(mapper_.snapshot()),
+        first_ns_(first_ns) {}
 
   /// Goes on in a map made before.
   void begin_in(const MapSnapshot& before) {
@@ -44,7 +49,8 @@ class TownSession {
 
   TrackOutcome track(const TownFrame& seen) {
     StageTimes times;
-    const Frame frame{FrameId{num_frames_}, 50'000'000 * std::int64_t{num_frames_}, seen.features};
+    const std::int64_t timestamp_ns = first_ns_ + kFramePeriodNs * num_frames_;
+    const Frame frame{FrameId{num_frames_}, timestamp_ns, seen.features};
     ++num_frames_;
     TrackOutcome outcome;
     times_ = {};
@@ -87,6 +93,7 @@ class TownSession {
   Tracker tracker_;
   GlobalMapper mapper_;
   MapSnapshot visible_;
+  std::int64_t first_ns_;
   Times times_;
   std::uint32_t num_frames_ = 0;
 };
