@@ -24,6 +24,7 @@
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/global_mapper.h"
+#include "waymark/loop/spread_drift.h"
 #include "waymark/map/parts.h"
 #include "waymark/simulate/testing/town_map.h"
 #include "waymark/simulate/testing/town_session.h"
@@ -173,9 +174,7 @@ LoopEdge drifted_loop(const TownScene& scene) {
 void spread_drift_of_loop(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
   const PeakCounter peak(state);
-  for (auto _ : state) {
-    benchmark::DoNotOptimize(spread_drift(*scene.town.map, drifted_loop(scene)));
-  }
+  for (auto _ : state) benchmark::DoNotOptimize(spread_drift(*scene.town.map, drifted_loop(scene)));
 }
 
 void apply_correction_to_all(benchmark::State& state) {

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
@@ -15,6 +16,10 @@ namespace {
 constexpr std::size_t kSmallPart = 8;
 /// Of a radius, for what rounding does to distances.
 constexpr double kRoundingMargin = 1e-6;
+
+double margin_around(const Eigen::Vector3d& centre, double radius) {
+  return kRoundingMargin * (radius + centre.cwiseAbs().maxCoeff());
+}
 
 /// Tells what lies beside one keyframe.
 class BesideJudge {
@@ -70,6 +75,30 @@ std::vector<KeyframeId> find_beside(const Map& map,
   return judge.take();
 }
 
+void LivePositions::catch_up(const Map& map) {
+  positions_.resize(map.keyframes().end_id().value,
+                    Eigen::Vector3d::Constant(std::numeric_limits<double>::quiet_NaN()));
+  const auto note = [&](KeyframeId id, const Keyframe*, const Keyframe* now) {
+    if (now) positions_[id.value] = now->rig_from_world.origin_in_source();
+  };
+  map.keyframes().for_each_difference(followed_ ? followed_->keyframes() : Map().keyframes(), note);
+}
+
+std::vector<KeyframeId> LivePositions::find_beside(const Map& map,
+                                                   KeyframeId query,
+                                                   const BesideOptions& options) {
+  catch_up(map);
+  BesideJudge judge(map, query, options);
+  const Eigen::Vector3d centre = judge.centre();
+  const double radius = judge.radius() + margin_around(centre, judge.radius());
+  for (std::uint32_t i = 0; i < positions_.size(); ++i) {
+    if (!((positions_[i] - centre).squaredNorm() <= radius * radius)) continue;
+    if (const Keyframe* other = map.keyframes().find(KeyframeId{i}))
+      judge.judge(KeyframeId{i}, *other);
+  }
+  return judge.take();
+}
+
 KeyframePositions::KeyframePositions(const Map& map) {
   entries_.reserve(map.keyframes().size());
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
@@ -121,9 +150,9 @@ std::vector<KeyframeId> KeyframePositions::find_beside(const Map& map,
                                                        const BesideOptions& options) const {
   BesideJudge judge(map, query, options);
   const Eigen::Vector3d centre = judge.centre();
-  const double margin = kRoundingMargin * (judge.radius() + centre.cwiseAbs().maxCoeff());
   std::vector<KeyframeId> near;
-  list_within(0, entries_.size(), centre, judge.radius() + margin, near);
+  list_within(
+      0, entries_.size(), centre, judge.radius() + margin_around(centre, judge.radius()), near);
   std::sort(near.begin(), near.end());
   for (const KeyframeId id : near) {
     if (const Keyframe* other = map.keyframes().find(id)) judge.judge(id, *other);

@@ -5,6 +5,8 @@
 #include <Eigen/Core>
 #include <cstddef>
 #include <cstdint>
+#include <memory>
+#include <utility>
 #include <vector>
 
 #include "waymark/map/map.h"
@@ -21,6 +23,27 @@ struct BesideOptions {
 /// Keyframes of the same sub-map beside the query where the map has it, nearest first. Looks at all
 /// keyframes: for one question.
 std::vector<KeyframeId> find_beside(const Map& map, KeyframeId query, const BesideOptions& options);
+
+/// Where the keyframes of a map are, kept up to date as it changes, for a question now and then.
+class LivePositions {
+ public:
+  /// The same as waymark::find_beside(), in a time that follows what has changed since.
+  std::vector<KeyframeId> find_beside(const Map& map,
+                                      KeyframeId query,
+                                      const BesideOptions& options);
+  /// Notes the positions of a state of the map, from which on changes are looked for.
+  void follow(std::shared_ptr<const Map> frozen) {
+    catch_up(*frozen);
+    followed_ = std::move(frozen);
+  }
+
+ private:
+  void catch_up(const Map& map);
+
+  std::shared_ptr<const Map> followed_;
+  /// By value of the id; of those erased where they were, of others that are none not a number.
+  std::vector<Eigen::Vector3d> positions_;
+};
 
 /// Where the keyframes of a map are, for many questions: a tree that halves them again and again
 /// (Bentley 1975), so that an answer takes a time that follows what lies near.

@@ -38,6 +38,31 @@ INSTANTIATE_TEST_SUITE_P(Maps, Beside, ::testing::Bool(), [](const auto& info) {
   return info.param ? "closed" : "open";
 });
 
+TEST_P(Beside, LivePositionsFindTheSameWhateverChanges) {
+  const TownMap town = make_town_map({.num_keyframes = 500, .is_closed = GetParam()});
+  Map map = Map::thaw(*town.map);
+  LivePositions positions;
+  BesideOptions options = kNear;
+  options.distance = 2.0;
+  std::size_t num_found = 0;
+  const auto compare = [&](KeyframeId query) {
+    const auto expected = find_beside(map, query, options);
+    EXPECT_EQ(positions.find_beside(map, query, options), expected) << query.value;
+    num_found += expected.size();
+  };
+  compare(KeyframeId{250});
+  for (std::uint32_t i = 10; i < 490; i += 7) {
+    if (i % 3 == 0) positions.follow(map.freeze());
+    const KeyframeId moved{(13 * i) % 500};
+    const Rigid3 near = map.keyframes().at(KeyframeId{i + 1}).rig_from_world;
+    if (map.keyframes().contains(moved)) map.move_keyframe(moved, near);
+    compare(KeyframeId{i + 1});
+    if (!map.has_loop_edge(KeyframeId{i})) map.erase_keyframe(KeyframeId{i});
+    compare(KeyframeId{i + 2});
+  }
+  EXPECT_GT(num_found, 100u);
+}
+
 TEST(KeyframesBeside, WhatSeesNothingHasNothingBeside) {
   const TownMap town = make_town_map({.num_keyframes = 60});
   Map map = Map::thaw(*town.map);
@@ -47,6 +72,7 @@ TEST(KeyframesBeside, WhatSeesNothingHasNothingBeside) {
   }
   EXPECT_TRUE(find_beside(map, blind, kNear).empty());
   EXPECT_TRUE(KeyframePositions(map).find_beside(map, blind, kNear).empty());
+  EXPECT_TRUE(LivePositions().find_beside(map, blind, kNear).empty());
 }
 
 }  // namespace

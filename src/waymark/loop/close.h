@@ -11,23 +11,28 @@
 
 namespace waymark {
 
-/// Makes the map agree with a revisit, notes it as a loop edge and makes one of what query, match
-/// and their neighbours hold for different landmarks. Within a sub-map that closes a loop: the
-/// drift is spread over all keyframes (spread_drift()), and what is left of the error is for a
-/// global bundle adjustment. Two sub-maps, which must both be metric or both not, are joined: the
-/// younger moves by one similarity to where the older has the place, in its frame and units, and
-/// belongs to it from then on. Returns whether it was a join.
-bool close_revisit(Map& map,
-                   PlaceIndex& places,
-                   const Revisit& revisit,
-                   ProjectionMatcher& matcher,
-                   DirtyLandmarks& dirty);
+/// The loop of a revisit within a sub-map.
+inline LoopEdge as_loop(const Revisit& revisit) {
+  return {revisit.match, revisit.query, revisit.query_from_match};
+}
 
-/// Where the keyframes of a sub-map belong if a loop is to close: those of a pose graph (Strasdat
-/// et al. 2010) of the essential graph of Mur-Artal et al. (2015, III.D), which is the spanning
-/// tree, strong covisibility and the loops so far, and of the new loop; over similarities where the
-/// scale is free. The root stays.
-MapCorrection spread_drift(const Map& map, const LoopEdge& loop);
+/// Closes a loop within a sub-map: moves keyframes as spread_drift() says, notes the loop edge, and
+/// makes one of what query, match and their neighbours hold for different landmarks. What is left
+/// of the error is for a global bundle adjustment.
+void close_loop(Map& map,
+                const Revisit& revisit,
+                const MapCorrection& correction,
+                ProjectionMatcher& matcher,
+                DirtyLandmarks& dirty);
+
+/// Joins two sub-maps, which must both be metric or both not: the younger moves by one similarity
+/// to where the older has the place, in its frame and units, and belongs to it from then on. The
+/// revisit is noted as a loop edge, and landmarks are made one as in close_loop().
+void join_submaps(Map& map,
+                  PlaceIndex& places,
+                  const Revisit& revisit,
+                  ProjectionMatcher& matcher,
+                  DirtyLandmarks& dirty);
 
 /// Makes one of what keyframes that look at the same from near each other hold for different
 /// landmarks, though they are not neighbours in the graph: the camera came by again later. For a

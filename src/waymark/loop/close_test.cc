@@ -5,6 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/loop/find.h"
+#include "waymark/loop/spread_drift.h"
 #include "waymark/loop/test_loop.h"
 #include "waymark/loop/verify.h"
 
@@ -33,7 +34,8 @@ class LoopClosingTest : public ::testing::Test {
  protected:
   void close(LoopScene& scene, const Revisit& revisit) {
     ProjectionMatcher matcher(scene.rig);
-    EXPECT_FALSE(close_revisit(scene.map, scene.places, revisit, matcher, dirty_));
+    const SpreadDrift spread = spread_drift(scene.map, as_loop(revisit));
+    close_loop(scene.map, revisit, spread.correction, matcher, dirty_);
     ASSERT_EQ(scene.map.broken_invariants(), "");
   }
 
@@ -62,8 +64,7 @@ TEST_F(LoopClosingTest, ClosesALoopWithDriftOfTheScale) {
 TEST_F(LoopClosingTest, SpreadsTheDriftEvenly) {
   LoopScene scene(cloud_all_round(kNumPoints), false, whole_drift({0, 0, 0}, {0, 0, 0}, 1.3));
   const Revisit revisit = walk_until_found(scene, 0);
-  const MapCorrection correction =
-      spread_drift(scene.map, {revisit.match, revisit.query, revisit.query_from_match});
+  const MapCorrection correction = spread_drift(scene.map, as_loop(revisit)).correction;
   ASSERT_EQ(correction.keyframes.size(), scene.map.keyframes().size());
   EXPECT_EQ(correction.keyframes.front().scale, 1.0) << "the root stays";
   const double per_step = std::log(1.3) / kRound;
@@ -134,7 +135,7 @@ TEST(JoinSubmapsTest, MovesTheYoungerToTheOlder) {
     DirtyLandmarks dirty;
     const Map& map = scene.map;
     const std::size_t num_landmarks = map.landmarks().size();
-    EXPECT_TRUE(close_revisit(scene.map, scene.places, revisit, matcher, dirty));
+    join_submaps(scene.map, scene.places, revisit, matcher, dirty);
     EXPECT_EQ(map.broken_invariants(), "");
     EXPECT_EQ(map.resolve(SubmapId{1}), SubmapId{0});
     map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {

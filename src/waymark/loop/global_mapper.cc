@@ -3,12 +3,14 @@
 #include "waymark/loop/global_mapper.h"
 
 #include <algorithm>
+#include <iterator>
 #include <utility>
 
 #include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/join_by_markers.h"
+#include "waymark/loop/spread_drift.h"
 #include "waymark/loop/undo.h"
 #include "waymark/map/align.h"
 #include "waymark/map/parts.h"
@@ -35,6 +37,10 @@ constexpr std::size_t kFirstMarkerSurvey = 5;
 
 /// A loop between keyframes so near to those of another says the same again.
 constexpr std::uint32_t kBesideDisbelieved = 3;
+
+/// Of a loop that needs no weighing against the others, see SpreadDrift: nine times what
+/// switch_edges() lets stand, as odometry is less sure than the map by three.
+constexpr double kMaxContradiction = 9.0 * 4.3 * 4.3;
 
 /// A join makes loops of what was seen before it, which may let others be joined in turn.
 constexpr int kMaxPasses = 4;
@@ -88,14 +94,37 @@ void GlobalMapper::update_places(const Mapper::Changes& changes) {
 
 bool GlobalMapper::close(const Revisit& revisit) {
   odometry_.note(mapper_.map());
-  if (!agrees_with_loops(revisit)) return false;
-  bool is_join = false;
-  mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
-    is_join = close_revisit(map, places_, revisit, projection_, dirty);
-  });
-  num_loops_ += !is_join;
+  const auto& keyframes = mapper_.map().keyframes();
+  if (keyframes.at(revisit.query).submap != keyframes.at(revisit.match).submap) {
+    join(revisit);
+  } else if (!close_loop(revisit)) {
+    return false;
+  }
   ++num_closures_;
-  unadjusted_ = mapper_.map().keyframes().at(revisit.query).submap;
+  unadjusted_ = keyframes.at(revisit.query).submap;
+  return true;
+}
+
+void GlobalMapper::join(const Revisit& revisit) {
+  mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+    join_submaps(map, places_, revisit, projection_, dirty);
+  });
+  moved_ = all_keyframes();
+}
+
+bool GlobalMapper::close_loop(const Revisit& revisit) {
+  SpreadDrift spread = spread_drift(mapper_.map(), as_loop(revisit));
+  if (spread.contradiction > kMaxContradiction) {
+    const std::uint32_t num_placements = num_placements_;
+    if (!agrees_with_loops(revisit)) return false;
+    if (num_placements_ != num_placements) spread = spread_drift(mapper_.map(), as_loop(revisit));
+  }
+  mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
+    waymark::close_loop(map, revisit, spread.correction, projection_, dirty);
+  });
+  ++num_loops_;
+  moved_.clear();
+  for (const auto& move : spread.correction.keyframes) moved_.push_back(move.keyframe);
   return true;
 }
 
@@ -104,13 +133,12 @@ bool GlobalMapper::close(const Revisit& revisit) {
 bool GlobalMapper::agrees_with_loops(const Revisit& revisit) {
   const Map& map = mapper_.map();
   const SubmapId submap = map.keyframes().at(revisit.query).submap;
-  if (map.keyframes().at(revisit.match).submap != submap) return true;
   std::vector<LoopEdge> loops = map.measured_loop_edges();
   const std::size_t num_of_map = loops.size();
   loops.insert(loops.end(), disbelieved_.begin(), disbelieved_.end());
   // Nothing but the length of the way, which has been looked at, can contradict the first.
   if (loops.empty()) return true;
-  loops.push_back(as_measured(map, {revisit.match, revisit.query, revisit.query_from_match}));
+  loops.push_back(as_measured(map, as_loop(revisit)));
   const std::vector<std::uint8_t> is_on = choose_loops(map, odometry_, submap, loops, num_of_map);
   undo(submap, std::span(is_on).first(num_of_map));
   if (!is_on.back()) disbelieve(loops.back());
@@ -151,8 +179,16 @@ void GlobalMapper::disbelieve(const LoopEdge& loop) {
 bool GlobalMapper::close_alike(KeyframeId query) {
   const auto revisit = verifier_.verify_alike(mapper_.map(), places_, query);
   if (!revisit || !close(*revisit)) return false;
-  unconsolidated_ = all_keyframes();
+  consolidate_later(moved_);
   return true;
+}
+
+/// And what came since the last time.
+void GlobalMapper::consolidate_later(std::span<const KeyframeId> keyframes) {
+  unconsolidated_.insert(keyframes.begin(), keyframes.end());
+  for (; end_of_noted_ < mapper_.map().keyframes().end_id(); ++end_of_noted_.value) {
+    unconsolidated_.insert(unconsolidated_.end(), end_of_noted_);
+  }
 }
 
 std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
@@ -161,29 +197,33 @@ std::vector<KeyframeId> GlobalMapper::all_keyframes() const {
   return ids;
 }
 
+std::optional<KeyframeId> GlobalMapper::next_unconsolidated() {
+  while (!unconsolidated_.empty()) {
+    const KeyframeId id = unconsolidated_.extract(std::prev(unconsolidated_.end())).value();
+    if (mapper_.map().keyframes().contains(id)) return id;
+  }
+  return std::nullopt;
+}
+
 bool GlobalMapper::close_one_beside(KeyframeId query, std::span<const KeyframeId> beside) {
   const auto revisit = verifier_.verify_beside(mapper_.map(), query, beside);
   return revisit && close(*revisit);
 }
 
 void GlobalMapper::consolidate_some(std::size_t max_count) {
-  for (std::size_t i = 0; i < max_count && !unconsolidated_.empty(); ++i) {
-    const KeyframeId query = unconsolidated_.back();
-    unconsolidated_.pop_back();
-    if (!mapper_.map().keyframes().contains(query)) continue;
-    close_one_beside(query, find_beside(mapper_.map(), query, kBeside));
+  for (std::size_t i = 0; i < max_count; ++i) {
+    const std::optional<KeyframeId> query = next_unconsolidated();
+    if (!query) return;
+    close_one_beside(*query, positions_.find_beside(mapper_.map(), *query, kBeside));
   }
 }
 
 void GlobalMapper::consolidate_rest() {
   std::optional<KeyframePositions> positions;
-  while (!unconsolidated_.empty()) {
-    const KeyframeId query = unconsolidated_.back();
-    unconsolidated_.pop_back();
-    if (!mapper_.map().keyframes().contains(query)) continue;
+  while (const std::optional<KeyframeId> query = next_unconsolidated()) {
     if (!positions) positions.emplace(mapper_.map());
     // What was closed moved keyframes.
-    if (close_one_beside(query, positions->find_beside(mapper_.map(), query, kBeside))) {
+    if (close_one_beside(*query, positions->find_beside(mapper_.map(), *query, kBeside))) {
       positions.reset();
     }
   }
@@ -305,7 +345,7 @@ bool GlobalMapper::join_what_knows_the_same_markers() {
   mapper_.change([&](Map& map, DirtyLandmarks&) { num_joined = join_by_markers(map, places_); });
   if (num_joined == 0) return false;
   num_closures_ += static_cast<std::uint32_t>(num_joined);
-  unconsolidated_ = all_keyframes();
+  consolidate_later(all_keyframes());
   return true;
 }
 
@@ -317,7 +357,7 @@ void GlobalMapper::finish() {
     return;
   }
   if (mapper_.map().keyframes().contains(KeyframeId{end - 1})) close_alike(KeyframeId{end - 1});
-  if (num_closures_ == 0) unconsolidated_ = all_keyframes();
+  if (num_closures_ == 0) consolidate_later(all_keyframes());
   consolidate();
   place_rest_by_markers();
   if (join_what_knows_the_same_markers()) consolidate();
@@ -331,7 +371,9 @@ void GlobalMapper::consolidate() {
 }
 
 MapSnapshot GlobalMapper::snapshot() {
-  return {mapper_.freeze(), std::make_shared<const PlaceIndex>(places_)};
+  std::shared_ptr<const Map> map = mapper_.freeze();
+  positions_.follow(map);
+  return {std::move(map), std::make_shared<const PlaceIndex>(places_)};
 }
 
 MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {

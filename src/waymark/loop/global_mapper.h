@@ -6,10 +6,12 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <span>
 #include <vector>
 
 #include "waymark/loop/adjustment_pace.h"
+#include "waymark/loop/beside.h"
 #include "waymark/loop/odometry.h"
 #include "waymark/loop/settings.h"
 #include "waymark/loop/verify.h"
@@ -93,6 +95,8 @@ class GlobalMapper {
  private:
   void update_places(const Mapper::Changes& changes);
   bool close_one_beside(KeyframeId query, std::span<const KeyframeId> beside);
+  bool close_loop(const Revisit& revisit);
+  void join(const Revisit& revisit);
   bool agrees_with_loops(const Revisit& revisit);
   void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
   void disbelieve(const LoopEdge& loop);
@@ -100,6 +104,8 @@ class GlobalMapper {
   void consolidate_some(std::size_t max_count);
   void consolidate_rest();
   std::vector<KeyframeId> all_keyframes() const;
+  void consolidate_later(std::span<const KeyframeId> keyframes);
+  std::optional<KeyframeId> next_unconsolidated();
   void look_with_calibration(const std::shared_ptr<const Rig>& before);
   void refine_globally(bool with_calibration);
   void look_at_markers(KeyframeId newest);
@@ -114,7 +120,10 @@ class GlobalMapper {
   ProjectionMatcher projection_;
   AdjustmentPace pace_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
-  std::vector<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
+  std::set<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
+  KeyframeId end_of_noted_{0};           ///< Keyframes below were among these at some time.
+  std::vector<KeyframeId> moved_;        ///< What was closed last moved these, ascending.
+  LivePositions positions_;
   Odometry odometry_;
   /// Loops that others contradict, in units before any correction: further ones may agree with
   /// them.

@@ -6,6 +6,7 @@
 
 #include "waymark/image/hamming.h"
 #include "waymark/loop/close.h"
+#include "waymark/loop/spread_drift.h"
 #include "waymark/loop/test_loop.h"
 
 namespace waymark {
@@ -54,7 +55,7 @@ TEST(UndoLoops, TakesBackPosesAndMerges) {
     ASSERT_GT(lie.pairs.size(), 30u);
     ProjectionMatcher matcher(scene.rig);
     DirtyLandmarks dirty;
-    close_revisit(map, scene.places, lie, matcher, dirty);
+    close_loop(map, lie, spread_drift(map, as_loop(lie)).correction, matcher, dirty);
     const std::size_t num_merged = map.landmarks().size();
     const LandmarkId end_before = map.landmarks().end_id();
     const std::vector<std::uint8_t> none = {0};

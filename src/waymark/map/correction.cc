@@ -2,7 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/map/correction.h"
 
-#include <optional>
+#include <algorithm>
+#include <cstdint>
 #include <vector>
 
 #include "waymark/geometry/sim3.h"
@@ -10,8 +11,29 @@
 namespace waymark {
 namespace {
 
-/// new_world_from_old_world around each keyframe that moves, by value of the id.
-using Motions = std::vector<std::optional<Sim3>>;
+/// new_world_from_old_world around each keyframe that moves.
+class MotionTable {
+ public:
+  explicit MotionTable(KeyframeId end) : place_of_id_(end.value, kNone) {}
+
+  void set(KeyframeId id, const Sim3& motion) {
+    place_of_id_[id.value] = static_cast<std::uint32_t>(motions_.size());
+    motions_.push_back(motion);
+  }
+  void share(KeyframeId id, KeyframeId with) { place_of_id_[id.value] = place_of_id_[with.value]; }
+  /// Null where there is none.
+  const Sim3* find(KeyframeId id) const {
+    const bool is_known = id.value < place_of_id_.size() && place_of_id_[id.value] != kNone;
+    return is_known ? &motions_[place_of_id_[id.value]] : nullptr;
+  }
+  KeyframeId end() const { return KeyframeId{static_cast<std::uint32_t>(place_of_id_.size())}; }
+
+ private:
+  static constexpr std::uint32_t kNone = UINT32_MAX;
+
+  std::vector<std::uint32_t> place_of_id_;  // By value of the id.
+  std::vector<Sim3> motions_;
+};
 
 Sim3 motion_of(const MapCorrection::KeyframeMove& move, const Rigid3& old_rig_from_world) {
   const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), move.scale);
@@ -19,14 +41,14 @@ Sim3 motion_of(const MapCorrection::KeyframeMove& move, const Rigid3& old_rig_fr
 }
 
 /// The motion of the nearest ancestor that has one, given to all on the way.
-void inherit(const Map& map, KeyframeId id, Motions& motions) {
+void inherit(const Map& map, KeyframeId id, MotionTable& motions) {
   std::vector<KeyframeId> way;
-  while (id.is_valid() && !motions[id.value]) {
+  while (id.is_valid() && !motions.find(id)) {
     way.push_back(id);
     id = map.keyframes().at(id).parent;
   }
   if (!id.is_valid()) return;
-  for (const KeyframeId descendant : way) motions[descendant.value] = motions[id.value];
+  for (const KeyframeId descendant : way) motions.share(descendant, id);
 }
 
 Rigid3 moved(const Rigid3& rig_from_world, const Sim3& motion) {
@@ -35,21 +57,45 @@ Rigid3 moved(const Rigid3& rig_from_world, const Sim3& motion) {
   return {rig_from_new.rotation, rig_from_new.translation};
 }
 
-void move_keyframes(Map& map, const MapCorrection& correction, const Motions& motions) {
+void move_keyframes(Map& map, const MapCorrection& correction, const MotionTable& motions) {
   auto named = correction.keyframes.begin();
-  for (KeyframeId id{0}; id.value < motions.size(); ++id.value) {
-    if (!motions[id.value]) continue;
+  for (KeyframeId id{0}; id < motions.end(); ++id.value) {
+    const Sim3* const motion = motions.find(id);
+    if (!motion) continue;
     while (named != correction.keyframes.end() && named->keyframe < id) ++named;
     const bool is_named = named != correction.keyframes.end() && named->keyframe == id;
     // What is named goes exactly where it is told to.
-    map.move_keyframe(id,
-                      is_named ? named->rig_from_world
-                               : moved(map.keyframes().at(id).rig_from_world, *motions[id.value]));
-    map.rescale_keyframe(id, motions[id.value]->scale);
+    map.move_keyframe(
+        id,
+        is_named ? named->rig_from_world : moved(map.keyframes().at(id).rig_from_world, *motion));
+    map.rescale_keyframe(id, motion->scale);
   }
 }
 
-void move_landmarks(Map& map, const MapCorrection& correction, const Motions& motions) {
+/// Those that may move, ascending.
+template <class Visit>
+void for_each_landmark(const Map& map, const MapCorrection& correction, const Visit& visit) {
+  if (!correction.is_of_part) {
+    map.landmarks().for_each(visit);
+    return;
+  }
+  std::vector<LandmarkId> ids;
+  for (const MapCorrection::LandmarkMove& move : correction.landmarks) ids.push_back(move.landmark);
+  for (const MapCorrection::KeyframeMove& move : correction.keyframes) {
+    const Keyframe* const keyframe = map.keyframes().find(move.keyframe);
+    if (!keyframe) continue;
+    for (const LandmarkId id : keyframe->landmarks) {
+      if (id.is_valid() && map.landmarks().at(id).reference == move.keyframe) ids.push_back(id);
+    }
+  }
+  std::sort(ids.begin(), ids.end());
+  ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
+  for (const LandmarkId id : ids) {
+    if (const Landmark* const landmark = map.landmarks().find(id)) visit(id, *landmark);
+  }
+}
+
+void move_landmarks(Map& map, const MapCorrection& correction, const MotionTable& motions) {
   struct Move {
     LandmarkId landmark;
     Eigen::Vector3d position_in_world;
@@ -57,12 +103,10 @@ void move_landmarks(Map& map, const MapCorrection& correction, const Motions& mo
   };
   std::vector<Move> moves;
   auto named = correction.landmarks.begin();
-  map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
+  for_each_landmark(map, correction, [&](LandmarkId id, const Landmark& landmark) {
     while (named != correction.landmarks.end() && named->landmark < id) ++named;
     const bool is_named = named != correction.landmarks.end() && named->landmark == id;
-    const bool has_reference = landmark.reference.value < motions.size();
-    const std::optional<Sim3> motion =
-        has_reference ? motions[landmark.reference.value] : std::nullopt;
+    const Sim3* const motion = motions.find(landmark.reference);
     if (!is_named && !motion) return;
     Move move{id, landmark.position_in_world, landmark.appearance};
     if (motion) {
@@ -82,12 +126,14 @@ void move_landmarks(Map& map, const MapCorrection& correction, const Motions& mo
 }  // namespace
 
 void apply_correction(Map& map, const MapCorrection& correction) {
-  Motions motions(map.keyframes().end_id().value);
+  MotionTable motions(map.keyframes().end_id());
   for (const MapCorrection::KeyframeMove& move : correction.keyframes) {
     const Keyframe* keyframe = map.keyframes().find(move.keyframe);
-    if (keyframe) motions[move.keyframe.value] = motion_of(move, keyframe->rig_from_world);
+    if (keyframe) motions.set(move.keyframe, motion_of(move, keyframe->rig_from_world));
   }
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe&) { inherit(map, id, motions); });
+  if (!correction.is_of_part) {
+    map.keyframes().for_each([&](KeyframeId id, const Keyframe&) { inherit(map, id, motions); });
+  }
   move_landmarks(map, correction, motions);
   move_keyframes(map, correction, motions);
 }

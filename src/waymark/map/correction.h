@@ -22,13 +22,16 @@ struct MapCorrection {
   };
   std::vector<KeyframeMove> keyframes;  ///< Ascending.
   std::vector<LandmarkMove> landmarks;  ///< Ascending.
+  /// Found out on the map of now about a part of it: what is not named stays, but for landmarks,
+  /// which go with their reference. Takes a time that follows what is named.
+  bool is_of_part = false;
 };
 
 /// Moves what the correction names to where it says; what it names but is erased is skipped. What
-/// it does not name, being younger, moves along: a keyframe by the similarity (rotation,
-/// translation, scale) of its nearest ancestor in the spanning tree that is named, and stays if
-/// there is none; a landmark, with its size, by that of its reference keyframe. Poses stored
-/// relative to a keyframe follow through its applied_scale.
+/// it does not name, being younger, moves along (unless it is of a part): a keyframe by the
+/// similarity (rotation, translation, scale) of its nearest ancestor in the spanning tree that is
+/// named, and stays if there is none; a landmark, with its size, by that of its reference keyframe.
+/// Poses stored relative to a keyframe follow through its applied_scale.
 void apply_correction(Map& map, const MapCorrection& correction);
 
 }  // namespace waymark

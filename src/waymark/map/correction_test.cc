@@ -40,6 +40,21 @@ class CorrectionTest : public ::testing::Test {
   const Rigid3 target_ = Rigid3::exp((Vector6d() << 0.3, -0.2, 0.5, 0.1, 0.4, -0.2).finished());
 };
 
+TEST_F(CorrectionTest, OfAPartMovesOnlyWhatItNamesAndItsLandmarks) {
+  MapCorrection correction;
+  correction.is_of_part = true;
+  correction.keyframes.push_back({KeyframeId{2}, target_, 1.5});
+  correction.landmarks.push_back({LandmarkId{4}, {7.0, 8.0, 9.0}});
+  apply_correction(map_, correction);
+  EXPECT_EQ(map_.broken_invariants(), "");
+  EXPECT_EQ(map_.keyframes().at(KeyframeId{2}).rig_from_world.translation, target_.translation);
+  EXPECT_TRUE(landmark_in_rig(2, 2).isApprox(Eigen::Vector3d(0.0, 0.0, 3.0), 1e-12));
+  EXPECT_EQ(map_.keyframes().at(KeyframeId{3}).rig_from_world.translation.x(), -3.0);
+  EXPECT_EQ(map_.keyframes().at(KeyframeId{3}).applied_scale, 1.0);
+  EXPECT_EQ(map_.landmarks().at(LandmarkId{3}).position_in_world, Eigen::Vector3d(3.0, 0.0, 2.0));
+  EXPECT_EQ(map_.landmarks().at(LandmarkId{4}).position_in_world, Eigen::Vector3d(7.0, 8.0, 9.0));
+}
+
 TEST_F(CorrectionTest, WhatWasUnknownMovesWithTheSimilarityOfItsAncestor) {
   MapCorrection correction;
   correction.keyframes.push_back({KeyframeId{2}, target_, 1.5});
