@@ -42,6 +42,11 @@ bool outdoes(const Map& map, const Revisit& loop, double drift_of_rival) {
          is_plausible_loop(map, loop, kMaxPartOfPossibleDrift);
 }
 
+bool is_rival(const Revisit& place, std::size_t num_inliers_of_other) {
+  return static_cast<double>(place.num_inliers) >=
+         kMinPartOfInliers * static_cast<double>(num_inliers_of_other);
+}
+
 std::optional<Revisit> choose_loop(const Map& map, std::span<const RevisitEvidence> loops) {
   std::size_t most_inliers = 0;
   for (const RevisitEvidence& loop : loops) {
@@ -52,8 +57,7 @@ std::optional<Revisit> choose_loop(const Map& map, std::span<const RevisitEviden
   std::vector<const Revisit*> contenders;
   for (const RevisitEvidence& loop : loops) {
     const Revisit& revisit = loop.revisit;
-    const auto num_inliers = static_cast<double>(revisit.num_inliers);
-    if (num_inliers < kMinPartOfInliers * static_cast<double>(most_inliers)) continue;
+    if (!is_rival(revisit, most_inliers)) continue;
     contenders.push_back(&revisit);
     const double drift = drift_in_depths(map, revisit);
     if (nearest && drift >= least_drift) continue;

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 
@@ -24,6 +25,10 @@ bool agree(const Map& map, const Revisit& a, const Revisit& b);
 /// maps mostly are. There may be more such places than were found: beside each other doors and
 /// shelves are seen at once, so that none is looked for at the other.
 bool outdoes(const Map& map, const Revisit& loop, double drift_of_rival);
+
+/// Whether a place is a rival of another that looks like the same query: not where half as many
+/// inliers do not speak for it.
+bool is_rival(const Revisit& place, std::size_t num_inliers_of_other);
 
 /// Of loops of one query that looks and geometry allow, the one that explains best what is seen:
 /// places for which half as many inliers speak are rivals, whether the map can have drifted so far

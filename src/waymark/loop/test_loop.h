@@ -50,6 +50,21 @@ inline PointCloud cloud_with_twins(int count) {
   return cloud;
 }
 
+/// A fifth of the half round z > 0 again, turned by 180 degrees, among what the other half has.
+inline PointCloud cloud_with_faint_twins(int count) {
+  PointCloud cloud = cloud_all_round(count);
+  const Eigen::Vector3d half_turn(-1.0, 1.0, -1.0);
+  const std::vector<PointLandmark> originals = cloud.landmarks;
+  for (std::size_t i = 0; i < originals.size(); i += 5) {
+    PointLandmark twin = originals[i];
+    if (twin.position.z() < 0.0) continue;
+    twin.position = half_turn.cwiseProduct(twin.position);
+    twin.tangent = half_turn.cwiseProduct(twin.tangent);
+    cloud.landmarks.push_back(twin);
+  }
+  return cloud;
+}
+
 /// One and the same stretch, so many times all round.
 inline PointCloud cloud_of_equal_stretches(int count, int num_stretches) {
   PointCloud cloud = cloud_all_round(count);

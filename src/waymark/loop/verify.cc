@@ -51,13 +51,20 @@ bool is_loop(const Map& map, const Revisit& revisit) {
   return map.keyframes().at(revisit.query).submap == map.keyframes().at(revisit.match).submap;
 }
 
-/// The one with most inliers, unless another contradicts it.
-std::optional<Revisit> choose_join(const Map& map, const std::vector<RevisitEvidence>& joins) {
+/// The one with most inliers, unless another contradicts it, or a place of the query's own sub-map
+/// is a rival: where one sub-map has two places alike, one of them says nothing of another sub-map.
+std::optional<Revisit> choose_join(const Map& map,
+                                   const std::vector<RevisitEvidence>& joins,
+                                   const std::vector<RevisitEvidence>& loops) {
   const RevisitEvidence& best = *std::ranges::max_element(
       joins, {}, [](const RevisitEvidence& one) { return one.revisit.num_inliers; });
   const bool is_clear = std::ranges::all_of(
       joins, [&](const RevisitEvidence& other) { return agree(map, best.revisit, other.revisit); });
-  return is_clear && meets(map, best, kOfJoins) ? std::optional(best.revisit) : std::nullopt;
+  const bool has_rival = std::ranges::any_of(loops, [&](const RevisitEvidence& loop) {
+    return is_rival(loop.revisit, best.revisit.num_inliers);
+  });
+  return is_clear && !has_rival && meets(map, best, kOfJoins) ? std::optional(best.revisit)
+                                                              : std::nullopt;
 }
 
 /// Features of a keyframe that show a landmark of its own and another one.
@@ -108,13 +115,8 @@ std::optional<Revisit> RevisitVerifier::verify_alike(const Map& map,
   for (RevisitEvidence& evidence : collect_alike(map, places, query)) {
     (is_loop(map, evidence.revisit) ? loops : joins).push_back(std::move(evidence));
   }
-  // Where one sub-map has two places alike, one of them says nothing of another sub-map.
-  std::optional<Revisit> chosen;
-  if (!loops.empty()) {
-    chosen = choose_loop(map, loops);
-  } else if (!joins.empty()) {
-    chosen = choose_join(map, joins);
-  }
+  std::optional<Revisit> chosen = choose_loop(map, loops);
+  if (!chosen && !joins.empty()) chosen = choose_join(map, joins, loops);
   return chosen && is_unrivalled(map, places, *chosen) ? chosen : std::nullopt;
 }
 

@@ -130,6 +130,17 @@ TEST(VerifyAlikeTest, JoinsNothingAtAPlaceThatIsThereTwice) {
   EXPECT_EQ(walk(scene, verifier, 2, 8).num_found, 0);
 }
 
+TEST(VerifyAlikeTest, JoinsAtAPlaceThatAnotherOneFaintlyResembles) {
+  LoopScene scene(cloud_with_faint_twins(kNumPoints), true, Vector7d::Zero());
+  RevisitVerifier verifier(scene.rig, 1);
+  walk(scene, verifier, 0, 12);
+  scene.start_submap(Sim3());
+  EXPECT_EQ(walk(scene, verifier, 18, 30).num_found, 0) << "a fifth of what is there is the same";
+  const Walk result = walk(scene, verifier, 30, kRound + 10);
+  EXPECT_GE(result.num_found, 8);
+  EXPECT_EQ(scene.map.keyframes().at(result.first->match).submap, SubmapId{0});
+}
+
 TEST(VerifyAlikeTest, FindsThePlaceAmongEqualStretchesThatTheMapIsNearTo) {
   LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, drift_of(0.05, 0.01, 0.0));
   RevisitVerifier verifier(scene.rig, 1);
