@@ -21,16 +21,19 @@ struct EdgePoint {
 
 /// Which edges to find.
 struct EdgeRequest {
-  int border_px = 4;        ///< Nearest to the border of the image, at least 4.
-  double min_slope = 2.5;   ///< Grey values per pixel.
-  std::size_t count = 500;  ///< At most; the steepest.
+  int border_px = 7;         ///< Nearest to the border of the image, at least 7.
+  double min_slope = 0.7;    ///< Grey values per pixel; no edge is less steep, ...
+  double clear_slope = 2.5;  ///< ... and one as steep as that is one, however noisy the image.
+  std::size_t count = 500;   ///< At most; the steepest.
 };
 
 /// Finds points on edges: where the slope of the grey values, of an image smoothed by a small
 /// binomial, has its maximum along its own direction (Canny 1986), to sub-pixel accuracy by a
 /// parabola (Devernay 1995). Edges are straight there for 4 px to both sides, so that a neighbour
-/// of a point tells the same. One point per cell of the image at most, which spreads them. Same
-/// image, same bits. Keeps its buffers.
+/// of a point tells the same; place and direction are those of the line through all of that, so
+/// that noise averages out. How much steeper than its surroundings an edge must be follows the
+/// noise of the image. One point per cell of the image at most, which spreads them. Same image,
+/// same bits. Keeps its buffers.
 class EdgeFinder {
  public:
   static constexpr int kCellPx = 8;
@@ -54,7 +57,15 @@ class EdgeFinder {
                       static_cast<std::size_t>(x)];
   }
   float slope_at(int x, int y) const;
+  /// Standard deviation of a derivative where the image shows nothing.
+  float measure_noise();
   bool is_straight(int x, int y, const EdgePoint& point) const;
+  /// Slope in a direction between pixels.
+  float slope_along(float x, float y, float nx, float ny) const;
+  /// By how much the ridge through a point is steeper than what is beside it.
+  float rise_above_sides(const EdgePoint& point) const;
+  /// Moves a point to the line through its edge nearby; false where there is none.
+  bool fit_line(EdgePoint& point) const;
   /// The point of the edge through a pixel, if that is its ridge.
   bool locate(int x, int y, EdgePoint& point) const;
   void limit(std::size_t count);

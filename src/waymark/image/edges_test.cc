@@ -9,6 +9,7 @@
 #include <numbers>
 #include <vector>
 
+#include "waymark/base/rng.h"
 #include "waymark/image/image_testing.h"
 
 namespace waymark {
@@ -16,16 +17,16 @@ namespace {
 
 constexpr int kSizePx = 120;
 
-/// Grey 80 where distance(x, y) is negative, 110 where it is positive; areas are integrated over
-/// one pixel, and blurred a little as lenses do.
+/// Grey 80 where distance(x, y) is negative, more by `height` where it is positive; areas are
+/// integrated over one pixel, and blurred a little as lenses do.
 template <class Distance>
-PaddedImage make_step(Distance distance) {
+PaddedImage make_step(Distance distance, double height = 30.0) {
   PaddedImage image;
   image.resize(kSizePx, kSizePx);
   for (int y = 0; y < kSizePx; ++y) {
     for (int x = 0; x < kSizePx; ++x) {
       const double lit = 0.5 * (1.0 + std::erf(distance(x, y) / 0.9));
-      image.row(y)[x] = static_cast<std::uint8_t>(std::lround(80.0 + 30.0 * lit));
+      image.row(y)[x] = static_cast<std::uint8_t>(std::lround(80.0 + height * lit));
     }
   }
   return image;
@@ -67,6 +68,59 @@ TEST(Edges, AreNotMadeOfNoise) {
   }
   EdgeFinder finder;
   EXPECT_TRUE(finder.find(image, {}, {}).empty());
+}
+
+/// Noise of this standard deviation, in grey values, on top of an image.
+void add_noise(double sigma, PaddedImage& image) {
+  Rng rng(3, 0);
+  for (int y = 0; y < kSizePx; ++y) {
+    for (int x = 0; x < kSizePx; ++x) {
+      const double grey = image.row(y)[x] + sigma * rng.normal();
+      image.row(y)[x] = static_cast<std::uint8_t>(std::clamp(std::lround(grey), 0l, 255l));
+    }
+  }
+}
+
+TEST(Edges, MayBeFaintWhereThereIsLittleNoise) {
+  const auto distance = [](double x, double y) { return 0.6 * (x - 60.3) + 0.8 * (y - 59.1); };
+  PaddedImage image = make_step(distance, 5.0);
+  add_noise(0.5, image);
+  EdgeFinder finder;
+  EXPECT_GT(finder.find(image, {}, {}).size(), 8u);
+  add_noise(3.0, image);
+  EXPECT_LT(finder.find(image, {}, {}).size(), 3u);
+}
+
+TEST(Edges, AreNotMadeOfShading) {
+  // A ball that is lit from the side: from 100 to 200 grey values over 60 px.
+  PaddedImage image;
+  image.resize(kSizePx, kSizePx);
+  for (int y = 0; y < kSizePx; ++y) {
+    for (int x = 0; x < kSizePx; ++x) {
+      const double angle = std::clamp((x + 0.3 * y - 48.0) / 60.0, 0.0, 1.0) * std::numbers::pi;
+      image.row(y)[x] = static_cast<std::uint8_t>(std::lround(150.0 - 50.0 * std::cos(angle)));
+    }
+  }
+  add_noise(1.5, image);
+  EdgeFinder finder;
+  EXPECT_TRUE(finder.find(image, {}, {}).empty());
+}
+
+TEST(Edges, AreLinesThroughNoise) {
+  const auto distance = [](double x, double y) { return 0.6 * (x - 60.3) + 0.8 * (y - 59.1); };
+  PaddedImage image = make_step(distance);
+  add_noise(2.0, image);
+  EdgeFinder finder;
+  const auto points = finder.find(image, {}, {});
+  ASSERT_GT(points.size(), 8u);
+  double squared_px = 0.0, squared_rad = 0.0;
+  for (const EdgePoint& point : points) {
+    squared_px += std::pow(distance(point.x_px, point.y_px), 2);
+    squared_rad += std::pow(point.angle_rad - std::atan2(0.8, 0.6), 2);
+  }
+  const auto count = static_cast<double>(points.size());
+  EXPECT_LT(std::sqrt(squared_px / count), 0.06);
+  EXPECT_LT(std::sqrt(squared_rad / count), 0.025);
 }
 
 TEST(Edges, AreTheSteepestOfTheFreeCells) {

@@ -33,6 +33,8 @@ constexpr int kNumBlocks = 8;
 constexpr int kEdgeLevel = 2;
 // Slope of an edge, per grey value of its height, in pixels of its level.
 constexpr double kSlopeOfHeight = 0.35;
+// The least height of an edge, in grey values, in an image without noise.
+constexpr double kLeastHeight = 2.0;
 
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
@@ -103,6 +105,7 @@ struct FeatureExtractor::Workspace {
   BlurWorkspace blur;
   EdgeFinder edge_finder;
   std::vector<std::uint8_t> has_no_corner;
+  std::vector<std::uint8_t> has_edge;  ///< Per cell.
   std::vector<std::uint8_t> is_covered;
 
   void reserve(int width_px, int height_px, int count);
@@ -111,6 +114,9 @@ struct FeatureExtractor::Workspace {
   void append(int level, std::vector<Keypoint>& keypoints, std::vector<Descriptor>& descriptors);
   void mark_strong_corners(std::span<const Keypoint> keypoints);
   bool has_few_corners(ImageView mask, int count);
+  void drop_corners_on_edges(std::span<const EdgePoint> points,
+                             std::vector<Keypoint>& keypoints,
+                             std::vector<Descriptor>& descriptors);
   std::size_t append_edges(ImageView mask,
                            const FeatureSettings& settings,
                            std::vector<Keypoint>& keypoints,
@@ -229,6 +235,33 @@ bool FeatureExtractor::Workspace::has_few_corners(ImageView mask, int count) {
   return num_covered < kFewCovered * std::min(num_allowed, count / kCornersPerBlock);
 }
 
+// Weak corners on edges are where noise makes them: their place along the edge tells nothing.
+void FeatureExtractor::Workspace::drop_corners_on_edges(std::span<const EdgePoint> points,
+                                                        std::vector<Keypoint>& keypoints,
+                                                        std::vector<Descriptor>& descriptors) {
+  const PaddedImage& image = pyramid.image(kEdgeLevel);
+  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
+  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
+  const auto cell_of = [&](double x_px, double y_px) {
+    const int column = std::clamp(static_cast<int>(x_px) / EdgeFinder::kCellPx, 0, columns - 1);
+    const int row = std::clamp(static_cast<int>(y_px) / EdgeFinder::kCellPx, 0, rows - 1);
+    return static_cast<std::size_t>(row * columns + column);
+  };
+  has_edge.assign(static_cast<std::size_t>(columns * rows), 0);
+  for (const EdgePoint& point : points) has_edge[cell_of(point.x_px, point.y_px)] = 1;
+  std::size_t num_kept = 0;
+  for (std::size_t i = 0; i < keypoints.size(); ++i) {
+    const double x_px = Pyramid::level_from_level0(keypoints[i].x_px, kEdgeLevel);
+    const double y_px = Pyramid::level_from_level0(keypoints[i].y_px, kEdgeLevel);
+    const bool is_weak = keypoints[i].response < static_cast<float>(kStrongContrast);
+    if (is_weak && has_edge[cell_of(x_px, y_px)]) continue;
+    keypoints[num_kept] = keypoints[i];
+    descriptors[num_kept++] = descriptors[i];
+  }
+  keypoints.resize(num_kept);
+  descriptors.resize(num_kept);
+}
+
 std::size_t FeatureExtractor::Workspace::append_edges(ImageView mask,
                                                       const FeatureSettings& settings,
                                                       std::vector<Keypoint>& keypoints,
@@ -236,11 +269,14 @@ std::size_t FeatureExtractor::Workspace::append_edges(ImageView mask,
   mark_strong_corners(keypoints);
   if (!has_few_corners(mask, settings.count)) return 0;
   const PaddedImage& image = pyramid.image(kEdgeLevel);
+  const double least_height = std::min<double>(kLeastHeight, settings.min_contrast);
   const auto points = edge_finder.find(image,
                                        has_no_corner,
                                        {.border_px = kBorderPx + 1,
-                                        .min_slope = kSlopeOfHeight * settings.min_contrast,
+                                        .min_slope = kSlopeOfHeight * least_height,
+                                        .clear_slope = kSlopeOfHeight * settings.min_contrast,
                                         .count = static_cast<std::size_t>(settings.count) / 2});
+  drop_corners_on_edges(points, keypoints, descriptors);
   selected.clear();
   angles_rad.clear();
   for (const EdgePoint& point : points) {

@@ -10,6 +10,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
+#include "waymark/base/rng.h"
+#include "waymark/image/corners.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/testing/allocation_count.h"
 
@@ -161,9 +163,37 @@ TEST(FeatureExtractor, AddsPointsOnEdgesWhereCornersAreFew) {
     num_of_door += std::min(side, std::abs(keypoint.y_px - 200.5)) < 0.5;
   }
   EXPECT_GT(num_of_door, 30);
-  FeatureExtractor without({});
+  FeatureExtractor without({.edges = false});
   EXPECT_EQ(extract(without, make_blank_wall()).num_edges, 0u);
   EXPECT_EQ(extract(extractor, testing::make_texture(640, 480, 4, 2)).num_edges, 0u);
+}
+
+TEST(FeatureExtractor, HasFewerCornersOnEdges) {
+  PaddedImage wall = make_blank_wall();
+  Rng rng(5, 0);
+  for (int y = 0; y < wall.height_px(); ++y) {
+    for (int x = 0; x < wall.width_px(); ++x) {
+      const long grey = std::lround(wall.row(y)[x] + 3.0 * rng.normal());
+      wall.row(y)[x] = static_cast<std::uint8_t>(std::clamp(grey, 0l, 255l));
+    }
+  }
+  // On the sides of the door, far from its corners.
+  const auto count_on_door = [](const Extracted& features) {
+    int count = 0;
+    for (std::size_t i = 0; i < features.keypoints.size() - features.num_edges; ++i) {
+      const Keypoint& corner = features.keypoints[i];
+      const double side = std::min(std::abs(corner.x_px - 300.5), std::abs(corner.x_px - 479.5));
+      const bool is_weak = corner.response < static_cast<float>(kStrongContrast);
+      count += is_weak && side < 2.0 && corner.y_px > 250.0f;
+    }
+    return count;
+  };
+  FeatureExtractor with({.edges = true});
+  FeatureExtractor without({.edges = false});
+  const int num_without = count_on_door(extract(without, wall));
+  EXPECT_GT(num_without, 10);
+  // Those that lie in the cell beside their edge stay.
+  EXPECT_LE(count_on_door(extract(with, wall)), num_without / 2);
 }
 
 TEST(FeatureExtractor, AddsNoEdgesWhereTheMaskIs) {

@@ -102,7 +102,7 @@ TEST(FeatureGeometry, OfEdgesIsAcross) {
   const Eigen::Vector2f across(std::cos(kAngleRad), std::sin(kAngleRad));
   const Matrix23f& of_corner = features.level_pixel_from_bearing[0];
   const Matrix23f& of_edge = features.level_pixel_from_bearing[1];
-  EXPECT_LT((across.transpose() * (of_edge - of_corner)).norm(), 1e-3f);
+  EXPECT_LT((across.transpose() * (of_edge - kEdgePrecision * of_corner)).norm(), 1e-3f);
   EXPECT_LT((Eigen::RowVector2f(-across.y(), across.x()) * of_edge).norm(), 1e-3f);
   EXPECT_GT(of_edge.norm(), 100.0f);
 }

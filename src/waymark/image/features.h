@@ -50,10 +50,15 @@ inline Eigen::Vector2f edge_normal(float angle_rad) {
   return {std::cos(angle_rad), std::sin(angle_rad)};
 }
 
-/// What an edge leaves of W: n n^T W, n being its normal in the image.
+/// How much surer than a corner's place that of a line through nine places of an edge is.
+/// (docs/decisions.md)
+inline constexpr float kEdgePrecision = 2.0f;
+
+/// What an edge leaves of W: n n^T W, n being its normal in the image, in units of its own
+/// uncertainty.
 inline Matrix23f across_edge(const Matrix23f& level_pixel_from_bearing, float angle_rad) {
   const Eigen::Vector2f normal = edge_normal(angle_rad);
-  return normal * (normal.transpose() * level_pixel_from_bearing).eval();
+  return kEdgePrecision * normal * (normal.transpose() * level_pixel_from_bearing).eval();
 }
 
 /// One of the arrays of features.

@@ -13,7 +13,7 @@ namespace waymark {
 struct FeatureSettings {
   int count = 1000;      ///< Features per image.
   int min_contrast = 7;  ///< In grey values.
-  bool edges = false;    ///< Points on edges join in where corners are few.
+  bool edges = true;     ///< Points on edges join in where corners are few.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

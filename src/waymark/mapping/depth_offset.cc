@@ -28,7 +28,8 @@ bool has_depth(const Map& map, std::span<const Observation> observed) {
 }
 
 /// Gives the observations their ranges back that an adjustment leaves out as too far off: most are,
-/// where depth images are wrong.
+/// where depth images are wrong. Points on edges get none: where a surface ends, its nearest part
+/// is measured.
 void restore_ranges(const Map& map,
                     std::span<const Observation> observed,
                     const Rig& rig,
@@ -36,8 +37,12 @@ void restore_ranges(const Map& map,
   for (std::size_t i = 0; i < observed.size(); ++i) {
     BundleObservation& observation = problem.observations[i];
     if (problem.rigs[observation.pose] != &rig) continue;
-    const Measurement measured =
-        map.keyframes().at(observed[i].keyframe).features->measurement(observed[i].feature);
+    const Features& features = *map.keyframes().at(observed[i].keyframe).features;
+    if (features.is_edge(observed[i].feature)) {
+      observation.inverse_range_sigma = 0.0f;
+      continue;
+    }
+    const Measurement measured = features.measurement(observed[i].feature);
     const Eigen::Vector3d point_in_rig =
         problem.rig_from_world[observation.pose] * problem.points[observation.point];
     const double off = measured.inverse_range * point_in_rig.norm() - 1.0;

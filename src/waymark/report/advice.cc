@@ -187,7 +187,7 @@ constexpr std::array kCauses = {
                 "the-images-are-blurred"},
     AdviceCause{"few_features",
                 recognise_few_features,
-                "a wider view, or look along walls rather than at them; --set features.edges=true",
+                "a wider view, or look along walls rather than at them",
                 "there-is-little-to-see"},
     AdviceCause{"no_parallax",
                 recognise_no_parallax,
