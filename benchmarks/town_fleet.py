@@ -26,6 +26,7 @@ import time
 import numpy as np
 import waymark
 
+
 def positions(path):
     """Of the truth, by time in milliseconds."""
     truth = {}
@@ -147,10 +148,14 @@ def main():
     parser.add_argument("--keyframes", type=int, default=250)
     parser.add_argument("--out", type=pathlib.Path)
     options = parser.parse_args()
+    if options.out:
+        options.out.mkdir(parents=True, exist_ok=True)
     with tempfile.TemporaryDirectory(dir=options.out) as temporary:
         kept = options.out or pathlib.Path(temporary)
-        kept.mkdir(parents=True, exist_ok=True)
-        make = lambda count: make_recordings(options.build, count, options.keyframes, kept / f"town_{count}_{options.keyframes}")
+
+        def make(count):
+            return make_recordings(options.build, count, options.keyframes, kept / f"town_{count}_{options.keyframes}")
+
         fleet = Fleet(str(options.build / "waymark"), pathlib.Path(temporary))
         result = measure(fleet, make(options.recordings), make(options.recordings // 4))
     print(json.dumps(result, indent=1))

@@ -78,6 +78,38 @@ bool allows(ImageView mask, int level, int x_px, int y_px) {
   return mask.at(nearest(x_px, mask.width_px), nearest(y_px, mask.height_px)) > level;
 }
 
+// Parts of this size that cover a length.
+int num_cells(int length, int cell) { return (length + cell - 1) / cell; }
+
+// The cells of the level of edges, row by row.
+struct EdgeCells {
+  int columns = 0;
+  int rows = 0;
+
+  explicit EdgeCells(const PaddedImage& image)
+      : columns(num_cells(image.width_px(), EdgeFinder::kCellPx)),
+        rows(num_cells(image.height_px(), EdgeFinder::kCellPx)) {}
+
+  std::size_t count() const { return static_cast<std::size_t>(columns * rows); }
+
+  // Coordinates are pixels of the level; what is beyond the border is in the cell beside it.
+  std::size_t at(double x_px, double y_px) const {
+    const int column = std::clamp(static_cast<int>(x_px) / EdgeFinder::kCellPx, 0, columns - 1);
+    const int row = std::clamp(static_cast<int>(y_px) / EdgeFinder::kCellPx, 0, rows - 1);
+    return static_cast<std::size_t>(row * columns + column);
+  }
+
+  std::size_t of(const Keypoint& keypoint) const {
+    return at(Pyramid::level_from_level0(keypoint.x_px, kEdgeLevel),
+              Pyramid::level_from_level0(keypoint.y_px, kEdgeLevel));
+  }
+};
+
+// Strong corners tell more than edges do.
+bool is_strong(const Keypoint& corner) {
+  return corner.response >= static_cast<float>(kStrongContrast);
+}
+
 // The corners of a level that the mask lets through.
 std::span<Corner> apply_mask(ImageView mask, int level, std::span<Corner> corners) {
   const auto end = std::remove_if(corners.begin(), corners.end(), [&](const Corner& corner) {
@@ -185,23 +217,12 @@ void FeatureExtractor::Workspace::append(int level,
   }
 }
 
-// Parts of this size that cover a length.
-int num_cells(int length, int cell) { return (length + cell - 1) / cell; }
-
-// Cells around strong corners, which tell more than edges do.
+// The cells of strong corners.
 void FeatureExtractor::Workspace::mark_strong_corners(std::span<const Keypoint> keypoints) {
-  const PaddedImage& image = pyramid.image(kEdgeLevel);
-  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
-  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
-  has_no_corner.assign(static_cast<std::size_t>(columns * rows), 1);
+  const EdgeCells cells(pyramid.image(kEdgeLevel));
+  has_no_corner.assign(cells.count(), 1);
   for (const Keypoint& keypoint : keypoints) {
-    if (keypoint.response < static_cast<float>(kStrongContrast)) continue;
-    const auto cell = [&](float coordinate_px, int count) {
-      const double at = Pyramid::level_from_level0(coordinate_px, kEdgeLevel);
-      return std::clamp(static_cast<int>(at) / EdgeFinder::kCellPx, 0, count - 1);
-    };
-    const int index = cell(keypoint.y_px, rows) * columns + cell(keypoint.x_px, columns);
-    has_no_corner[static_cast<std::size_t>(index)] = 0;
+    if (is_strong(keypoint)) has_no_corner[cells.of(keypoint)] = 0;
   }
 }
 
@@ -209,18 +230,17 @@ void FeatureExtractor::Workspace::mark_strong_corners(std::span<const Keypoint> 
 // lets through.
 bool FeatureExtractor::Workspace::has_few_corners(ImageView mask, int count) {
   const PaddedImage& image = pyramid.image(kEdgeLevel);
-  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
-  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
-  const int block_cells = std::max(num_cells(std::max(columns, rows), kNumBlocks), 1);
+  const EdgeCells cells(image);
+  const int block_cells = std::max(num_cells(std::max(cells.columns, cells.rows), kNumBlocks), 1);
   const int block_px = block_cells * EdgeFinder::kCellPx;
   const int block_columns = num_cells(image.width_px(), block_px);
   const int num_blocks = block_columns * num_cells(image.height_px(), block_px);
   is_covered.assign(static_cast<std::size_t>(num_blocks), 0);
-  for (int row = 0; row < rows; ++row) {
-    for (int column = 0; column < columns; ++column) {
+  for (int row = 0; row < cells.rows; ++row) {
+    for (int column = 0; column < cells.columns; ++column) {
       const int block = row / block_cells * block_columns + column / block_cells;
       is_covered[static_cast<std::size_t>(block)] |=
-          !has_no_corner[static_cast<std::size_t>(row * columns + column)];
+          !has_no_corner[static_cast<std::size_t>(row * cells.columns + column)];
     }
   }
   int num_allowed = 0;
@@ -239,22 +259,12 @@ bool FeatureExtractor::Workspace::has_few_corners(ImageView mask, int count) {
 void FeatureExtractor::Workspace::drop_corners_on_edges(std::span<const EdgePoint> points,
                                                         std::vector<Keypoint>& keypoints,
                                                         std::vector<Descriptor>& descriptors) {
-  const PaddedImage& image = pyramid.image(kEdgeLevel);
-  const int columns = num_cells(image.width_px(), EdgeFinder::kCellPx);
-  const int rows = num_cells(image.height_px(), EdgeFinder::kCellPx);
-  const auto cell_of = [&](double x_px, double y_px) {
-    const int column = std::clamp(static_cast<int>(x_px) / EdgeFinder::kCellPx, 0, columns - 1);
-    const int row = std::clamp(static_cast<int>(y_px) / EdgeFinder::kCellPx, 0, rows - 1);
-    return static_cast<std::size_t>(row * columns + column);
-  };
-  has_edge.assign(static_cast<std::size_t>(columns * rows), 0);
-  for (const EdgePoint& point : points) has_edge[cell_of(point.x_px, point.y_px)] = 1;
+  const EdgeCells cells(pyramid.image(kEdgeLevel));
+  has_edge.assign(cells.count(), 0);
+  for (const EdgePoint& point : points) has_edge[cells.at(point.x_px, point.y_px)] = 1;
   std::size_t num_kept = 0;
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    const double x_px = Pyramid::level_from_level0(keypoints[i].x_px, kEdgeLevel);
-    const double y_px = Pyramid::level_from_level0(keypoints[i].y_px, kEdgeLevel);
-    const bool is_weak = keypoints[i].response < static_cast<float>(kStrongContrast);
-    if (is_weak && has_edge[cell_of(x_px, y_px)]) continue;
+    if (!is_strong(keypoints[i]) && has_edge[cells.of(keypoints[i])]) continue;
     keypoints[num_kept] = keypoints[i];
     descriptors[num_kept++] = descriptors[i];
   }

@@ -54,8 +54,8 @@ inline Eigen::Vector2f edge_normal(float angle_rad) {
 /// (docs/decisions.md)
 inline constexpr float kEdgePrecision = 2.0f;
 
-/// What an edge leaves of W: n n^T W, n being its normal in the image, in units of its own
-/// uncertainty.
+/// What an edge leaves of W: n n^T W, n being its normal in the image. Residuals are in pixels of
+/// its level over kEdgePrecision, so that one is as likely as one of a corner.
 inline Matrix23f across_edge(const Matrix23f& level_pixel_from_bearing, float angle_rad) {
   const Eigen::Vector2f normal = edge_normal(angle_rad);
   return kEdgePrecision * normal * (normal.transpose() * level_pixel_from_bearing).eval();
@@ -78,7 +78,7 @@ struct Features {
   FeatureArray<Eigen::Vector3f> bearings;  ///< Unit, in the frame of the feature's camera.
   /// Derivative of the pixel of the feature's level by the bearing, at the measured bearing (W).
   /// The residual of a landmark is W * (predicted bearing - measured bearing). On edges W has rank
-  /// 1: what it gives is across.
+  /// 1 and gives what is across, see across_edge().
   FeatureArray<Matrix23f> level_pixel_from_bearing;
   FeatureArray<float> size_rad;  ///< Angle of one pixel of the feature's level.
   /// The feature of camera 1 that belongs to a primary feature, and back; kNoFeature where none.

@@ -21,7 +21,7 @@ struct BesideOptions {
 };
 
 /// Keyframes of the same sub-map beside the query where the map has it, nearest first. Looks at all
-/// keyframes: for one question.
+/// keyframes: what the quicker ways below are held against.
 std::vector<KeyframeId> find_beside(const Map& map, KeyframeId query, const BesideOptions& options);
 
 /// Where the keyframes of a map are, kept up to date as it changes, for a question now and then.

@@ -13,7 +13,7 @@
 #include "waymark/loop/spread_drift.h"
 #include "waymark/loop/undo.h"
 #include "waymark/map/align.h"
-#include "waymark/map/parts.h"
+#include "waymark/optimize/switch_edges.h"
 
 namespace waymark {
 namespace {
@@ -38,12 +38,15 @@ constexpr std::size_t kFirstMarkerSurvey = 5;
 /// A loop between keyframes so near to those of another says the same again.
 constexpr std::uint32_t kBesideDisbelieved = 3;
 
-/// Of a loop that needs no weighing against the others, see SpreadDrift: nine times what
-/// switch_edges() lets stand, as odometry is less sure than the map by three.
-constexpr double kMaxContradiction = 9.0 * 4.3 * 4.3;
+/// How much less sure odometry is than the map, in standard deviations.
+constexpr double kOdometrySigmas = 3.0;
 
-/// A join makes loops of what was seen before it, which may let others be joined in turn.
-constexpr int kMaxPasses = 4;
+/// Of a loop that needs no weighing against the others, see SpreadDrift: what switch_edges() lets
+/// stand, as unsure as odometry is.
+double max_contradiction() {
+  const double max_residual = kOdometrySigmas * SwitchOptions().max_residual;
+  return max_residual * max_residual;
+}
 
 }  // namespace
 
@@ -92,40 +95,40 @@ void GlobalMapper::update_places(const Mapper::Changes& changes) {
   for (const KeyframeId id : changes.erased) places_.erase(id);
 }
 
-bool GlobalMapper::close(const Revisit& revisit) {
+bool GlobalMapper::close(const Revisit& revisit) { return close_moving(revisit).has_value(); }
+
+std::optional<GlobalMapper::Moved> GlobalMapper::close_moving(const Revisit& revisit) {
   odometry_.note(mapper_.map());
   const auto& keyframes = mapper_.map().keyframes();
-  if (keyframes.at(revisit.query).submap != keyframes.at(revisit.match).submap) {
-    join(revisit);
-  } else if (!close_loop(revisit)) {
-    return false;
-  }
+  const bool is_loop = keyframes.at(revisit.query).submap == keyframes.at(revisit.match).submap;
+  std::optional<Moved> moved = is_loop ? close_loop(revisit) : join(revisit);
+  if (!moved) return std::nullopt;
   ++num_closures_;
   unadjusted_ = keyframes.at(revisit.query).submap;
-  return true;
+  return moved;
 }
 
-void GlobalMapper::join(const Revisit& revisit) {
+GlobalMapper::Moved GlobalMapper::join(const Revisit& revisit) {
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
     join_submaps(map, places_, revisit, projection_, dirty);
   });
-  moved_ = all_keyframes();
+  return all_keyframes();
 }
 
-bool GlobalMapper::close_loop(const Revisit& revisit) {
+std::optional<GlobalMapper::Moved> GlobalMapper::close_loop(const Revisit& revisit) {
   SpreadDrift spread = spread_drift(mapper_.map(), as_loop(revisit));
-  if (spread.contradiction > kMaxContradiction) {
+  if (spread.contradiction > max_contradiction()) {
     const std::uint32_t num_placements = num_placements_;
-    if (!agrees_with_loops(revisit)) return false;
+    if (!agrees_with_loops(revisit)) return std::nullopt;
     if (num_placements_ != num_placements) spread = spread_drift(mapper_.map(), as_loop(revisit));
   }
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
     waymark::close_loop(map, revisit, spread.correction, projection_, dirty);
   });
   ++num_loops_;
-  moved_.clear();
-  for (const auto& move : spread.correction.keyframes) moved_.push_back(move.keyframe);
-  return true;
+  Moved moved;
+  for (const auto& move : spread.correction.keyframes) moved.push_back(move.keyframe);
+  return moved;
 }
 
 /// Whether the loops so far leave a new one standing. If it is them that turn out to be false, they
@@ -178,8 +181,10 @@ void GlobalMapper::disbelieve(const LoopEdge& loop) {
 
 bool GlobalMapper::close_alike(KeyframeId query) {
   const auto revisit = verifier_.verify_alike(mapper_.map(), places_, query);
-  if (!revisit || !close(*revisit)) return false;
-  consolidate_later(moved_);
+  if (!revisit) return false;
+  const std::optional<Moved> moved = close_moving(*revisit);
+  if (!moved) return false;
+  consolidate_later(*moved);
   return true;
 }
 
@@ -374,26 +379,6 @@ MapSnapshot GlobalMapper::snapshot() {
   std::shared_ptr<const Map> map = mapper_.freeze();
   positions_.follow(map);
   return {std::move(map), std::make_shared<const PlaceIndex>(places_)};
-}
-
-MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
-  Map both = unite(a, b);
-  std::vector<KeyframeId> of_b;
-  both.keyframes().for_each([&](KeyframeId id, const Keyframe&) {
-    if (id >= a.keyframes().end_id()) of_b.push_back(id);
-  });
-  if (of_b.empty()) return {both.freeze()};
-  GlobalMapper mapper(both.keyframes().at(of_b.front()).rig, {}, {}, {.refine = "off"}, seed);
-  // Only what is indexed is found: b looks for its places in a.
-  mapper.take_over(index_map(both.freeze(), of_b.front()));
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    const int num_joins_before = mapper.num_joins();
-    for (const KeyframeId query : of_b) mapper.close_alike(query);
-    if (mapper.num_joins() == num_joins_before) break;
-  }
-  mapper.join_what_knows_the_same_markers();
-  if (mapper.num_joins() > 0) mapper.consolidate();
-  return {mapper.snapshot().map, mapper.num_joins(), mapper.num_loops()};
 }
 
 }  // namespace waymark

@@ -95,8 +95,11 @@ class GlobalMapper {
  private:
   void update_places(const Mapper::Changes& changes);
   bool close_one_beside(KeyframeId query, std::span<const KeyframeId> beside);
-  bool close_loop(const Revisit& revisit);
-  void join(const Revisit& revisit);
+  using Moved = std::vector<KeyframeId>;  ///< By a loop or a join, ascending.
+
+  std::optional<Moved> close_moving(const Revisit& revisit);
+  std::optional<Moved> close_loop(const Revisit& revisit);
+  Moved join(const Revisit& revisit);
   bool agrees_with_loops(const Revisit& revisit);
   void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
   void disbelieve(const LoopEdge& loop);
@@ -122,7 +125,6 @@ class GlobalMapper {
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
   std::set<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   KeyframeId end_of_noted_{0};           ///< Keyframes below were among these at some time.
-  std::vector<KeyframeId> moved_;        ///< What was closed last moved these, ascending.
   LivePositions positions_;
   Odometry odometry_;
   /// Loops that others contradict, in units before any correction: further ones may agree with
@@ -136,19 +138,5 @@ class GlobalMapper {
   std::uint32_t num_placements_ = 0;
   std::size_t next_survey_;  ///< Keyframes of a sub-map with markers when it is due again.
 };
-
-/// Two maps in one.
-struct MergedMaps {
-  std::shared_ptr<const Map> map;
-  int num_joins = 0;  ///< Sub-maps that became part of another; 0: no overlap was found.
-  int num_loops = 0;  ///< Further places of one map that the other shows.
-};
-
-/// Puts b behind a (see unite()), and where keyframes of b show places of a, joins their sub-maps
-/// and closes the loops that this makes, joins those that know the same markers, then links and
-/// adjusts all of it. Frame and units
-/// are those of the older sub-map, of which a has all. Sub-maps in metres are not compared with
-/// those whose scale is free. The same maps and seed give the same bits.
-MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed);
 
 }  // namespace waymark

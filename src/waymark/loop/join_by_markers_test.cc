@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/loop/global_mapper.h"
+#include "waymark/loop/merge_maps.h"
 #include "waymark/loop/test_loop.h"
 #include "waymark/map/parts.h"
 

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "waymark/loop/global_mapper.h"
+#include "waymark/loop/merge_maps.h"
 
 namespace waymark {
 namespace {

@@ -1,11 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include "waymark/loop/merge_maps.h"
+
 #include <gtest/gtest.h>
 
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/loop/global_mapper.h"
 #include "waymark/loop/test_loop.h"
 #include "waymark/map/testing/random_map.h"
 
