@@ -14,7 +14,8 @@ MOST_ADJUSTED = 10000  # Adjusting more takes hours.
 MEMORY = {"map_kb": "{}: map and index", "places_kb": "{}: index of places", "peak_kb": "{}: peak beyond the map",
           "file_kb": "{}: file"}
 
-LOOPS = {"true_on": "true ones believed", "false_on": "false ones believed", "ate_open_m": "ATE in m without loops",
+LOOPS = {"true_plausible": "true ones that are plausible", "false_plausible": "false ones that are plausible",
+         "true_on": "true ones believed", "false_on": "false ones believed", "ate_open_m": "ATE in m without loops",
          "ate_all_m": "with all of them", "ate_true_m": "with the true ones", "ate_chosen_m": "with those believed",
          "ate_closed_true_m": "50 true ones closed one by one", "ate_closed_m": "and 20 false ones among them"}
 

@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <limits>
 #include <optional>
 #include <vector>
 
@@ -35,12 +34,12 @@ struct GraphWay {
 };
 
 /// The shortest way; nothing between sub-maps. Keyframes that share but a few landmarks are not
-/// linked: what was seen again by chance would be a shortcut. Where the way is at least `enough`
-/// long, a beginning of that length may come in its place. Time is that of what lies as near.
+/// linked: what was seen again by chance would be a shortcut. Where the way is at least as long as
+/// `enough` and has as many steps, that may come in its place. Time is that of what lies as near.
 std::optional<GraphWay> shortest_way(const Map& map,
                                      KeyframeId from,
                                      KeyframeId to,
-                                     double enough = std::numeric_limits<double>::infinity());
+                                     const std::optional<GraphWay>& enough = std::nullopt);
 
 /// Median distance of what a keyframe sees, in map units; 0 if that is nothing.
 double median_depth(const Map& map, KeyframeId id);

@@ -8,6 +8,7 @@
 namespace waymark {
 namespace {
 
+/// Of the query's sub-map, and again of the others.
 constexpr std::size_t kMaxCandidates = 4;
 /// Of keyframes that see the same, so many are candidates, so that others have their turn.
 constexpr int kMaxOfOnePlace = 2;
@@ -20,6 +21,15 @@ constexpr double kMinRelativeScore = 0.1;
 bool are_linked(const Map& map, KeyframeId a, KeyframeId b) {
   return std::ranges::any_of(map.covisible(a), [&](const CovisibilityEdge& edge) {
     return edge.keyframe == b && edge.num_shared >= kMinSharedOfLinked;
+  });
+}
+
+/// Whether there are other sub-maps that this one might be joined with.
+bool has_others(const Map& map, SubmapId own) {
+  std::uint32_t id = 0;
+  return std::ranges::any_of(map.submaps(), [&](const Submap& other) {
+    return SubmapId{id++} != own && other.root.is_valid() &&
+           other.is_metric == map.submaps()[own.value].is_metric;
   });
 }
 
@@ -62,24 +72,30 @@ std::vector<KeyframeId> with_neighbours(const Map& map,
 
 std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query) {
   const std::vector<KeyframeId> near = within_steps(map, query, kNumNearSteps);
-  const auto ranked =
-      places.find(map.keyframes().at(query).features->corner_descriptors(),
-                  {.max_candidates = near.size() + kNumRanked,
-                   .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
+  const SubmapId own = map.keyframes().at(query).submap;
+  const auto ranked = places.find(
+      map.keyframes().at(query).features->corner_descriptors(),
+      {.max_candidates = has_others(map, own) ? places.size() : near.size() + kNumRanked,
+       .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
   double best_near = 0.0;
   for (const PlaceCandidate& candidate : ranked) {
     if (std::ranges::binary_search(near, candidate.keyframe))
       best_near = std::max(best_near, candidate.score);
   }
   std::vector<KeyframeId> alike;
+  std::size_t num_own = 0;
+  std::size_t num_others = 0;
   for (const PlaceCandidate& candidate : ranked) {
     const KeyframeId id = candidate.keyframe;
+    if (candidate.score < kMinRelativeScore * best_near) break;
     if (std::ranges::binary_search(near, id) || !map.keyframes().contains(id)) continue;
     if (has_metric_submap(map, id) != has_metric_submap(map, query)) continue;
-    if (alike.size() == kMaxCandidates || candidate.score < kMinRelativeScore * best_near) break;
+    std::size_t& count = map.keyframes().at(id).submap == own ? num_own : num_others;
     const auto num_linked = std::ranges::count_if(
         alike, [&](KeyframeId chosen) { return are_linked(map, chosen, id); });
-    if (num_linked < kMaxOfOnePlace) alike.push_back(id);
+    if (count == kMaxCandidates || num_linked >= kMaxOfOnePlace) continue;
+    alike.push_back(id);
+    ++count;
   }
   return alike;
 }

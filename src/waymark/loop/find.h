@@ -27,7 +27,8 @@ std::vector<KeyframeId> with_neighbours(const Map& map, KeyframeId keyframe, std
 
 /// Keyframes of other places that look like the query, best first: none that the map links to it by
 /// a few steps of covisibility, few of one place, and none that look less like it than the query's
-/// own surroundings do by far.
+/// own surroundings do by far. As many of the query's sub-map as of the others: places of its own
+/// that only look alike do not take the places of those.
 std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query);
 
 }  // namespace waymark

@@ -4,6 +4,8 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
+
 #include "waymark/loop/beside.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
@@ -139,6 +141,22 @@ TEST(VerifyAlikeTest, JoinsAtAPlaceThatAnotherOneFaintlyResembles) {
   const Walk result = walk(scene, verifier, 30, kRound + 10);
   EXPECT_GE(result.num_found, 8);
   EXPECT_EQ(scene.map.keyframes().at(result.first->match).submap, SubmapId{0});
+}
+
+TEST(FindAlikeTest, LeavesRoomForOtherSubmapsWhereMuchOfItsOwnLooksAlike) {
+  LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, Vector7d::Zero());
+  for (int step = 0; step < kRound; ++step) scene.add_keyframe(step);
+  // The other one has a third of it.
+  std::vector<PointLandmark>& points = scene.cloud.landmarks;
+  points.resize(points.size() / 30);
+  scene.start_submap(Sim3());
+  for (int step = 0; step < 4; ++step) scene.add_keyframe(step);
+  const auto found = find_alike(scene.map, scene.places, KeyframeId{kRound - 1});
+  const auto num_own =
+      std::ranges::count_if(found, [](KeyframeId id) { return id.value < kRound; });
+  EXPECT_EQ(num_own, 4);
+  EXPECT_GT(found.size(), 4u);
+  EXPECT_LT(found.front().value, std::uint32_t{kRound}) << "best first";
 }
 
 TEST(VerifyAlikeTest, FindsThePlaceAmongEqualStretchesThatTheMapIsNearTo) {
