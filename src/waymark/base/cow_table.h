@@ -15,13 +15,14 @@
 namespace waymark {
 
 /// Ordered table from Id to T whose copies are cheap: a table and its frozen copies share pages,
-/// and the writer clones a page the first time it edits it after freezing. Its memory follows what
-/// it holds: a page has room for what lives, and none is left where nothing does. Of the ids that
-/// were ever given only a pointer for each page of them stays.
+/// and the writer clones a page the first time it edits it after freezing. Pages stand on shelves
+/// that are shared and cloned in the same way, so that a copy is a pointer for each few thousand
+/// ids. Its memory follows what it holds: a page has room for what lives, and none is left where
+/// nothing does, nor are shelves.
 ///
-/// Invariant: a page with the stamp of a table belongs to that table alone.
+/// Invariant: a page, or shelf, with the stamp of a table belongs to that table alone.
 /// Thread safety: a frozen table is for any number of readers; a live table has one writer.
-template <class Key, class T, std::size_t kPageSize = 64>
+template <class Key, class T, std::size_t kPageSize = 64, std::size_t kShelfSize = 64>
 class CowTable {
  public:
   CowTable() = default;
@@ -29,10 +30,10 @@ class CowTable {
   CowTable(CowTable&&) noexcept = default;
   CowTable& operator=(CowTable&&) noexcept = default;  ///< As the constructor.
 
-  /// Copy that shares every page with this table and never changes. O(pages).
+  /// Copy that shares every page with this table and never changes. O(shelves).
   CowTable freeze() {
     for (const std::size_t index : own_pages_) {
-      if (pages_[index]) pages_[index]->tighten();
+      if (Page* const page = page_at(index)) page->tighten();
     }
     own_pages_.clear();
     ++stamp_;  // From now on no page belongs to this table or to the copy, so that edits clone.
@@ -58,9 +59,8 @@ class CowTable {
 
   /// The element, or nullptr. Valid until the table is edited or destroyed.
   const T* find(Key id) const {
-    const std::size_t page = id.value / kPageSize;
-    if (page >= pages_.size() || !pages_[page]) return nullptr;
-    return pages_[page]->find(id.value % kPageSize);
+    const Page* const page = page_at(id.value / kPageSize);
+    return page ? page->find(id.value % kPageSize) : nullptr;
   }
 
   /// The element, which must exist.
@@ -107,10 +107,10 @@ class CowTable {
   bool erase(Key id) {
     if (!contains(id)) return false;
     const std::size_t page = id.value / kPageSize;
-    if (pages_[page]->num_living > 1) {
+    if (page_at(page)->num_living > 1) {
       own(page).erase(id.value % kPageSize);
     } else {
-      pages_[page].reset();
+      drop_page(page);
     }
     --size_;
     return true;
@@ -120,11 +120,15 @@ class CowTable {
   /// repeatable. The table must not be edited meanwhile.
   template <class Visitor>
   void for_each(Visitor&& visit) const {
-    for (std::size_t page = 0; page < pages_.size(); ++page) {
-      if (!pages_[page]) continue;
-      for (std::size_t i = 0; i < kPageSize; ++i) {
-        if (const T* element = pages_[page]->find(i)) {
-          visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, *element);
+    for (std::size_t shelf = 0; shelf < shelves_.size(); ++shelf) {
+      if (!shelves_[shelf]) continue;
+      for (std::size_t i = 0; i < kShelfSize; ++i) {
+        const Page* const page = shelves_[shelf]->pages[i].get();
+        if (!page) continue;
+        const std::size_t first = (shelf * kShelfSize + i) * kPageSize;
+        for (std::size_t k = 0; k < kPageSize; ++k) {
+          const T* const element = page->find(k);
+          if (element) visit(Key{static_cast<std::uint32_t>(first + k)}, *element);
         }
       }
     }
@@ -135,16 +139,12 @@ class CowTable {
   /// null where there was or is no element.
   template <class Visitor>
   void for_each_difference(const CowTable& earlier, Visitor&& visit) const {
-    for (std::size_t page = 0; page < std::max(pages_.size(), earlier.pages_.size()); ++page) {
-      const Page* now = page < pages_.size() ? pages_[page].get() : nullptr;
-      const Page* before = page < earlier.pages_.size() ? earlier.pages_[page].get() : nullptr;
-      if (now == before) continue;
-      for (std::size_t i = 0; i < kPageSize; ++i) {
-        const T* old = before ? before->find(i) : nullptr;
-        const T* current = now ? now->find(i) : nullptr;
-        if (old || current) {
-          visit(Key{static_cast<std::uint32_t>(page * kPageSize + i)}, old, current);
-        }
+    const std::size_t num_shelves = std::max(shelves_.size(), earlier.shelves_.size());
+    for (std::size_t shelf = 0; shelf < num_shelves; ++shelf) {
+      if (shelf_at(shelf) == earlier.shelf_at(shelf)) continue;
+      for (std::size_t i = 0; i < kShelfSize; ++i) {
+        const std::size_t page = shelf * kShelfSize + i;
+        visit_difference(page, earlier.page_at(page), page_at(page), visit);
       }
     }
   }
@@ -193,12 +193,57 @@ class CowTable {
     std::vector<T> elements;
   };
 
+  struct Shelf {
+    std::uint64_t stamp = 0;
+    std::size_t num_pages = 0;
+    std::array<std::shared_ptr<Page>, kShelfSize> pages;
+  };
+
   CowTable(const CowTable&) = default;
 
+  const Shelf* shelf_at(std::size_t shelf) const {
+    return shelf < shelves_.size() ? shelves_[shelf].get() : nullptr;
+  }
+  Page* page_at(std::size_t index) const {
+    const Shelf* const shelf = shelf_at(index / kShelfSize);
+    return shelf ? shelf->pages[index % kShelfSize].get() : nullptr;
+  }
+
+  template <class Visitor>
+  static void visit_difference(std::size_t index,
+                               const Page* before,
+                               const Page* now,
+                               Visitor&& visit) {
+    if (now == before) return;
+    for (std::size_t i = 0; i < kPageSize; ++i) {
+      const T* const old = before ? before->find(i) : nullptr;
+      const T* const current = now ? now->find(i) : nullptr;
+      if (old || current) {
+        visit(Key{static_cast<std::uint32_t>(index * kPageSize + i)}, old, current);
+      }
+    }
+  }
+
+  Shelf& own_shelf(std::size_t index) {
+    if (index >= shelves_.size()) shelves_.resize(index + 1);
+    std::shared_ptr<Shelf>& shelf = shelves_[index];
+    if (shelf && shelf->stamp == stamp_) return *shelf;
+    shelf = shelf ? std::make_shared<Shelf>(*shelf) : std::make_shared<Shelf>();
+    shelf->stamp = stamp_;
+    return *shelf;
+  }
+
+  void drop_page(std::size_t index) {
+    Shelf& shelf = own_shelf(index / kShelfSize);
+    shelf.pages[index % kShelfSize].reset();
+    if (--shelf.num_pages == 0) shelves_[index / kShelfSize].reset();
+  }
+
   Page& own(std::size_t index) {
-    if (index >= pages_.size()) pages_.resize(index + 1);
-    std::shared_ptr<Page>& page = pages_[index];
+    Shelf& shelf = own_shelf(index / kShelfSize);
+    std::shared_ptr<Page>& page = shelf.pages[index % kShelfSize];
     if (page && page->stamp == stamp_) return *page;
+    if (!page) ++shelf.num_pages;
     const std::shared_ptr<const Page> shared = std::exchange(page, std::make_shared<Page>());
     page->stamp = stamp_;
     // What insert() adds must not move what is there, to which there may be references.
@@ -211,7 +256,7 @@ class CowTable {
     return *page;
   }
 
-  std::vector<std::shared_ptr<Page>> pages_;
+  std::vector<std::shared_ptr<Shelf>> shelves_;
   std::vector<std::size_t> own_pages_;  ///< With the stamp of now.
   std::uint64_t stamp_ = 0;
   std::uint32_t next_ = 0;

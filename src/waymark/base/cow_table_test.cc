@@ -15,8 +15,8 @@
 namespace waymark {
 namespace {
 
-// Small pages, so that a few elements make many of them.
-using Table = CowTable<LandmarkId, std::string, 4>;
+// Small pages and shelves, so that a few elements make many of them.
+using Table = CowTable<LandmarkId, std::string, 4, 2>;
 using Content = std::map<std::uint32_t, std::string>;
 
 Content content_of(const Table& table) {
