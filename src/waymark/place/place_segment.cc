@@ -160,10 +160,23 @@ void PlaceSegment::Table::index() {
 }
 
 std::size_t PlaceSegment::Table::lower_bound(std::uint64_t entry) const {
-  const std::size_t prefix = directory_bits == 0 ? 0 : entry >> (64 - directory_bits);
+  const std::size_t prefix = prefix_of(entry);
   const auto begin = entries.begin() + directory[prefix];
   const auto end = entries.begin() + directory[prefix + 1];
   return static_cast<std::size_t>(std::lower_bound(begin, end, entry) - entries.begin());
+}
+
+void PlaceSegment::Table::fetch_place(PlaceKey key) const {
+  __builtin_prefetch(directory.data() + prefix_of(key << kPlaceRowBits));
+}
+
+void PlaceSegment::Table::fetch_around(PlaceKey key, std::size_t window) const {
+  constexpr std::size_t kEntriesPerLine = 64 / sizeof(std::uint64_t);
+  const std::size_t prefix = prefix_of(key << kPlaceRowBits);
+  const std::size_t first = directory[prefix];
+  const std::size_t begin = first - std::min(first, window / 2);
+  const std::size_t end = std::min<std::size_t>(directory[prefix + 1] + window / 2, entries.size());
+  for (std::size_t i = begin; i < end; i += kEntriesPerLine) __builtin_prefetch(&entries[i]);
 }
 
 std::size_t PlaceSegment::look_around(std::size_t table,

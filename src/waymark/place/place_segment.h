@@ -80,6 +80,13 @@ class PlaceSegment {
                           std::size_t window,
                           Window& differences) const;
 
+  /// Has the processor fetch what look_around() will read, in two steps some time ahead of it: the
+  /// tables are large and read all over, so that a look is mostly waiting for memory.
+  void fetch_directory(std::size_t table, PlaceKey key) const { tables_[table].fetch_place(key); }
+  void fetch_entries(std::size_t table, PlaceKey key, std::size_t window) const {
+    tables_[table].fetch_around(key, window);
+  }
+
   std::size_t num_bytes() const;
 
  private:
@@ -94,7 +101,12 @@ class PlaceSegment {
     int directory_bits = 0;
 
     void index();
+    std::size_t prefix_of(std::uint64_t entry) const {
+      return directory_bits == 0 ? 0 : entry >> (64 - directory_bits);
+    }
     std::size_t lower_bound(std::uint64_t entry) const;
+    void fetch_place(PlaceKey key) const;
+    void fetch_around(PlaceKey key, std::size_t window) const;
   };
 
   std::shared_ptr<std::pmr::memory_resource> memory_;  ///< Of the tables; null: the heap.

@@ -79,6 +79,16 @@ class Neighbourhood {
 
   std::size_t num_rows() const { return num_rows_; }
 
+  /// See PlaceSegment.
+  void fetch_directories(std::size_t table, PlaceKey key) const {
+    for (const auto& segment : segments_) segment->fetch_directory(table, key);
+  }
+  void fetch_entries(std::size_t table, PlaceKey key) const {
+    for (std::size_t i = 0; i < parts_.size(); ++i) {
+      segments_[i]->fetch_entries(table, key, parts_[i].window);
+    }
+  }
+
   void look(std::size_t table, PlaceKey key) {
     num_with_prefix_.fill(0);
     for (std::size_t i = 0; i < parts_.size(); ++i) {
@@ -141,13 +151,20 @@ std::vector<double> vote_for_places(std::span<const std::shared_ptr<const PlaceS
                                     std::span<const Descriptor> descriptors) {
   Neighbourhood neighbourhood(segments);
   Ballot ballot(neighbourhood.num_rows());
-  for (std::uint32_t i = 0; i < descriptors.size(); ++i) {
-    const std::array<PlaceKey, kNumPlaceTables> keys = place_keys(descriptors[i]);
-    for (std::size_t table = 0; table < keys.size(); ++table) {
-      neighbourhood.look(table, keys[table]);
-      neighbourhood.visit_similar([&](std::size_t row) { ballot.vote(i, row); });
+  std::vector<PlaceKey> keys;  // Of all tables, descriptor by descriptor.
+  keys.reserve(kNumPlaceTables * descriptors.size());
+  for (const Descriptor& descriptor : descriptors) {
+    for (const PlaceKey key : place_keys(descriptor)) keys.push_back(key);
+  }
+  for (std::size_t i = 0; i < keys.size(); ++i) {
+    if (i + 2 < keys.size()) {
+      neighbourhood.fetch_directories((i + 2) % kNumPlaceTables, keys[i + 2]);
     }
-    ballot.close();
+    if (i + 1 < keys.size()) neighbourhood.fetch_entries((i + 1) % kNumPlaceTables, keys[i + 1]);
+    neighbourhood.look(i % kNumPlaceTables, keys[i]);
+    const auto descriptor = static_cast<std::uint32_t>(i / kNumPlaceTables);
+    neighbourhood.visit_similar([&](std::size_t row) { ballot.vote(descriptor, row); });
+    if (i % kNumPlaceTables + 1 == kNumPlaceTables) ballot.close();
   }
   return ballot.take_scores(descriptors.size());
 }
