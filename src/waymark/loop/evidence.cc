@@ -58,11 +58,13 @@ EvidenceCollector::EvidenceCollector(std::shared_ptr<const Rig> rig, std::uint64
 
 std::optional<RevisitEvidence> EvidenceCollector::collect(const Map& map,
                                                           KeyframeId query,
-                                                          KeyframeId match) {
+                                                          KeyframeId match,
+                                                          std::size_t min_inliers) {
   RevisitEvidence evidence;
   evidence.revisit.query = query;
   evidence.revisit.match = match;
   if (!estimate(map, evidence.revisit)) return std::nullopt;
+  if (evidence.revisit.num_inliers < min_inliers) return std::nullopt;
   count_sightings(map, evidence);
   return evidence;
 }
@@ -199,9 +201,10 @@ void EvidenceCollector::count_sightings(const Map& map, RevisitEvidence& evidenc
     const Sim3 id_from_match = Sim3(id_from_query) * revisit.query_from_match;
     const Sightings sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
-    evidence.num_confirming += static_cast<int>(sightings.num_found) >=
-                                   enough_of(kMinFoundToConfirm, features.num_corners()) &&
-                               sightings.share() >= kMinShareToConfirm;
+    evidence.is_confirmed = static_cast<int>(sightings.num_found) >=
+                                enough_of(kMinFoundToConfirm, features.num_corners()) &&
+                            sightings.share() >= kMinShareToConfirm;
+    if (evidence.is_confirmed) break;
   }
 }
 

@@ -31,8 +31,8 @@ struct RevisitEvidence {
   Revisit revisit;
   Sightings in_query;  ///< Landmarks around the match in the query.
   Sightings in_match;  ///< Landmarks around the query in the match.
-  /// Other keyframes near the query that see the place, too, where this revisit puts it.
-  std::size_t num_confirming = 0;
+  /// Whether another keyframe near the query sees the place, too, where this revisit puts it.
+  bool is_confirmed = false;
 };
 
 /// Collects by geometry what speaks for two keyframes showing the same place: how much of what they
@@ -43,8 +43,12 @@ class EvidenceCollector {
  public:
   EvidenceCollector(std::shared_ptr<const Rig> rig, std::uint64_t seed);
 
-  /// Nothing if no similarity fits enough matches to be looked into. Repeatable by bits.
-  std::optional<RevisitEvidence> collect(const Map& map, KeyframeId query, KeyframeId match);
+  /// Nothing if no similarity fits enough matches to be looked into, or fewer than min_inliers.
+  /// Repeatable by bits.
+  std::optional<RevisitEvidence> collect(const Map& map,
+                                         KeyframeId query,
+                                         KeyframeId match,
+                                         std::size_t min_inliers = 0);
 
  private:
   LandmarkMatches match_by_appearance(const Map& map, KeyframeId query, KeyframeId match);

@@ -31,11 +31,15 @@ constexpr double kMinShare = 0.15;  ///< Of what both sides should see.
 constexpr std::size_t kMinPairsBeside = 10;
 constexpr double kMaxRatioError = 0.15;
 
+/// That either of two keyframes has at least.
+std::size_t num_features_of(const Map& map, KeyframeId a, KeyframeId b) {
+  return std::min(map.keyframes().at(a).features->num_corners(),
+                  map.keyframes().at(b).features->num_corners());
+}
+
 bool meets(const Map& map, const RevisitEvidence& evidence, const Demand& demand) {
   const Revisit& revisit = evidence.revisit;
-  const std::size_t num_features =
-      std::min(map.keyframes().at(revisit.query).features->num_corners(),
-               map.keyframes().at(revisit.match).features->num_corners());
+  const std::size_t num_features = num_features_of(map, revisit.query, revisit.match);
   const auto is_enough = [&](std::size_t count, int full) {
     return static_cast<int>(count) >= enough_of(full, num_features);
   };
@@ -44,7 +48,7 @@ bool meets(const Map& map, const RevisitEvidence& evidence, const Demand& demand
   return is_enough(revisit.num_inliers, demand.num_inliers) &&
          is_enough(evidence.in_query.num_found, demand.num_found) &&
          is_enough(evidence.in_match.num_found, demand.num_found) && both.share() >= kMinShare &&
-         evidence.num_confirming > 0;
+         evidence.is_confirmed;
 }
 
 bool is_loop(const Map& map, const Revisit& revisit) {
@@ -125,7 +129,9 @@ std::vector<RevisitEvidence> RevisitVerifier::collect_alike(const Map& map,
                                                             KeyframeId query) {
   std::vector<RevisitEvidence> found;
   for (const KeyframeId match : find_alike(map, places, query)) {
-    std::optional<RevisitEvidence> evidence = evidence_.collect(map, query, match);
+    const int least = enough_of(kOfLoops.num_inliers, num_features_of(map, query, match));
+    std::optional<RevisitEvidence> evidence =
+        evidence_.collect(map, query, match, static_cast<std::size_t>(least));
     if (evidence && meets(map, *evidence, kOfLoops)) found.push_back(std::move(*evidence));
   }
   return found;

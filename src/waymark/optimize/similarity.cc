@@ -54,10 +54,57 @@ std::optional<SideView> view(const Eigen::Vector3d& point_in_cam,
   return SideView{seen, residual};
 }
 
-/// Of a point by a left perturbation that acts on it: rho + phi x p + sigma p.
-Eigen::Matrix<double, 3, 7> point_by_perturbation(const Eigen::Vector3d& point) {
-  Eigen::Matrix<double, 3, 7> result;
-  result << Eigen::Matrix3d::Identity(), -skew(point), point;
+/// Derivatives of what depends on a point by a left perturbation that acts on that, which is moved
+/// by rho + phi x p + sigma p: by_point * (I, -skew(p), p).
+template <int kRows>
+Eigen::Matrix<double, kRows, 7> by_perturbation(const Eigen::Matrix<double, kRows, 3>& by_point,
+                                                const Eigen::Vector3d& point) {
+  Eigen::Matrix<double, kRows, 7> result;
+  result.template leftCols<3>() = by_point;
+  result.col(3) = by_point.col(2) * point.y() - by_point.col(1) * point.z();
+  result.col(4) = by_point.col(0) * point.z() - by_point.col(2) * point.x();
+  result.col(5) = by_point.col(1) * point.x() - by_point.col(0) * point.y();
+  result.col(6).noalias() = by_point * point;
+  return result;
+}
+
+/// A similarity with what the residuals of all matches need of it.
+struct BothWays {
+  explicit BothWays(const Sim3& similarity)
+      : b_from_a(similarity),
+        a_from_b(similarity.inverse()),
+        linear_a_from_b(a_from_b.scale * a_from_b.rotation.toRotationMatrix()) {}
+
+  const Sim3& b_from_a;
+  Sim3 a_from_b;
+  Eigen::Matrix3d linear_a_from_b;
+};
+
+/// See similarity_residual(). Without the ratio of the ranges where is_scale_free is not set.
+std::optional<SimilarityResidual> residual_of(const BothWays& similarity,
+                                              const LandmarkMatches& matches,
+                                              std::size_t index,
+                                              bool is_scale_free) {
+  const Eigen::Vector3d& from_b = matches.b.point_in_cam[index];
+  const Eigen::Vector3d point_in_b = similarity.b_from_a * matches.a.point_in_cam[index];
+  const auto in_b = view(point_in_b, matches.b, index);
+  const auto in_a = view(similarity.a_from_b * from_b, matches.a, index);
+  if (!in_a || !in_b) return std::nullopt;
+  const double range_ratio = from_b.norm() * in_b->seen.inverse_range;
+  if (!(range_ratio > 0.0 && std::isfinite(range_ratio))) return std::nullopt;
+  SimilarityResidual result;
+  result.value << in_b->residual, in_a->residual;
+  result.jacobian.topRows<2>() = by_perturbation<2>(
+      bearing_residual_by_point(in_b->seen, matches.b.level_pixel_from_bearing[index]), point_in_b);
+  // (exp(xi) S)^-1 p = S^-1 (exp(-xi) p).
+  const Matrix23d by_point_in_b =
+      bearing_residual_by_point(in_a->seen, matches.a.level_pixel_from_bearing[index]) *
+      similarity.linear_a_from_b;
+  result.jacobian.bottomRows<2>() = by_perturbation<2>(-by_point_in_b, from_b);
+  if (!is_scale_free) return result;
+  result.log_range_ratio = -std::log(range_ratio);
+  result.log_range_jacobian =
+      by_perturbation<1>(in_b->seen.inverse_range * in_b->seen.direction.transpose(), point_in_b);
   return result;
 }
 
@@ -94,8 +141,9 @@ class SimilaritySolver {
 
   NormalEquations<7> linearize(const Sim3& b_from_a, Indices indices, const Loss& loss) const {
     NormalEquations<7> equations;
+    const BothWays both_ways(b_from_a);
     for (const std::uint32_t index : indices) {
-      const auto residual = similarity_residual(b_from_a, matches_, index);
+      const auto residual = residual_of(both_ways, matches_, index, options_.is_scale_free);
       if (!residual) {
         const double num_parts = options_.is_scale_free ? 2.0 : 1.0;
         equations.cost += num_parts * loss(kGrossSquaredResidual).loss;
@@ -148,8 +196,9 @@ class SimilaritySolver {
   /// Measures the noise of the ratios of ranges and returns it.
   double measure_range_noise(const Sim3& b_from_a, Indices indices) {
     std::vector<double> ratios;
+    const BothWays both_ways(b_from_a);
     for (const std::uint32_t index : indices) {
-      const auto residual = similarity_residual(b_from_a, matches_, index);
+      const auto residual = residual_of(both_ways, matches_, index, true);
       if (residual) ratios.push_back(residual->log_range_ratio);
     }
     if (ratios.empty()) return range_noise_;
@@ -244,27 +293,7 @@ class SimilarityEstimator {
 std::optional<SimilarityResidual> similarity_residual(const Sim3& b_from_a,
                                                       const LandmarkMatches& matches,
                                                       std::size_t index) {
-  const Sim3 a_from_b = b_from_a.inverse();
-  const Eigen::Vector3d& from_b = matches.b.point_in_cam[index];
-  const Eigen::Vector3d point_in_b = b_from_a * matches.a.point_in_cam[index];
-  const auto in_b = view(point_in_b, matches.b, index);
-  const auto in_a = view(a_from_b * from_b, matches.a, index);
-  if (!in_a || !in_b) return std::nullopt;
-  SimilarityResidual result;
-  result.value << in_b->residual, in_a->residual;
-  result.jacobian.topRows<2>() =
-      bearing_residual_by_point(in_b->seen, matches.b.level_pixel_from_bearing[index]) *
-      point_by_perturbation(point_in_b);
-  // (exp(xi) S)^-1 p = S^-1 (exp(-xi) p).
-  const Matrix23d by_point_in_b =
-      bearing_residual_by_point(in_a->seen, matches.a.level_pixel_from_bearing[index]) *
-      (a_from_b.scale * a_from_b.rotation.toRotationMatrix());
-  result.jacobian.bottomRows<2>() = -by_point_in_b * point_by_perturbation(from_b);
-  result.log_range_ratio = -std::log(from_b.norm() * in_b->seen.inverse_range);
-  result.log_range_jacobian = in_b->seen.inverse_range * in_b->seen.direction.transpose() *
-                              point_by_perturbation(point_in_b);
-  if (!std::isfinite(result.log_range_ratio)) return std::nullopt;
-  return result;
+  return residual_of(BothWays(b_from_a), matches, index, true);
 }
 
 std::optional<SimilarityEstimate> find_similarity(const LandmarkMatches& matches,

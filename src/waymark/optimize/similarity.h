@@ -41,8 +41,8 @@ struct SimilarityResidual {
   Eigen::Matrix<double, 4, 7> jacobian;
   /// Logarithm of the ratio of the ranges, in b, of the landmark of a and that of b. Bearings tell
   /// the scale by the distance of the cameras only, and there may be none.
-  double log_range_ratio;
-  Eigen::Matrix<double, 1, 7> log_range_jacobian;
+  double log_range_ratio = 0.0;
+  Eigen::Matrix<double, 1, 7> log_range_jacobian = Eigen::Matrix<double, 1, 7>::Zero();
 };
 
 /// Nothing if a landmark is more than 90 degrees from its bearing, or if a value is not finite.
