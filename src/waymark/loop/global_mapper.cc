@@ -241,15 +241,16 @@ GlobalAdjustment AdjustmentTask::adjust() const {
 }
 
 std::optional<AdjustmentTask> GlobalMapper::take_task() {
-  const bool is_calibration_due =
-      mapper_.is_calibrating() && mapper_.map().keyframes().size() >= next_calibration_;
+  const std::size_t num_keyframes = mapper_.map().keyframes().size();
+  const bool is_calibration_due = mapper_.is_calibrating() && num_keyframes >= next_calibration_ &&
+                                  num_keyframes <= kMaxAdjustedAtOnce;
   if (!has_loop_task() && !is_calibration_due) return std::nullopt;
   AdjustmentTask task;
   task.is_for_calibration = !unadjusted_.is_valid();
   task.submap = task.is_for_calibration
                     ? submaps_by_size(mapper_.map()).front()
                     : mapper_.map().resolve(std::exchange(unadjusted_, SubmapId{}));
-  if (!task.is_for_calibration) pace_.note(mapper_.map().keyframes().size());
+  if (!task.is_for_calibration) pace_.note(num_keyframes);
   task.num_closures = num_closures_;
   task.num_placements = num_placements_;
   if (mapper_.is_calibrating()) {

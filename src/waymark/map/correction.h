@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
+#include <utility>
 #include <vector>
 
 #include "waymark/map/map.h"
@@ -25,6 +27,23 @@ struct MapCorrection {
   /// Found out on the map of now about a part of it: what is not named stays, but for landmarks,
   /// which go with their reference. Takes a time that follows what is named.
   bool is_of_part = false;
+
+  /// The move of a keyframe, or null.
+  const KeyframeMove* find(KeyframeId keyframe) const {
+    const auto at = std::ranges::lower_bound(keyframes, keyframe, {}, &KeyframeMove::keyframe);
+    return at != keyframes.end() && at->keyframe == keyframe ? &*at : nullptr;
+  }
+  KeyframeMove* find(KeyframeId keyframe) {
+    return const_cast<KeyframeMove*>(std::as_const(*this).find(keyframe));
+  }
+  /// The move of a landmark, or null.
+  const LandmarkMove* find(LandmarkId landmark) const {
+    const auto at = std::ranges::lower_bound(landmarks, landmark, {}, &LandmarkMove::landmark);
+    return at != landmarks.end() && at->landmark == landmark ? &*at : nullptr;
+  }
+  LandmarkMove* find(LandmarkId landmark) {
+    return const_cast<LandmarkMove*>(std::as_const(*this).find(landmark));
+  }
 };
 
 /// Moves what the correction names to where it says; what it names but is erased is skipped. What

@@ -24,13 +24,13 @@ constexpr double kMaxRangeSigmas = 3.0;
 /// What a feature measures of a landmark; without its range where that is of something else, as of
 /// a pattern that repeats.
 Measurement measurement_of(const Keyframe& keyframe,
+                           const Rigid3& rig_from_world,
                            std::uint32_t feature,
                            const Eigen::Vector3d& point_in_world) {
   Measurement measured = keyframe.features->measurement(feature);
   if (!(measured.inverse_range_sigma > 0.0f)) return measured;
   const Rigid3& cam_from_rig = keyframe.rig->cameras[measured.camera].cam_from_rig;
-  const InverseRangePoint seen =
-      in_inverse_range(cam_from_rig * (keyframe.rig_from_world * point_in_world));
+  const InverseRangePoint seen = in_inverse_range(cam_from_rig * (rig_from_world * point_in_world));
   const double off = range_residual(seen, measured.inverse_range, measured.inverse_range_sigma);
   if (std::abs(off) > kMaxRangeSigmas) measured.inverse_range_sigma = 0.0f;
   return measured;
@@ -110,25 +110,32 @@ std::vector<KeyframeId> keyframes_of(const BundleWindow& window) {
   return keyframes;
 }
 
-WindowProblem make_problem(const Map& map, const BundleWindow& window) {
+/// start: where what it names is by now; null: all is where the map has it.
+WindowProblem make_problem(const Map& map,
+                           const BundleWindow& window,
+                           const MapCorrection* start = nullptr) {
   WindowProblem result;
   BundleProblem& problem = result.problem;
   const std::vector<KeyframeId> keyframes = keyframes_of(window);
   for (KeyframeId id : keyframes) {
-    problem.rig_from_world.push_back(map.keyframes().at(id).rig_from_world);
+    const auto* const moved = start ? start->find(id) : nullptr;
+    problem.rig_from_world.push_back(moved ? moved->rig_from_world
+                                           : map.keyframes().at(id).rig_from_world);
     problem.rigs.push_back(map.keyframes().at(id).rig.get());
     problem.is_pose_fixed.push_back(index_of(window.moving, id) == window.moving.size());
   }
   for (LandmarkId id : window.landmarks) {
     const Landmark& landmark = map.landmarks().at(id);
     const auto point = static_cast<std::uint32_t>(problem.points.size());
-    problem.points.push_back(landmark.position_in_world);
+    const auto* const moved = start ? start->find(id) : nullptr;
+    problem.points.push_back(moved ? moved->position_in_world : landmark.position_in_world);
     for (const Observation& observation : landmark.observations) {
       const std::size_t pose = index_of(keyframes, observation.keyframe);
       if (pose == keyframes.size()) continue;
       problem.observations.push_back({measurement_of(map.keyframes().at(observation.keyframe),
+                                                     problem.rig_from_world[pose],
                                                      observation.feature,
-                                                     landmark.position_in_world),
+                                                     problem.points.back()),
                                       static_cast<std::uint32_t>(pose),
                                       point});
       result.observations.push_back(observation);
@@ -199,8 +206,8 @@ bool is_supported(const Map& map, const Landmark& landmark) {
   if (num_observers(landmark) >= 2) return true;
   for (const Observation& observation : landmark.observations) {
     const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
-    const Measurement measured =
-        measurement_of(keyframe, observation.feature, landmark.position_in_world);
+    const Measurement measured = measurement_of(
+        keyframe, keyframe.rig_from_world, observation.feature, landmark.position_in_world);
     if (measured.inverse_range_sigma > 0.0f) return true;
   }
   return false;
@@ -209,8 +216,9 @@ bool is_supported(const Map& map, const Landmark& landmark) {
 WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
                                     const BundleOptions& options,
-                                    const KnownCalibration* known) {
-  WindowProblem window_problem = make_problem(map, window);
+                                    const KnownCalibration* known,
+                                    const MapCorrection* start) {
+  WindowProblem window_problem = make_problem(map, window, start);
   std::optional<KnownCalibration> calibration;
   if (known) {
     calibration = find_readout(map, window_problem.observations, *known, window_problem.problem);

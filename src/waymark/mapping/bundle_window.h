@@ -38,12 +38,14 @@ struct WindowAdjustment {
   std::optional<KnownCalibration> calibration = std::nullopt;  ///< Where it changed.
 };
 
-/// Adjusts a window and leaves the map as it is. known: the calibration that is to be adjusted
-/// along, or null.
+/// Adjusts a window and leaves the map as it is.
+/// \param known  the calibration that is to be adjusted along, or null.
+/// \param start  where what it names begins; null: all of it where the map has it. Without known.
 WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
                                     const BundleOptions& options,
-                                    const KnownCalibration* known = nullptr);
+                                    const KnownCalibration* known = nullptr,
+                                    const MapCorrection* start = nullptr);
 
 /// Looks for the readout of a rolling shutter in what a window sees: see find_readout().
 std::optional<KnownCalibration> look_for_readout(const Map& map,

@@ -9,6 +9,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/sim3.h"
+#include "waymark/mapping/adjust_parts.h"
 
 namespace waymark {
 namespace {
@@ -48,12 +49,13 @@ GlobalAdjustment adjust(const Map& frozen,
                         const KnownCalibration* known = nullptr) {
   GlobalAdjustment adjustment;
   if (window.moving.empty() || window.landmarks.empty()) return adjustment;
-  WindowAdjustment found = compute_adjustment(frozen,
-                                              window,
-                                              {.num_rounds = 2,
-                                               .max_iterations_per_round = 20,
-                                               .num_threads = std::thread::hardware_concurrency()},
-                                              known);
+  const BundleOptions options{.num_rounds = 2,
+                              .max_iterations_per_round = 20,
+                              .num_threads = std::thread::hardware_concurrency()};
+  WindowAdjustment found =
+      window.moving.size() > kMaxAdjustedAtOnce
+          ? compute_adjustment_in_parts(frozen, window, options, kMaxAdjustedAtOnce)
+          : compute_adjustment(frozen, window, options, known);
   adjustment.calibration = std::move(found.calibration);
   adjustment.correction = std::move(found.correction);
   adjustment.outliers = std::move(found.outliers);
