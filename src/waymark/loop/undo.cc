@@ -6,24 +6,12 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/map/parts.h"
-
 namespace waymark {
 namespace {
 
 /// Squared residual, in pixels of the level, from which on a feature does not see a landmark. What
 /// hangs together stays so: until all is adjusted again, it may be a few pixels off.
 constexpr double kMaxSquaredOfTogether = 100.0;
-
-Map without_loops(const Map& map, std::span<const std::uint8_t> is_on) {
-  MapParts parts = take_apart(map);
-  std::vector<LoopEdge> kept;
-  for (std::size_t i = 0; i < parts.loop_edges.size(); ++i) {
-    if (is_on[i]) kept.push_back(parts.loop_edges[i]);
-  }
-  parts.loop_edges = std::move(kept);
-  return Map::restore(std::move(parts));
-}
 
 /// Where keyframes have what lies around them, before and after a correction.
 class Motions {
@@ -95,7 +83,7 @@ void undo_loops(Map& map,
                 SubmapId submap,
                 std::span<const std::uint8_t> is_on,
                 DirtyLandmarks& dirty) {
-  map = without_loops(map, is_on);
+  map.drop_loop_edges(is_on);
   const Motions motions(map);
   apply_correction(map, place_by_odometry(map, odometry, submap, map.measured_loop_edges()));
   std::vector<LandmarkId> landmarks;

@@ -254,6 +254,12 @@ void Map::add_loop_edge(const LoopEdge& edge) {
   loop_edges_.push_back(stored);
 }
 
+void Map::drop_loop_edges(std::span<const std::uint8_t> is_kept) {
+  WAYMARK_CHECK(is_kept.size() == loop_edges_.size());
+  std::size_t index = 0;
+  std::erase_if(loop_edges_, [&](const LoopEdge&) { return is_kept[index++] == 0; });
+}
+
 void Map::join_submaps(KeyframeId child, KeyframeId parent) {
   const SubmapId from = keyframes_.at(child).submap;
   const SubmapId into = keyframes_.at(parent).submap;

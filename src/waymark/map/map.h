@@ -9,6 +9,7 @@
 #include <memory>
 #include <memory_resource>
 #include <optional>
+#include <span>
 #include <string>
 #include <utility>
 #include <vector>
@@ -296,6 +297,8 @@ class Map {
   void rescale_keyframe(KeyframeId id, double factor);
   /// Adds an edge between two living keyframes, measured in the units of now.
   void add_loop_edge(const LoopEdge& edge);
+  /// Drops loop edges: is_kept has 1 or 0 per loop edge, in their order.
+  void drop_loop_edges(std::span<const std::uint8_t> is_kept);
   /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
   /// first becomes its root and hangs below `parent` of the second.
   void join_submaps(KeyframeId child, KeyframeId parent);

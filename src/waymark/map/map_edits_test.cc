@@ -4,6 +4,7 @@
 // All mutators of the map in random order, with frozen copies taken in between.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <optional>
 #include <sstream>
@@ -72,6 +73,7 @@ enum class Edit {
   kMoveKeyframe,
   kRescaleKeyframe,
   kAddLoopEdge,
+  kDropLoopEdges,
   kJoinSubmaps,
   kMoveLandmark,
   kSetAppearance,
@@ -164,10 +166,28 @@ class RandomEditor {
       case Edit::kAddLoopEdge:
         if (a == b || !is_one_part || rng_.below(4) != 0) return false;
         return map.add_loop_edge({a, b, Sim3(random_pose())}), true;
+      case Edit::kDropLoopEdges:
+        return drop_loop_edges();
       default:
         if (is_one_part) return false;
         return map.join_submaps(a, b), true;
     }
+  }
+
+  bool drop_loop_edges() {
+    std::vector<LoopEdge> edges = map.measured_loop_edges();
+    if (edges.size() < 2) return false;
+    std::vector<std::uint8_t> is_kept(edges.size(), 1);
+    const std::uint32_t dropped = rng_.below(static_cast<std::uint32_t>(edges.size()));
+    is_kept[dropped] = 0;
+    map.drop_loop_edges(is_kept);
+    edges.erase(edges.begin() + dropped);
+    EXPECT_TRUE(std::ranges::equal(
+        edges, map.measured_loop_edges(), [](const LoopEdge& one, const LoopEdge& other) {
+          return one.from == other.from && one.to == other.to &&
+                 one.to_from_from.translation == other.to_from_from.translation;
+        }));
+    return true;
   }
 
   bool change(Edit edit, KeyframeId keyframe, LandmarkId landmark) {
