@@ -123,13 +123,12 @@ bool is_plausible(const Map& map, const LoopEdge& loop) {
 /// towns: which are believed, and what the map is like with them.
 void choose_among_loops(benchmark::State& state) {
   const TownMap town = drifting_town(state);
-  const Map& map = *town.map;
+  Map map = Map::thaw(*town.map);
+  note_odometry(map);
   constexpr std::size_t kNumTrue = 500, kNumFalse = 200;
   const MixedLoops loops = mix_loops(town, kNumTrue, kNumFalse);
-  Odometry odometry;
-  odometry.note(map);
   std::vector<std::uint8_t> is_on;
-  for (auto _ : state) is_on = choose_loops(map, odometry, SubmapId{0}, loops.all, 0);
+  for (auto _ : state) is_on = choose_loops(map, SubmapId{0}, loops.all, 0);
   std::vector<LoopEdge> chosen;
   double num_true = 0.0;
   double num_plausible[2] = {0.0, 0.0};
@@ -140,7 +139,7 @@ void choose_among_loops(benchmark::State& state) {
     num_true += loops.is_true[i];
   }
   const auto error_with = [&](const std::vector<LoopEdge>& used) {
-    return error_after(town, place_by_odometry(map, odometry, SubmapId{0}, used));
+    return error_after(town, place_by_odometry(map, SubmapId{0}, used));
   };
   state.counters["true_on"] = num_true;
   state.counters["false_on"] = static_cast<double>(chosen.size()) - num_true;

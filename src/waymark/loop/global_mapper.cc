@@ -10,6 +10,7 @@
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/join_by_markers.h"
+#include "waymark/loop/odometry.h"
 #include "waymark/loop/spread_drift.h"
 #include "waymark/loop/undo.h"
 #include "waymark/map/align.h"
@@ -98,7 +99,7 @@ void GlobalMapper::update_places(const Mapper::Changes& changes) {
 bool GlobalMapper::close(const Revisit& revisit) { return close_moving(revisit).has_value(); }
 
 std::optional<GlobalMapper::Moved> GlobalMapper::close_moving(const Revisit& revisit) {
-  odometry_.note(mapper_.map());
+  note_odometry();
   const auto& keyframes = mapper_.map().keyframes();
   const bool is_loop = keyframes.at(revisit.query).submap == keyframes.at(revisit.match).submap;
   std::optional<Moved> moved = is_loop ? close_loop(revisit) : join(revisit);
@@ -142,7 +143,7 @@ bool GlobalMapper::agrees_with_loops(const Revisit& revisit) {
   // Nothing but the length of the way, which has been looked at, can contradict the first.
   if (loops.empty()) return true;
   loops.push_back(as_measured(map, as_loop(revisit)));
-  const std::vector<std::uint8_t> is_on = choose_loops(map, odometry_, submap, loops, num_of_map);
+  const std::vector<std::uint8_t> is_on = choose_loops(map, submap, loops, num_of_map);
   undo(submap, std::span(is_on).first(num_of_map));
   if (!is_on.back()) disbelieve(loops.back());
   return is_on.back();
@@ -155,12 +156,15 @@ void GlobalMapper::undo(SubmapId submap, std::span<const std::uint8_t> is_on) {
   for (std::size_t i = 0; i < is_on.size(); ++i) {
     if (!is_on[i]) disbelieve(mapper_.map().measured_loop_edges()[i]);
   }
-  mapper_.change(
-      [&](Map& map, DirtyLandmarks& dirty) { undo_loops(map, odometry_, submap, is_on, dirty); });
+  mapper_.change([&](Map& map, DirtyLandmarks& dirty) { undo_loops(map, submap, is_on, dirty); });
   num_loops_ = std::max(num_loops_ - static_cast<int>(num_off), 0);
   // What is being adjusted holds what was undone.
   ++num_placements_;
   adjust_soon(submap);
+}
+
+void GlobalMapper::note_odometry() {
+  mapper_.change([](Map& map, DirtyLandmarks&) { waymark::note_odometry(map); });
 }
 
 /// The pose graph does not do for now, however large the map is.
@@ -269,7 +273,7 @@ void GlobalMapper::apply(const AdjustmentTask& task, const GlobalAdjustment& adj
     return;
   }
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
-  odometry_.note(mapper_.map());
+  note_odometry();
   if (task.num_closures == num_closures_) {
     mapper_.apply(adjustment);
   } else {
@@ -287,7 +291,7 @@ void GlobalMapper::look_with_calibration(const std::shared_ptr<const Rig>& befor
 
 void GlobalMapper::refine_globally(bool with_calibration) {
   const std::shared_ptr<const Rig> before = mapper_.calibration().rig;
-  odometry_.note(mapper_.map());
+  note_odometry();
   mapper_.refine_globally(with_calibration && mapper_.is_calibrating() &&
                           mapper_.map().keyframes().size() >= kFewestInTheEnd);
   look_with_calibration(before);

@@ -12,7 +12,6 @@
 
 #include "waymark/loop/adjustment_pace.h"
 #include "waymark/loop/beside.h"
-#include "waymark/loop/odometry.h"
 #include "waymark/loop/settings.h"
 #include "waymark/loop/verify.h"
 #include "waymark/mapping/global_adjustment.h"
@@ -103,6 +102,7 @@ class GlobalMapper {
   bool agrees_with_loops(const Revisit& revisit);
   void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
   void disbelieve(const LoopEdge& loop);
+  void note_odometry();
   void adjust_soon(SubmapId submap);
   void consolidate_some(std::size_t max_count);
   void consolidate_rest();
@@ -126,7 +126,6 @@ class GlobalMapper {
   std::set<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   KeyframeId end_of_noted_{0};           ///< Keyframes below were among these at some time.
   LivePositions positions_;
-  Odometry odometry_;
   /// Loops that others contradict, in units before any correction: further ones may agree with
   /// them.
   std::vector<LoopEdge> disbelieved_;

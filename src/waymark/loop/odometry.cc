@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/loop/odometry.h"
 
+#include <utility>
+
 #include "waymark/loop/drift.h"
 #include "waymark/optimize/pose_graph.h"
 #include "waymark/optimize/switch_edges.h"
@@ -25,15 +27,14 @@ constexpr std::uint32_t kNoNode = UINT32_MAX;
 /// Odometry and loops of a sub-map. Lengths of a node are in its units before any correction.
 class OdometryGraph {
  public:
-  OdometryGraph(const Map& map, const Odometry& odometry, SubmapId submap)
-      : map_(map), odometry_(odometry), node_of_keyframe_(odometry.nodes().size(), kNoNode) {
+  OdometryGraph(const Map& map, SubmapId submap)
+      : map_(map), node_of_keyframe_(map.odometry().end_id().value, kNoNode) {
     graph_.is_scale_free = !map.submaps()[submap.value].is_metric;
-    for (std::uint32_t i = 0; i < node_of_keyframe_.size(); ++i) {
-      if (!odometry.nodes()[i]) continue;
-      if (map.keyframes().at(map.resolve(KeyframeId{i})).submap != submap) continue;
-      node_of_keyframe_[i] = static_cast<std::uint32_t>(ids_.size());
-      ids_.push_back(KeyframeId{i});
-    }
+    map.odometry().for_each([&](KeyframeId id, const OdometryNode&) {
+      if (map.keyframes().at(map.resolve(id)).submap != submap) return;
+      node_of_keyframe_[id.value] = static_cast<std::uint32_t>(ids_.size());
+      ids_.push_back(id);
+    });
     graph_.node_from_world.resize(ids_.size());
     graph_.is_fixed.assign(ids_.size(), 0);
     const KeyframeId root = map.submaps()[submap.value].root;
@@ -52,7 +53,7 @@ class OdometryGraph {
     edge.from = node_of(loop.from);
     edge.to = node_of(loop.to);
     edge.to_from_from = loop.to_from_from;
-    edge.sigma_translation = kLoopTranslation * odometry_.nodes()[loop.to.value]->depth;
+    edge.sigma_translation = kLoopTranslation * noted(loop.to).depth;
     edge.sigma_rotation_rad = kLoopRotationRad;
     edge.sigma_log_scale = kLoopLogScale;
     edge.is_robust = is_robust;
@@ -83,9 +84,9 @@ class OdometryGraph {
                                                                 : kNoNode;
   }
 
-  std::uint32_t parent_of(std::uint32_t node) const {
-    return node_of(odometry_.nodes()[ids_[node].value]->parent);
-  }
+  std::uint32_t parent_of(std::uint32_t node) const { return node_of(noted(ids_[node]).parent); }
+
+  const OdometryNode& noted(KeyframeId id) const { return map_.odometry().at(id); }
 
   /// A node and what is above it, by the way from the top of its tree; that is where the map has
   /// it.
@@ -101,7 +102,7 @@ class OdometryGraph {
     }
     for (auto below = way.rbegin(); below != way.rend(); node = *below++) {
       graph_.node_from_world[*below] =
-          odometry_.nodes()[ids_[*below].value]->rig_from_parent * graph_.node_from_world[node];
+          noted(ids_[*below]).rig_from_parent * graph_.node_from_world[node];
       is_placed_[*below] = 1;
     }
   }
@@ -116,47 +117,46 @@ class OdometryGraph {
 
   void add_step(std::uint32_t node) {
     if (parent_of(node) == kNoNode) return;
-    const Odometry::Node& noted = *odometry_.nodes()[ids_[node].value];
+    const OdometryNode& step = noted(ids_[node]);
     PoseGraphEdge edge;
     edge.from = parent_of(node);
     edge.to = node;
-    edge.to_from_from = noted.rig_from_parent;
-    edge.sigma_translation = kStepTranslation * noted.depth;
+    edge.to_from_from = step.rig_from_parent;
+    edge.sigma_translation = kStepTranslation * step.depth;
     edge.sigma_rotation_rad = kStepRotationRad;
     edge.sigma_log_scale = kStepLogScale;
     graph_.edges.push_back(edge);
   }
 
   const Map& map_;
-  const Odometry& odometry_;
   std::vector<std::uint32_t> node_of_keyframe_;
   std::vector<KeyframeId> ids_;  // Ascending, one per node.
   std::vector<std::uint8_t> is_placed_;
   PoseGraph graph_;
 };
 
+OdometryNode node_of(const Map& map, KeyframeId id, const Keyframe& keyframe) {
+  const double scale = keyframe.applied_scale;
+  OdometryNode node;
+  const double depth = median_depth(map, id) / scale;
+  if (depth > 0.0) node.depth = depth;
+  node.parent = keyframe.parent;
+  if (const Keyframe* parent = map.keyframes().find(node.parent)) {
+    const Rigid3 rigid = keyframe.rig_from_world * parent->rig_from_world.inverse();
+    node.rig_from_parent = {
+        rigid.rotation, rigid.translation / scale, parent->applied_scale / scale};
+  }
+  return node;
+}
+
 }  // namespace
 
-void Odometry::note(const Map& map) {
-  const KeyframeId end = map.keyframes().end_id();
-  nodes_.reserve(end.value);
-  while (nodes_.size() < end.value) {
-    const KeyframeId id{static_cast<std::uint32_t>(nodes_.size())};
-    nodes_.emplace_back();
-    const Keyframe* keyframe = map.keyframes().find(id);
-    if (!keyframe) continue;
-    const double scale = keyframe->applied_scale;
-    Node node;
-    const double depth = median_depth(map, id) / scale;
-    if (depth > 0.0) node.depth = depth;
-    node.parent = keyframe->parent;
-    if (const Keyframe* parent = map.keyframes().find(node.parent)) {
-      const Rigid3 rigid = keyframe->rig_from_world * parent->rig_from_world.inverse();
-      node.rig_from_parent = {
-          rigid.rotation, rigid.translation / scale, parent->applied_scale / scale};
-    }
-    nodes_.back() = node;
-  }
+void note_odometry(Map& map) {
+  std::vector<std::pair<KeyframeId, OdometryNode>> notes;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    if (!map.odometry().contains(id)) notes.emplace_back(id, node_of(map, id, keyframe));
+  });
+  for (const auto& [id, node] : notes) map.note_odometry(id, node);
 }
 
 LoopEdge as_measured(const Map& map, const LoopEdge& loop) {
@@ -169,11 +169,10 @@ LoopEdge as_measured(const Map& map, const LoopEdge& loop) {
 }
 
 std::vector<std::uint8_t> choose_loops(const Map& map,
-                                       const Odometry& odometry,
                                        SubmapId submap,
                                        std::span<const LoopEdge> loops,
                                        std::size_t num_believed) {
-  OdometryGraph graph(map, odometry, submap);
+  OdometryGraph graph(map, submap);
   const std::size_t num_steps = graph.graph().edges.size();
   std::vector<std::size_t> is_there;  // The loops that have edges, in their order.
   SwitchOptions options;
@@ -188,11 +187,8 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
   return is_on;
 }
 
-MapCorrection place_by_odometry(const Map& map,
-                                const Odometry& odometry,
-                                SubmapId submap,
-                                std::span<const LoopEdge> loops) {
-  OdometryGraph graph(map, odometry, submap);
+MapCorrection place_by_odometry(const Map& map, SubmapId submap, std::span<const LoopEdge> loops) {
+  OdometryGraph graph(map, submap);
   for (const LoopEdge& loop : loops) graph.add_loop(loop, false);
   optimize_pose_graph(graph.graph(), {});
   return graph.correction();

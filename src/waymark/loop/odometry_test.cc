@@ -18,7 +18,7 @@ class OdometryTest : public ::testing::TestWithParam<bool> {
  protected:
   OdometryTest() {
     for (int step = 0; step < 3 * kRound; ++step) scene_.add_keyframe(step);
-    odometry_.note(scene_.map);
+    note_odometry(scene_.map);
   }
 
   LoopEdge true_loop(int from, int to) const {
@@ -31,11 +31,10 @@ class OdometryTest : public ::testing::TestWithParam<bool> {
   static KeyframeId id(int step) { return KeyframeId{static_cast<std::uint32_t>(step)}; }
 
   std::vector<std::uint8_t> choose(const std::vector<LoopEdge>& loops) const {
-    return choose_loops(scene_.map, odometry_, kSubmap, loops, loops.size() - 1);
+    return choose_loops(scene_.map, kSubmap, loops, loops.size() - 1);
   }
 
   LoopScene scene_{cloud_all_round(1000), GetParam(), drift_of(0.2, 0.05, GetParam() ? 0.0 : 0.05)};
-  Odometry odometry_;
 };
 
 TEST_P(OdometryTest, TellsAFalseLoopByTheOthers) {
@@ -52,12 +51,12 @@ TEST_P(OdometryTest, StillTellsItOnceTheMapIsBent) {
   apply_correction(scene_.map, spread_drift(scene_.map, lie).correction);
   scene_.map.add_loop_edge({lie.from, lie.to, lie.to_from_from});
   const double error_bent = error_of(scene_);
-  odometry_.note(scene_.map);
+  note_odometry(scene_.map);
   std::vector<LoopEdge> loops = {
       lie, true_loop(2, 42), true_loop(10, 52), true_loop(60, 100), true_loop(35, 117)};
   EXPECT_EQ(choose(loops), (std::vector<std::uint8_t>{0, 1, 1, 1, 1}));
   loops.erase(loops.begin());
-  apply_correction(scene_.map, place_by_odometry(scene_.map, odometry_, kSubmap, loops));
+  apply_correction(scene_.map, place_by_odometry(scene_.map, kSubmap, loops));
   EXPECT_LT(error_of(scene_), 0.1);
   EXPECT_LT(error_of(scene_), 0.2 * error_bent);
   EXPECT_EQ(scene_.map.broken_invariants(), "");
@@ -68,7 +67,7 @@ TEST_P(OdometryTest, WithoutLoopsKeyframesGoBackToWhereTheyWere) {
   scene_.map.keyframes().for_each(
       [&](KeyframeId, const Keyframe& keyframe) { before.push_back(keyframe.rig_from_world); });
   apply_correction(scene_.map, spread_drift(scene_.map, false_loop(30, 84)).correction);
-  apply_correction(scene_.map, place_by_odometry(scene_.map, odometry_, kSubmap, {}));
+  apply_correction(scene_.map, place_by_odometry(scene_.map, kSubmap, {}));
   for (std::uint32_t i = 0; i < before.size(); ++i) {
     const Keyframe& keyframe = scene_.map.keyframes().at(KeyframeId{i});
     EXPECT_TRUE(keyframe.rig_from_world.matrix().isApprox(before[i].matrix(), 1e-6)) << i;
@@ -81,7 +80,7 @@ TEST_P(OdometryTest, RemembersWhatWasErased) {
   const std::vector<LoopEdge> loops = {
       true_loop(2, 42), true_loop(10, 52), false_loop(30, 84), true_loop(60, 100)};
   EXPECT_EQ(choose(loops), (std::vector<std::uint8_t>{1, 1, 0, 1}));
-  const MapCorrection correction = place_by_odometry(scene_.map, odometry_, kSubmap, {});
+  const MapCorrection correction = place_by_odometry(scene_.map, kSubmap, {});
   EXPECT_EQ(correction.keyframes.size(), scene_.map.keyframes().size());
 }
 

@@ -6,6 +6,8 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/loop/odometry.h"
+
 namespace waymark {
 namespace {
 
@@ -79,13 +81,12 @@ void split(Map& map, LandmarkId id, const Motions& motions, DirtyLandmarks& dirt
 }  // namespace
 
 void undo_loops(Map& map,
-                const Odometry& odometry,
                 SubmapId submap,
                 std::span<const std::uint8_t> is_on,
                 DirtyLandmarks& dirty) {
   map.drop_loop_edges(is_on);
   const Motions motions(map);
-  apply_correction(map, place_by_odometry(map, odometry, submap, map.measured_loop_edges()));
+  apply_correction(map, place_by_odometry(map, submap, map.measured_loop_edges()));
   std::vector<LandmarkId> landmarks;
   map.landmarks().for_each([&](LandmarkId id, const Landmark& landmark) {
     if (landmark.submap == submap) landmarks.push_back(id);

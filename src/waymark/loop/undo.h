@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <span>
 
-#include "waymark/loop/odometry.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
 
@@ -13,9 +13,9 @@ namespace waymark {
 /// Takes back loops of a sub-map that turned out to be false: without their edges, keyframes go to
 /// where odometry and the other loops put them, and landmarks that this tears apart are split:
 /// observations that do not see the landmark any more see one of their own, where they had it.
+/// All keyframes must be noted, see note_odometry().
 /// \param is_on  1 or 0 per loop edge of the map.
 void undo_loops(Map& map,
-                const Odometry& odometry,
                 SubmapId submap,
                 std::span<const std::uint8_t> is_on,
                 DirtyLandmarks& dirty);

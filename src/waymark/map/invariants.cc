@@ -198,6 +198,23 @@ void find_broken_loop_edges(const Map& map, Findings& findings) {
   }
 }
 
+void find_broken_odometry(const Map& map, Findings& findings) {
+  const KeyframeId end = map.keyframes().end_id();
+  map.odometry().for_each([&](KeyframeId id, const OdometryNode& node) {
+    if (id >= end) findings.add(name(id), "its odometry was noted, though it was never there");
+    if (node.parent.is_valid() && node.parent >= end) {
+      findings.add(name(id), "its odometry is from a keyframe that was never there");
+    }
+  });
+  const auto parent_of = [&](KeyframeId id) {
+    const OdometryNode* node = map.odometry().find(id);
+    return node ? node->parent : KeyframeId{};
+  };
+  for (const KeyframeId id : find_endless(end, parent_of)) {
+    findings.add(name(id), "its odometry goes round in a cycle");
+  }
+}
+
 void find_broken_covisibility(const Map& map,
                               const CowTable<KeyframeId, Covisibility>& counted,
                               Findings& findings) {
@@ -220,6 +237,7 @@ std::vector<std::string> Map::list_broken_invariants(std::size_t max_count) cons
     if (!findings.is_full()) findings.add(name(id), broken_landmark(*this, id, landmark));
   });
   find_broken_loop_edges(*this, findings);
+  find_broken_odometry(*this, findings);
   find_broken_forwarding(*this, findings);
   find_broken_covisibility(*this, count_covisibility(), findings);
   return findings.take();

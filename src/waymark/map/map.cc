@@ -35,6 +35,7 @@ std::shared_ptr<const Map> Map::freeze() {
   frozen->covisibility_ = covisibility_.freeze();
   frozen->keyframe_forwarding_ = keyframe_forwarding_.freeze();
   frozen->landmark_forwarding_ = landmark_forwarding_.freeze();
+  frozen->odometry_ = odometry_.freeze();
   frozen->submaps_ = submaps_;
   frozen->loop_edges_ = loop_edges_;
   frozen->markers_ = markers_;
@@ -50,6 +51,7 @@ Map Map::thaw(const Map& frozen) {
   map.covisibility_ = decltype(covisibility_)::thaw(frozen.covisibility_);
   map.keyframe_forwarding_ = decltype(keyframe_forwarding_)::thaw(frozen.keyframe_forwarding_);
   map.landmark_forwarding_ = decltype(landmark_forwarding_)::thaw(frozen.landmark_forwarding_);
+  map.odometry_ = decltype(odometry_)::thaw(frozen.odometry_);
   map.submaps_ = frozen.submaps_;
   map.loop_edges_ = frozen.loop_edges_;
   map.markers_ = frozen.markers_;

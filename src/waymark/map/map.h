@@ -87,6 +87,14 @@ struct LoopEdge {
   Sim3 to_from_from;  ///< Of the rigs; lengths in the units of the map around `to`.
 };
 
+/// How a keyframe lay to its parent by what was seen on the way, before any loop moved them: what a
+/// loop that bent the map can still be contradicted by.
+struct OdometryNode {
+  KeyframeId parent;     ///< In the spanning tree then; invalid for a root.
+  Sim3 rig_from_parent;  ///< Lengths in the units before any correction, as of loop edges.
+  double depth = 1.0;    ///< Median distance of what it saw, in these units.
+};
+
 /// A feature of a keyframe that sees a landmark.
 struct Observation {
   KeyframeId keyframe;                 ///< That sees the landmark.
@@ -166,12 +174,18 @@ struct MapParts {
     LandmarkId id;        ///< Its former id.
     LandmarkId survivor;  ///< The one it was merged into.
   };
+  /// How a keyframe lay to its parent.
+  struct NotedOdometry {
+    KeyframeId id;      ///< Of the keyframe, which may be gone.
+    OdometryNode node;  ///< As it was noted.
+  };
   std::vector<Submap> submaps;                   ///< By id; joined ones stay in the list.
   std::vector<StoredKeyframe> keyframes;         ///< Ascending.
   std::vector<StoredLandmark> landmarks;         ///< Ascending.
   std::vector<ErasedKeyframe> erased_keyframes;  ///< Ascending.
   std::vector<MergedLandmark> merged_landmarks;  ///< Ascending; that are gone.
   std::vector<LoopEdge> loop_edges;              ///< As Map::measured_loop_edges() gives them.
+  std::vector<NotedOdometry> odometry;           ///< Ascending.
   std::vector<MapMarker> markers;                ///< By number.
   KeyframeId end_keyframe;                       ///< One past the largest id ever given.
   LandmarkId end_landmark;                       ///< The same.
@@ -231,6 +245,8 @@ class Map {
   std::vector<LoopEdge> loop_edges() const;
   /// The same, lengths in the units before any correction. For writers of files.
   const std::vector<LoopEdge>& measured_loop_edges() const { return loop_edges_; }
+  /// Where keyframes lay before any loop moved them, as far as it was noted; of erased ones, too.
+  const CowTable<KeyframeId, OdometryNode>& odometry() const { return odometry_; }
   /// The markers that hold the map in metres, by number; one may be there once per sub-map.
   const std::vector<MapMarker>& markers() const { return markers_; }
   /// Where a marker is, in metres in the frame of its sub-map.
@@ -299,6 +315,8 @@ class Map {
   void add_loop_edge(const LoopEdge& edge);
   /// Drops loop edges: is_kept has 1 or 0 per loop edge, in their order.
   void drop_loop_edges(std::span<const std::uint8_t> is_kept);
+  /// Notes where a keyframe lies, once for each: see odometry().
+  void note_odometry(KeyframeId id, const OdometryNode& node) { odometry_.put(id, node); }
   /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
   /// first becomes its root and hangs below `parent` of the second.
   void join_submaps(KeyframeId child, KeyframeId parent);
@@ -327,6 +345,7 @@ class Map {
   CowTable<KeyframeId, Covisibility> covisibility_;
   CowTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
   CowTable<LandmarkId, LandmarkForwarding> landmark_forwarding_;
+  CowTable<KeyframeId, OdometryNode> odometry_;
   std::shared_ptr<std::pmr::memory_resource> feature_memory_;  ///< Null: where they come from.
   FrameId newest_frame_{0};                                    ///< Of all keyframes that ever were.
   std::vector<Submap> submaps_;

@@ -55,6 +55,11 @@ std::string content_of(const Map& map) {
   map.landmark_forwarding().for_each([&](LandmarkId id, const LandmarkForwarding& forwarding) {
     out << id.value << '>' << forwarding.survivor.value << ' ';
   });
+  map.odometry().for_each([&](KeyframeId id, const OdometryNode& node) {
+    out << id.value << " below " << node.parent.value << ' ' << node.depth << ' '
+        << node.rig_from_parent.scale << ' ' << node.rig_from_parent.translation.transpose()
+        << '\n';
+  });
   for (const LoopEdge& edge : map.measured_loop_edges()) {
     out << edge.from.value << '-' << edge.to.value << ' ' << edge.to_from_from.scale << '\n';
   }
@@ -74,6 +79,7 @@ enum class Edit {
   kRescaleKeyframe,
   kAddLoopEdge,
   kDropLoopEdges,
+  kNoteOdometry,
   kJoinSubmaps,
   kMoveLandmark,
   kSetAppearance,
@@ -168,6 +174,9 @@ class RandomEditor {
         return map.add_loop_edge({a, b, Sim3(random_pose())}), true;
       case Edit::kDropLoopEdges:
         return drop_loop_edges();
+      case Edit::kNoteOdometry:
+        if (map.odometry().contains(a)) return false;
+        return map.note_odometry(a, {KeyframeId{a.value - 1}, Sim3(random_pose())}), true;
       default:
         if (is_one_part) return false;
         return map.join_submaps(a, b), true;
@@ -249,7 +258,7 @@ TEST(MapEdits, KeepTheMapSoundAndFrozenCopiesAsTheyWere) {
   for (std::uint64_t seed = 1; seed <= 4; ++seed) {
     RandomEditor editor(seed);
     std::vector<std::pair<std::shared_ptr<const Map>, std::string>> frozen;
-    for (int step = 0; step < 1500; ++step) {
+    for (int step = 0; step < 2500; ++step) {
       editor.step();
       ASSERT_EQ(editor.map.broken_invariants(), "") << "seed " << seed << ", step " << step;
       if (step % 7 == 0 && step % 100 < 50) {

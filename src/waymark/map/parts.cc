@@ -93,6 +93,10 @@ void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
     forwarding.heir = shift(forwarding.heir);
     parts.erased_keyframes.push_back({shift(id), forwarding});
   });
+  map.odometry().for_each([&](KeyframeId id, OdometryNode node) {
+    node.parent = shift(node.parent);
+    parts.odometry.push_back({shift(id), node});
+  });
 }
 
 void append_landmarks(const Map& map, const Shift& shift, MapParts& parts) {
@@ -147,6 +151,9 @@ Map Map::restore(MapParts parts) {
   map.keyframes_.skip_to(parts.end_keyframe);
   for (const MapParts::ErasedKeyframe& erased : parts.erased_keyframes) {
     map.keyframe_forwarding_.put(erased.id, erased.forwarding);
+  }
+  for (const MapParts::NotedOdometry& noted : parts.odometry) {
+    map.odometry_.put(noted.id, noted.node);
   }
   for (const MapParts::MergedLandmark& merged : parts.merged_landmarks) {
     map.landmark_forwarding_.put(merged.id, {merged.survivor, map.newest_frame_});

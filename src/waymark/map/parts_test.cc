@@ -33,6 +33,12 @@ TEST(MapParts, UniteKeepsBothMapsAsTheyAre) {
     EXPECT_EQ(other.submap.value, keyframe.submap.value + a.submaps().size());
     EXPECT_EQ(both.covisible(KeyframeId{id.value + shift}).size(), b.covisible(id).size());
   });
+  EXPECT_EQ(both.odometry().size(), a.odometry().size() + b.odometry().size());
+  b.odometry().for_each([&](KeyframeId id, const OdometryNode& node) {
+    const OdometryNode& other = both.odometry().at(KeyframeId{id.value + shift});
+    EXPECT_EQ(other.rig_from_parent.translation, node.rig_from_parent.translation);
+    if (node.parent.is_valid()) EXPECT_EQ(other.parent.value, node.parent.value + shift);
+  });
 }
 
 TEST(MapParts, UniteKeepsWhatIdsStandFor) {

@@ -122,6 +122,12 @@ std::vector<Damage> damages() {
          erased[0].forwarding.heir = erased[1].id;
          erased[1].forwarding.heir = erased[0].id;
        }},
+      {"its odometry was noted, though it was never there",
+       [](MapParts& parts) { parts.odometry.back().id = parts.end_keyframe; }},
+      {"its odometry is from a keyframe that was never there",
+       [](MapParts& parts) { parts.odometry[0].node.parent = parts.end_keyframe; }},
+      {"its odometry goes round in a cycle",
+       [](MapParts& parts) { parts.odometry[1].node.parent = parts.odometry[1].id; }},
       {"was merged in a cycle",
        [](MapParts& parts) { parts.merged_landmarks[0].survivor = parts.merged_landmarks[0].id; }},
       {"was merged into one never there",

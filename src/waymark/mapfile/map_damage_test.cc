@@ -269,7 +269,13 @@ TEST_F(MapDamage, Arrays) {
        20,
        raw(HUGE_VALF),
        "level_pixel_from_bearing holds inf as number 5"},
-      {"landmarks", "position_in_world", 8, raw(HUGE_VAL), "position_in_world holds inf"}};
+      {"landmarks", "position_in_world", 8, raw(HUGE_VAL), "position_in_world holds inf"},
+      {"odometry", "keyframe", 4, raw(0u), "has keyframe 0 after 0, expected ids that ascend"},
+      {"odometry", "rotation", 0, raw(static_cast<double>(NAN)), "rotation holds nan"},
+      {"odometry", "rotation", 32, raw(1.9), "rotation 1 has the length"},
+      {"odometry", "translation", 8, raw(HUGE_VAL), "translation holds inf as number 1"},
+      {"odometry", "scale", 0, raw(0.0), "scale holds 0"},
+      {"odometry", "depth", 8, raw(-1.0), "depth holds -1 as number 1"}};
   for (const Case& one : cases) {
     Records damaged = records_;
     patch_array(find(damaged, one.kind), one.key, one.offset, one.bytes);
@@ -323,6 +329,8 @@ TEST_F(MapDamage, MapsThatAreNotSound) {
        [](MapParts& parts) { parts.keyframes[0].keyframe.landmarks[0] = LandmarkId{5000000}; }},
       {"loop_edge 0: ties a keyframe to itself",
        [](MapParts& parts) { parts.loop_edges[0].to = parts.loop_edges[0].from; }},
+      {"keyframe 1: its odometry goes round in a cycle",
+       [](MapParts& parts) { parts.odometry[1].node.parent = parts.odometry[1].id; }},
   };
   for (const auto& [expected, inflict] : cases) {
     MapParts parts = take_apart(RandomMap(7, 120).map());

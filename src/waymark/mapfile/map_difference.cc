@@ -58,6 +58,13 @@ std::optional<MapDifference> find_difference(const Map& before, const Map& now) 
     }
   };
   now.landmarks().for_each_difference(before.landmarks(), compare_landmarks);
+  const auto compare_odometry =
+      [&](KeyframeId id, const OdometryNode* old, const OdometryNode* current) {
+        if (old && current) return;
+        is_later &= current && id >= before.odometry().end_id();
+        difference.noted.push_back(id);
+      };
+  now.odometry().for_each_difference(before.odometry(), compare_odometry);
   if (!is_later) return std::nullopt;
   // Keyframes that came and went in between have nothing but their heir.
   now.keyframe_forwarding().for_each_difference(

@@ -14,6 +14,7 @@ struct MapDifference {
   std::vector<KeyframeId> measured;          ///< Keyframes that are new, or whose features are.
   std::vector<KeyframeId> changed;           ///< Others whose pose, place or landmarks are.
   std::vector<KeyframeId> erased;            ///< Keyframes that are gone.
+  std::vector<KeyframeId> noted;             ///< Whose odometry is new.
   std::vector<LandmarkId> landmarks;         ///< That are new or changed.
   std::vector<LandmarkId> erased_landmarks;  ///< That are gone.
 };

@@ -102,6 +102,14 @@ TEST(MapFile, HoldsEverything) {
     EXPECT_EQ(a.appearance.direction, b.appearance.direction);
     EXPECT_EQ(a.appearance.across, b.appearance.across);
   });
+  EXPECT_GT(saved.map->odometry().size(), 100u);
+  ASSERT_EQ(loaded.map->odometry().size(), saved.map->odometry().size());
+  saved.map->odometry().for_each([&](KeyframeId id, const OdometryNode& a) {
+    const OdometryNode& b = loaded.map->odometry().at(id);
+    EXPECT_EQ(std::tie(a.parent, a.depth, a.rig_from_parent.scale, a.rig_from_parent.translation),
+              std::tie(b.parent, b.depth, b.rig_from_parent.scale, b.rig_from_parent.translation));
+    EXPECT_EQ(a.rig_from_parent.rotation.coeffs(), b.rig_from_parent.rotation.coeffs());
+  });
 }
 
 TEST(MapFile, SavingWhatWasLoadedGivesTheSameBytes) {

@@ -3,6 +3,7 @@
 #include "waymark/mapfile/map_journal.h"
 
 #include "waymark/base/check.h"
+#include "waymark/mapfile/map_odometry.h"
 #include "waymark/mapfile/map_writer.h"
 
 namespace waymark {
@@ -86,6 +87,7 @@ void MapJournal::write_change(MapRecordWriter& writer,
   }
   write_merged_landmarks(writer, map);
   write_loop_edges(writer, map);
+  write_odometry(writer, map, difference.noted);
   write_markers(writer, map);
 }
 

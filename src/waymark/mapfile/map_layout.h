@@ -31,6 +31,7 @@ inline constexpr std::uint32_t kMaxIds = std::uint32_t{1} << 28;
 inline constexpr std::size_t kMaxCamerasPerRig = 16;
 inline constexpr std::size_t kMaxSubmaps = std::size_t{1} << 20;
 inline constexpr std::size_t kLandmarksPerRecord = 4096;
+inline constexpr std::size_t kKeyframesPerRecord = 4096;
 inline constexpr std::uint32_t kMaxMarkerNumber = 1u << 20;
 inline constexpr std::size_t kMaxMarkersPerKeyframe = 4096;
 
@@ -50,6 +51,7 @@ inline constexpr NumberRange kPositive{std::numeric_limits<double>::min()};
 inline constexpr NumberRange kScaleRange{1e-12, 1e12};
 inline constexpr NumberRange kLengthRange{-1e15, 1e15};
 inline constexpr NumberRange kMarkerSideRange{1e-6, 1e6};
+inline constexpr NumberRange kDepthRange{kPositive.low, kLengthRange.high};
 inline constexpr NumberRange kLandmarkSizeRange{0.0, kLengthRange.high};
 inline constexpr NumberRange kDirectionRange{-2.0, 2.0};
 inline constexpr NumberRange kAngleRange{-10.0, 10.0};  ///< In radians.

@@ -12,6 +12,7 @@
 #include "waymark/base/text.h"
 #include "waymark/image/image_header.h"
 #include "waymark/mapfile/map_layout.h"
+#include "waymark/mapfile/map_odometry.h"
 
 namespace waymark {
 namespace {
@@ -70,6 +71,7 @@ const std::vector<MapReader::Kind>& MapReader::kinds() {
       {"erased_keyframe", false, &MapReader::read_erased_keyframe},
       {"merged_landmarks", true, &MapReader::read_merged_landmarks},
       {"loop_edge", true, &MapReader::read_loop_edge},
+      {"odometry", true, &MapReader::read_odometry},
       {"marker", true, &MapReader::read_marker},
       {"image", false, &MapReader::read_image}};
   return kKinds;
@@ -125,6 +127,7 @@ void MapReader::end(MapRecord& record) {
   id_ = 0;
   counts_.clear();
   last_landmark_ = last_erased_ = last_merged_ = {};
+  last_noted_ = {};
   num_rigs_before_ = rigs_.size();
 }
 
@@ -235,22 +238,8 @@ void MapReader::read_state(MapRecord& record, Keyframe& keyframe) {
   keyframe.applied_scale = record.number("applied_scale", kScaleRange);
 }
 
-/// Ids of landmarks, ascending within the record and after those of the records before.
-std::vector<LandmarkId> MapReader::read_landmark_ids(MapRecord& record, LandmarkId& last) {
-  const auto ids = record.array<LandmarkId>("landmark", std::nullopt);
-  if (ids.empty() || ids.size() > kLandmarksPerRecord) {
-    record.fail(fmt::format("has {} landmarks, expected 1 to {}", ids.size(), kLandmarksPerRecord));
-  }
-  for (const LandmarkId id : ids) {
-    if (id >= parts_.end_landmark || (last.is_valid() && id <= last)) {
-      record.fail(fmt::format("has landmark {} after {}, expected ids that ascend below {}",
-                              id.value,
-                              last.is_valid() ? fmt::format("{}", last.value) : "none",
-                              parts_.end_landmark.value));
-    }
-    last = id;
-  }
-  return ids;
+std::vector<LandmarkId> MapReader::read_landmark_ids(MapRecord& record, LandmarkId& last) const {
+  return record.ascending_ids("landmark", kLandmarksPerRecord, parts_.end_landmark, last);
 }
 
 void MapReader::read_landmarks(MapRecord& record) {
@@ -311,6 +300,13 @@ void MapReader::read_loop_edge(MapRecord& record) {
   const Rigid3 rigid = record.transform("to_from_from");
   edge.to_from_from = {rigid.rotation, rigid.translation, record.number("scale", kScaleRange)};
   parts_.loop_edges.push_back(edge);
+}
+
+void MapReader::read_odometry(MapRecord& record) {
+  for (const MapParts::NotedOdometry& noted :
+       waymark::read_odometry(record, parts_.end_keyframe, last_noted_)) {
+    put(record, parts_.odometry, noted);
+  }
 }
 
 void MapReader::read_marker(MapRecord& record) {

@@ -54,9 +54,10 @@ class MapReader {
   void read_erased_keyframe(MapRecord& record);
   void read_merged_landmarks(MapRecord& record);
   void read_loop_edge(MapRecord& record);
+  void read_odometry(MapRecord& record);
   void read_marker(MapRecord& record);
   void read_image(MapRecord& record);
-  std::vector<LandmarkId> read_landmark_ids(MapRecord& record, LandmarkId& last);
+  std::vector<LandmarkId> read_landmark_ids(MapRecord& record, LandmarkId& last) const;
   template <class Stored>
   void put(const MapRecord& record, std::vector<Stored>& rows, Stored row) const;
   void drop_erased();
@@ -67,6 +68,7 @@ class MapReader {
   std::uint64_t id_ = 0;
   std::map<std::string, std::uint64_t> counts_;           // Of records by kind, since the last end.
   LandmarkId last_landmark_, last_erased_, last_merged_;  // Since then, of their records.
+  KeyframeId last_noted_;                                 // The same.
   std::uint64_t num_cameras_ = 0;
   std::size_t num_rigs_before_ = 0;  // Up to the last end.
   std::vector<std::shared_ptr<Rig>> rigs_;

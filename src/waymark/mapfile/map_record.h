@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <fmt/format.h>
+
 #include <cmath>
 #include <cstdint>
 #include <cstring>
@@ -52,6 +54,14 @@ class MapRecord {
               std::optional<std::size_t> count,
               const NumberRange& range = {});
 
+  /// An array of 1 to max_count ids that ascend, above `last`, which becomes the last of them, and
+  /// below `end`.
+  template <class IdType>
+  std::vector<IdType> ascending_ids(std::string_view key,
+                                    std::size_t max_count,
+                                    IdType end,
+                                    IdType& last);
+
   /// Fails if there is anything that was not asked for.
   void expect_no_more() const;
 
@@ -98,6 +108,28 @@ Array MapRecord::array(std::string_view key,
   if (!bytes.empty()) std::memcpy(static_cast<void*>(values.data()), bytes.data(), bytes.size());
   if (const auto bad = find_outside(values, range)) fail_element(key, bad->index, bad->number);
   return values;
+}
+
+template <class IdType>
+std::vector<IdType> MapRecord::ascending_ids(std::string_view key,
+                                             std::size_t max_count,
+                                             IdType end,
+                                             IdType& last) {
+  const auto ids = array<IdType>(key, std::nullopt);
+  if (ids.empty() || ids.size() > max_count) {
+    fail(fmt::format("has {} {}s, expected 1 to {}", ids.size(), key, max_count));
+  }
+  for (const IdType id : ids) {
+    if (id >= end || (last.is_valid() && id <= last)) {
+      fail(fmt::format("has {} {} after {}, expected ids that ascend below {}",
+                       key,
+                       id.value,
+                       last.is_valid() ? fmt::format("{}", last.value) : "none",
+                       end.value));
+    }
+    last = id;
+  }
+  return ids;
 }
 
 }  // namespace waymark

@@ -27,6 +27,7 @@ class RandomMap {
     join();
     start_submap();
     for (int step = 0; step < num_steps / 2; ++step) edit();
+    note_odometry();
     erase_and_merge();
     describe_landmarks();
   }
@@ -36,6 +37,7 @@ class RandomMap {
   /// More edits of every kind.
   void go_on(int num_steps) {
     for (int step = 0; step < num_steps; ++step) edit();
+    note_odometry();
     erase_and_merge();
     describe_landmarks();
   }
@@ -181,6 +183,18 @@ class RandomMap {
     if (from == to || map_.keyframes().at(from).submap != map_.keyframes().at(to).submap) return;
     const Rigid3 rigid = random_pose();
     map_.add_loop_edge({from, to, {rigid.rotation, rigid.translation, rng_.uniform(0.5, 2.0)}});
+  }
+
+  /// Of the keyframes that are new.
+  void note_odometry() {
+    for (KeyframeId id = map_.odometry().end_id(); id < map_.keyframes().end_id(); ++id.value) {
+      const Keyframe* keyframe = map_.keyframes().find(id);
+      if (!keyframe) continue;
+      const double scale = 1.0 + 0.01 * (id.value % 50);
+      const Sim3 rig_from_parent{
+          keyframe->rig_from_world.rotation, {1.0, -0.0, 0.1 * id.value}, scale};
+      map_.note_odometry(id, {keyframe->parent, rig_from_parent, 2.0 * scale});
+    }
   }
 
   void join() {
