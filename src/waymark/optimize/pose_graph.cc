@@ -12,7 +12,7 @@ template <int kDimension>
 PoseGraphSummary minimize_with_huber(PoseGraph& graph, const PoseGraphOptions& options) {
   PoseGraphSolver<kDimension> solver(graph);
   solver.set_loss(huber, std::vector<double>(graph.edges.size(), options.robust_scale));
-  return solver.minimize(options.max_iterations);
+  return solver.minimize(options.max_iterations, options.negligible_share);
 }
 
 }  // namespace

@@ -39,6 +39,8 @@ struct PoseGraphOptions {
   /// Length of a residual, in standard deviations, from which Huber's loss of robust edges is
   /// linear; the default is the root of the 95 % quantile of chi-square with 7 degrees of freedom.
   double robust_scale = 3.75;
+  /// Iterations end when the next one would lower the cost by less than this share of it.
+  double negligible_share = 1e-10;
 };
 
 /// Costs are half the robust sum of squared residuals over the used edges.

@@ -19,9 +19,7 @@
 
 namespace waymark {
 
-/// Iterations end when the next step would lower the cost by less than this share of it, or by less
-/// than the absolute value, in squared standard deviations.
-inline constexpr double kNegligibleShare = 1e-10;
+/// Iterations end when the next step would lower the cost by less, in squared standard deviations.
 inline constexpr double kNegligibleDecrease = 1e-12;
 /// Damping at which no step is left to try, and that which keeps a graph without fixed nodes from
 /// drifting along with rounding.
@@ -89,7 +87,7 @@ class PoseGraphSolver {
     loss_scales_ = std::move(scale_of_edge);
   }
 
-  PoseGraphSummary minimize(int max_iterations, double negligible_share = kNegligibleShare) {
+  PoseGraphSummary minimize(int max_iterations, double negligible_share) {
     PoseGraphSummary summary;
     summary.num_unused_edges = graph_.edges.size() - edges_.size();
     double cost = cost_at(graph_.node_from_world);
