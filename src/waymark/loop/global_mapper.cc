@@ -113,6 +113,7 @@ GlobalMapper::Moved GlobalMapper::join(const Revisit& revisit) {
   mapper_.change([&](Map& map, DirtyLandmarks& dirty) {
     join_submaps(map, places_, revisit, projection_, dirty);
   });
+  ++num_joins_;
   return all_keyframes();
 }
 
@@ -144,19 +145,26 @@ bool GlobalMapper::agrees_with_loops(const Revisit& revisit) {
   if (loops.empty()) return true;
   loops.push_back(as_measured(map, as_loop(revisit)));
   const std::vector<std::uint8_t> is_on = choose_loops(map, submap, loops, num_of_map);
-  undo(submap, std::span(is_on).first(num_of_map));
+  std::vector<LoopEdge> also;
+  for (std::size_t i = num_of_map; i < loops.size(); ++i) {
+    if (is_on[i]) also.push_back(loops[i]);
+  }
+  undo(submap, std::span(is_on).first(num_of_map), also);
   if (!is_on.back()) disbelieve(loops.back());
   return is_on.back();
 }
 
-/// is_on: 1 or 0 per loop edge of the map.
-void GlobalMapper::undo(SubmapId submap, std::span<const std::uint8_t> is_on) {
+/// is_on: 1 or 0 per loop edge of the map. also: further loops that are believed.
+void GlobalMapper::undo(SubmapId submap,
+                        std::span<const std::uint8_t> is_on,
+                        std::span<const LoopEdge> also) {
   const auto num_off = std::ranges::count(is_on, std::uint8_t{0});
   if (num_off == 0) return;
   for (std::size_t i = 0; i < is_on.size(); ++i) {
     if (!is_on[i]) disbelieve(mapper_.map().measured_loop_edges()[i]);
   }
-  mapper_.change([&](Map& map, DirtyLandmarks& dirty) { undo_loops(map, submap, is_on, dirty); });
+  mapper_.change(
+      [&](Map& map, DirtyLandmarks& dirty) { undo_loops(map, submap, is_on, also, dirty); });
   num_loops_ = std::max(num_loops_ - static_cast<int>(num_off), 0);
   // What is being adjusted holds what was undone.
   ++num_placements_;
@@ -355,6 +363,7 @@ bool GlobalMapper::join_what_knows_the_same_markers() {
   mapper_.change([&](Map& map, DirtyLandmarks&) { num_joined = join_by_markers(map, places_); });
   if (num_joined == 0) return false;
   num_closures_ += static_cast<std::uint32_t>(num_joined);
+  num_joins_ += num_joined;
   consolidate_later(all_keyframes());
   return true;
 }

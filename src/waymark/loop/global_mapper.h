@@ -89,7 +89,7 @@ class GlobalMapper {
   int num_loops() const { return num_loops_; }
   /// Of the sub-map with most keyframes, as surveyed last; empty where no markers are looked for.
   const MarkerSurvey& marker_survey() const { return marker_survey_; }
-  int num_joins() const { return static_cast<int>(num_closures_) - num_loops_; }
+  int num_joins() const { return num_joins_; }
 
  private:
   void update_places(const Mapper::Changes& changes);
@@ -100,7 +100,7 @@ class GlobalMapper {
   std::optional<Moved> close_loop(const Revisit& revisit);
   Moved join(const Revisit& revisit);
   bool agrees_with_loops(const Revisit& revisit);
-  void undo(SubmapId submap, std::span<const std::uint8_t> is_on);
+  void undo(SubmapId submap, std::span<const std::uint8_t> is_on, std::span<const LoopEdge> also);
   void disbelieve(const LoopEdge& loop);
   void note_odometry();
   void adjust_soon(SubmapId submap);
@@ -131,6 +131,7 @@ class GlobalMapper {
   std::vector<LoopEdge> disbelieved_;
   std::uint32_t num_closures_ = 0;
   int num_loops_ = 0;
+  int num_joins_ = 0;
   const std::optional<KnownMarkers> known_markers_;  ///< Nothing: none are looked for.
   MarkerSurvey marker_survey_;
   std::map<SubmapId, MarkerFrame::Basis> placed_;  ///< Sub-maps that are in a frame of markers.

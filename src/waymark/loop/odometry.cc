@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "waymark/loop/drift.h"
+#include "waymark/optimize/place_islands.h"
 #include "waymark/optimize/pose_graph.h"
 #include "waymark/optimize/switch_edges.h"
 
@@ -21,6 +22,9 @@ constexpr double kStepLogScale = 0.015;
 constexpr double kLoopTranslation = 0.01;
 constexpr double kLoopRotationRad = 0.004;
 constexpr double kLoopLogScale = 0.01;
+
+/// Loops whose ends lie within so many times what is seen there are of one place.
+constexpr double kSamePlaceDepths = 2.0;
 
 constexpr std::uint32_t kNoNode = UINT32_MAX;
 
@@ -62,6 +66,15 @@ class OdometryGraph {
   }
 
   PoseGraph& graph() { return graph_; }
+
+  /// Puts sub-maps that loops joined, whose odometry nothing else ties, to where most of them say.
+  /// Loops are the edges from first_loop on.
+  IslandTies place_joined(std::size_t first_loop, std::vector<std::size_t> believed) {
+    return place_islands(
+        graph_,
+        first_loop,
+        {.same_place = kSamePlaceDepths / kLoopTranslation, .believed = std::move(believed)});
+  }
 
   /// Of the keyframes that are still there.
   MapCorrection correction() const {
@@ -181,6 +194,9 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
     if (i < num_believed) options.believed.push_back(num_steps + is_there.size());
     is_there.push_back(i);
   }
+  IslandTies ties = graph.place_joined(num_steps, std::move(options.believed));
+  options.believed = std::move(ties.believed);
+  options.left_out = std::move(ties.contradicting);
   const std::vector<std::uint8_t> edge_is_on = switch_edges(graph.graph(), options);
   std::vector<std::uint8_t> is_on(loops.size(), 1);
   for (std::size_t k = 0; k < is_there.size(); ++k) is_on[is_there[k]] = edge_is_on[num_steps + k];
@@ -189,7 +205,9 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
 
 MapCorrection place_by_odometry(const Map& map, SubmapId submap, std::span<const LoopEdge> loops) {
   OdometryGraph graph(map, submap);
+  const std::size_t num_steps = graph.graph().edges.size();
   for (const LoopEdge& loop : loops) graph.add_loop(loop, false);
+  graph.place_joined(num_steps, {});
   optimize_pose_graph(graph.graph(), {});
   return graph.correction();
 }

@@ -58,7 +58,7 @@ TEST(UndoLoops, TakesBackPosesAndMerges) {
     const std::size_t num_merged = map.landmarks().size();
     const LandmarkId end_before = map.landmarks().end_id();
     const std::vector<std::uint8_t> none = {0};
-    undo_loops(map, SubmapId{0}, none, dirty);
+    undo_loops(map, SubmapId{0}, none, {}, dirty);
     EXPECT_EQ(map.broken_invariants(), "");
     EXPECT_TRUE(map.measured_loop_edges().empty());
     EXPECT_GT(map.landmarks().size(), num_merged);

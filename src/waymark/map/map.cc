@@ -262,16 +262,27 @@ void Map::drop_loop_edges(std::span<const std::uint8_t> is_kept) {
   std::erase_if(loop_edges_, [&](const LoopEdge&) { return is_kept[index++] == 0; });
 }
 
+KeyframeId Map::turn_around(KeyframeId child, KeyframeId top, KeyframeId parent) {
+  KeyframeId new_parent = parent;
+  for (KeyframeId id = child;;) {
+    const KeyframeId old_parent = std::exchange(keyframes_.edit(id).parent, new_parent);
+    if (id == top || !old_parent.is_valid()) return id;
+    new_parent = id;
+    id = old_parent;
+  }
+}
+
+void Map::rehang(KeyframeId top, KeyframeId child, KeyframeId parent) {
+  WAYMARK_CHECK(keyframes_.at(child).submap == keyframes_.at(parent).submap);
+  const KeyframeId end = turn_around(child, top, parent);
+  WAYMARK_CHECK(end == top);
+}
+
 void Map::join_submaps(KeyframeId child, KeyframeId parent) {
   const SubmapId from = keyframes_.at(child).submap;
   const SubmapId into = keyframes_.at(parent).submap;
   WAYMARK_CHECK(from != into && submaps_[from.value].is_metric == submaps_[into.value].is_metric);
-  KeyframeId new_parent = parent;  // The way from the child up to the old root turns around.
-  for (KeyframeId id = child; id.is_valid();) {
-    const KeyframeId old_parent = std::exchange(keyframes_.edit(id).parent, new_parent);
-    new_parent = id;
-    id = old_parent;
-  }
+  turn_around(child, submaps_[from.value].root, parent);
   std::vector<KeyframeId> keyframes;
   keyframes_.for_each([&](KeyframeId id, const Keyframe& keyframe) {
     if (keyframe.submap == from) keyframes.push_back(id);

@@ -320,6 +320,9 @@ class Map {
   /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
   /// first becomes its root and hangs below `parent` of the second.
   void join_submaps(KeyframeId child, KeyframeId parent);
+  /// What hangs below `top` in the spanning tree, with itself, hangs by `child`, one of these,
+  /// below `parent` from now on, which is of the same sub-map and none of these.
+  void rehang(KeyframeId top, KeyframeId child, KeyframeId parent);
   /// Sets the position of a landmark, in the frame of its sub-map.
   void move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world);
   /// Sets what a landmark looks like.
@@ -335,6 +338,9 @@ class Map {
  private:
   /// Drops what was merged so long ago that nobody asks any more.
   void forget_old_merges();
+  /// Hangs a keyframe below another one: the way from it up to `top` turns around. Returns the end
+  /// of that way.
+  KeyframeId turn_around(KeyframeId child, KeyframeId top, KeyframeId parent);
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
   std::shared_ptr<const Features> kept(std::shared_ptr<const Features> features) const;
   /// From scratch; what is associated but not there is passed over.

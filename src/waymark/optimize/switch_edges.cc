@@ -10,6 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/optimize/pose_graph_solver.h"
+#include "waymark/optimize/trusted_ways.h"
 
 namespace waymark {
 namespace {
@@ -24,82 +25,6 @@ constexpr int kMaxPasses = 20;
 /// Steps at the narrowest loss, and the share of the cost that is not worth one.
 constexpr int kLastIterations = 20;
 constexpr double kNegligibleForSwitching = 1e-5;
-
-/// What the edges that are trusted say of how far the ends of the others may lie off: along the
-/// ways of a spanning tree of them.
-class TrustedWays {
- public:
-  TrustedWays(const PoseGraph& graph, std::span<const std::uint8_t> is_trusted)
-      : graph_(graph), above_(graph.node_from_world.size(), kNone), depth_(above_.size(), 0) {
-    std::vector<std::vector<std::uint32_t>> edges_of_node(above_.size());
-    for (std::uint32_t i = 0; i < graph.edges.size(); ++i) {
-      const PoseGraphEdge& edge = graph.edges[i];
-      if (!is_trusted[i] || !is_usable(edge, graph.node_from_world)) continue;
-      edges_of_node[edge.from].push_back(i);
-      edges_of_node[edge.to].push_back(i);
-    }
-    std::vector<std::uint8_t> is_reached(above_.size(), 0);
-    for (std::uint32_t root = 0; root < above_.size(); ++root) {
-      if (!is_reached[root]) spread_from(root, edges_of_node, is_reached);
-    }
-  }
-
-  /// Length that the residual of an edge may be expected to have, in standard deviations; infinite
-  /// where no way leads from one end to the other.
-  double expected_residual(const PoseGraphEdge& edge) const {
-    std::uint32_t a = edge.from;
-    std::uint32_t b = edge.to;
-    double sum = kNumComponents;
-    while (a != b) {
-      std::uint32_t& lower = depth_[a] >= depth_[b] ? a : b;
-      if (above_[lower] == kNone) return std::numeric_limits<double>::infinity();
-      const PoseGraphEdge& step = graph_.edges[above_[lower]];
-      sum += squared_share(step, edge);
-      lower = step.from == lower ? step.to : step.from;
-    }
-    return std::sqrt(sum);
-  }
-
- private:
-  static constexpr std::uint32_t kNone = UINT32_MAX;
-  static constexpr double kNumComponents = 7.0;
-
-  /// Breadth first.
-  void spread_from(std::uint32_t root,
-                   std::span<const std::vector<std::uint32_t>> edges_of_node,
-                   std::vector<std::uint8_t>& is_reached) {
-    is_reached[root] = 1;
-    std::vector<std::uint32_t> queue = {root};
-    for (std::size_t next = 0; next < queue.size(); ++next) {
-      const std::uint32_t node = queue[next];
-      for (const std::uint32_t i : edges_of_node[node]) {
-        const PoseGraphEdge& edge = graph_.edges[i];
-        const std::uint32_t other = edge.from == node ? edge.to : edge.from;
-        if (std::exchange(is_reached[other], 1)) continue;
-        above_[other] = i;
-        depth_[other] = depth_[node] + 1;
-        queue.push_back(other);
-      }
-    }
-  }
-
-  /// What the error of a step adds to the expected square of the residual of an edge.
-  double squared_share(const PoseGraphEdge& step, const PoseGraphEdge& edge) const {
-    const Sim3& to_from_world = graph_.node_from_world[edge.to];
-    const Sim3 to_from_step = to_from_world * graph_.node_from_world[step.to].inverse();
-    const double lever = to_from_step.translation.squaredNorm();
-    const auto square = [](double value) { return value * value; };
-    const double turn = square(step.sigma_rotation_rad);
-    const double growth = graph_.is_scale_free ? square(step.sigma_log_scale) : 0.0;
-    const double move = 3.0 * square(to_from_step.scale * step.sigma_translation);
-    return (move + lever * (2.0 * turn + growth)) / square(edge.sigma_translation) +
-           3.0 * turn / square(edge.sigma_rotation_rad) + growth / square(edge.sigma_log_scale);
-  }
-
-  const PoseGraph& graph_;
-  std::vector<std::uint32_t> above_;  // Edge that leads towards the root, per node.
-  std::vector<std::uint32_t> depth_;  // Per node.
-};
 
 /// Per edge: whether it agrees with the nodes.
 std::vector<std::uint8_t> agreeing(const PoseGraph& graph, double max_residual) {
@@ -131,7 +56,10 @@ template <int kDimension>
 class EdgeSwitcher {
  public:
   EdgeSwitcher(PoseGraph& graph, const SwitchOptions& options)
-      : graph_(graph), narrowest_(options.max_residual), solver_(graph) {
+      : graph_(graph),
+        narrowest_(options.max_residual),
+        left_out_(options.left_out),
+        solver_(graph) {
     for (const PoseGraphEdge& edge : graph.edges) is_on_.push_back(!edge.is_robust);
     for (const std::size_t edge : options.believed) is_on_.at(edge) = 1;
   }
@@ -139,7 +67,8 @@ class EdgeSwitcher {
   std::vector<std::uint8_t> switch_edges() {
     double reach = 0.0;
     for (int pass = 0; pass < kMaxPasses; ++pass) {
-      const std::vector<double> expected = expect_residuals(graph_, is_on_);
+      std::vector<double> expected = expect_residuals(graph_, is_on_);
+      for (const std::size_t edge : left_out_) expected[edge] = 0.0;
       reach = std::max(kReachGrowth * reach, least_of_undecided(expected));
       const bool is_last = reach >= *std::ranges::max_element(expected);
       admit(expected, reach);
@@ -195,6 +124,7 @@ class EdgeSwitcher {
 
   PoseGraph& graph_;
   const double narrowest_;
+  const std::vector<std::size_t>& left_out_;
   PoseGraphSolver<kDimension> solver_;
   std::vector<std::uint8_t> is_on_;  // Per edge.
   std::vector<double> widths_;       // Of the losses of a pass at first, per edge; 0: left out.

@@ -17,6 +17,8 @@ struct SwitchOptions {
   double max_residual = 4.3;
   /// Robust edges that were on before, by index: they begin as such.
   std::vector<std::size_t> believed = {};
+  /// Robust edges that are off, whatever the others say, by index.
+  std::vector<std::size_t> left_out = {};
 };
 
 /// Which edges agree with each other, 1 or 0 per edge: all that are not robust, and those robust
