@@ -95,7 +95,8 @@ class IslandPlacer {
           (from == island && is_placed_[to]) || (to == island && is_placed_[from]);
       if (is_between && is_usable(graph_.edges[i], graph_.node_from_world)) ties.push_back(i);
     }
-    std::ranges::stable_partition(ties, [&](std::size_t tie) { return is_believed_[tie] != 0; });
+    const auto is_believed = [&](std::size_t tie) { return is_believed_[tie] != 0; };
+    std::stable_partition(ties.begin(), ties.end(), is_believed);
     return ties;
   }
 
