@@ -2,8 +2,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/global_adjustment.h"
 
-#include <algorithm>
-#include <span>
 #include <thread>
 #include <utility>
 
@@ -26,18 +24,15 @@ Sim3 motion_since(const Map& before, const Map& now, KeyframeId id) {
 /// New by old distance of what a keyframe sees, in the median; 1 where it sees nothing.
 double scale_around(const Map& map,
                     const MapCorrection::KeyframeMove& move,
-                    std::span<const MapCorrection::LandmarkMove> landmarks) {
+                    const MapCorrection& correction) {
   const Keyframe& keyframe = map.keyframes().at(move.keyframe);
   std::vector<double> ratios;
   for (const LandmarkId id : keyframe.landmarks) {
-    const auto at = std::lower_bound(
-        landmarks.begin(), landmarks.end(), id, [](const auto& landmark, LandmarkId value) {
-          return landmark.landmark < value;
-        });
-    if (!id.is_valid() || at == landmarks.end() || at->landmark != id) continue;
+    const auto* const moved = id.is_valid() ? correction.find(id) : nullptr;
+    if (!moved) continue;
     const Eigen::Vector3d before =
         keyframe.rig_from_world * map.landmarks().at(id).position_in_world;
-    const Eigen::Vector3d after = move.rig_from_world * at->position_in_world;
+    const Eigen::Vector3d after = move.rig_from_world * moved->position_in_world;
     if (before.norm() > 0.0) ratios.push_back(after.norm() / before.norm());
   }
   const double scale = ratios.empty() ? 1.0 : median(ratios);
@@ -63,7 +58,7 @@ GlobalAdjustment adjust(const Map& frozen,
   for (auto& move : adjustment.correction.keyframes) {
     const SubmapId submap = frozen.keyframes().at(move.keyframe).submap;
     if (frozen.submaps()[submap.value].is_metric) continue;
-    move.scale = scale_around(frozen, move, adjustment.correction.landmarks);
+    move.scale = scale_around(frozen, move, adjustment.correction);
   }
   return adjustment;
 }
