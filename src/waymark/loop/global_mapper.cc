@@ -172,7 +172,8 @@ void GlobalMapper::undo(SubmapId submap,
 }
 
 void GlobalMapper::note_odometry() {
-  mapper_.change([](Map& map, DirtyLandmarks&) { waymark::note_odometry(map); });
+  mapper_.change([&](Map& map, DirtyLandmarks&) { waymark::note_odometry(map, end_of_odometry_); });
+  end_of_odometry_ = mapper_.map().keyframes().end_id();
 }
 
 /// The pose graph does not do for now, however large the map is.
@@ -390,9 +391,13 @@ void GlobalMapper::consolidate() {
 }
 
 MapSnapshot GlobalMapper::snapshot() {
+  std::erase_if(given_out_, [](const MapSnapshot& one) {
+    return one.map.use_count() == 1 && one.places.use_count() == 1;
+  });
   std::shared_ptr<const Map> map = mapper_.freeze();
   positions_.follow(map);
-  return {std::move(map), std::make_shared<const PlaceIndex>(places_)};
+  given_out_.push_back({std::move(map), std::make_shared<const PlaceIndex>(places_)});
+  return given_out_.back();
 }
 
 }  // namespace waymark

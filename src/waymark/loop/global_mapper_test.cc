@@ -288,6 +288,17 @@ TEST_F(TwoRecordings, ATrueJoinStandsAgainstWhatIsSaidAtOnePlaceOnly) {
   EXPECT_LT(error(), 4.0);
 }
 
+TEST_F(GlobalMapperTest, FreesAMapItselfOnceNobodyLooksAtIt) {
+  take_over_round();
+  MapSnapshot looked_at = mapper_->snapshot();
+  const std::weak_ptr<const Map> map = looked_at.map;
+  mapper_->snapshot();
+  looked_at = mapper_->snapshot();
+  EXPECT_FALSE(map.expired()) << "freed by who looked at it";
+  mapper_->snapshot();
+  EXPECT_TRUE(map.expired());
+}
+
 TEST_F(GlobalMapperTest, LeavesLoopsOpenIfAskedTo) {
   take_over_round(false);
   mapper_->add(last_of(walk({{0, kRound + 1}})));

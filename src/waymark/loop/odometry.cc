@@ -164,12 +164,12 @@ OdometryNode node_of(const Map& map, KeyframeId id, const Keyframe& keyframe) {
 
 }  // namespace
 
-void note_odometry(Map& map) {
-  std::vector<std::pair<KeyframeId, OdometryNode>> notes;
-  map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (!map.odometry().contains(id)) notes.emplace_back(id, node_of(map, id, keyframe));
-  });
-  for (const auto& [id, node] : notes) map.note_odometry(id, node);
+void note_odometry(Map& map, KeyframeId first) {
+  for (KeyframeId id = first; id < map.keyframes().end_id(); ++id.value) {
+    const Keyframe* keyframe = map.keyframes().find(id);
+    if (!keyframe || map.odometry().contains(id)) continue;
+    map.note_odometry(id, node_of(map, id, *keyframe));
+  }
 }
 
 LoopEdge as_measured(const Map& map, const LoopEdge& loop) {

@@ -16,8 +16,8 @@ namespace waymark {
 /// on the way: to be called before a loop or an adjustment moves them. Once a loop has been spread
 /// over the map, what the map says of two keyframes agrees with it; this does not, so that it can
 /// still contradict. What a map without such notes holds of loops is taken for what was seen on the
-/// way.
-void note_odometry(Map& map);
+/// way. first: all before it are noted.
+void note_odometry(Map& map, KeyframeId first = KeyframeId{0});
 
 /// A loop edge as Map::measured_loop_edges() would give it.
 LoopEdge as_measured(const Map& map, const LoopEdge& loop);
