@@ -16,11 +16,15 @@ PROGRAM = pathlib.Path(os.environ.get("WAYMARK_PROGRAM", ROOT / "build/release/w
 LIVE_SUBMAP = re.compile(r"frame (\d+): tracked in sub-map (\d+)")
 
 
+class NoPose(RuntimeError):
+    """A run in which no image has one."""
+
+
 def run(command):
     """Standard output of a command; RuntimeError says why it failed."""
     done = subprocess.run([str(c) for c in command], capture_output=True, text=True)
     if done.returncode == 3:
-        raise RuntimeError("no pose at all")
+        raise NoPose("no pose at all")
     if done.returncode:
         message = done.stderr.strip().split("\n")[-1]
         raise RuntimeError(message or f"status {done.returncode}")
