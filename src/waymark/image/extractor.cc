@@ -35,6 +35,9 @@ constexpr int kEdgeLevel = 2;
 constexpr double kSlopeOfHeight = 0.35;
 // The least height of an edge, in grey values, in an image without noise.
 constexpr double kLeastHeight = 2.0;
+// A corner of this part of an edge's height is one where edges meet, however dark the image is;
+// what noise makes on an edge is as high as the noise.
+constexpr double kCornerOfHeight = 0.5;
 
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
@@ -137,7 +140,7 @@ struct FeatureExtractor::Workspace {
   BlurWorkspace blur;
   EdgeFinder edge_finder;
   std::vector<std::uint8_t> has_no_corner;
-  std::vector<std::uint8_t> has_edge;  ///< Per cell.
+  std::vector<float> noise_contrast;  ///< Per cell: below that corners are noise on an edge.
   std::vector<std::uint8_t> is_covered;
 
   void reserve(int width_px, int height_px, int count);
@@ -255,16 +258,21 @@ bool FeatureExtractor::Workspace::has_few_corners(ImageView mask, int count) {
   return num_covered < kFewCovered * std::min(num_allowed, count / kCornersPerBlock);
 }
 
-// Weak corners on edges are where noise makes them: their place along the edge tells nothing.
+// Corners on edges that are weak for that edge are where noise makes them: their place along the
+// edge tells nothing.
 void FeatureExtractor::Workspace::drop_corners_on_edges(std::span<const EdgePoint> points,
                                                         std::vector<Keypoint>& keypoints,
                                                         std::vector<Descriptor>& descriptors) {
   const EdgeCells cells(pyramid.image(kEdgeLevel));
-  has_edge.assign(cells.count(), 0);
-  for (const EdgePoint& point : points) has_edge[cells.at(point.x_px, point.y_px)] = 1;
+  noise_contrast.assign(cells.count(), 0.0f);
+  for (const EdgePoint& point : points) {
+    noise_contrast[cells.at(point.x_px, point.y_px)] =
+        static_cast<float>(kCornerOfHeight / kSlopeOfHeight) * point.slope;
+  }
   std::size_t num_kept = 0;
   for (std::size_t i = 0; i < keypoints.size(); ++i) {
-    if (!is_strong(keypoints[i]) && has_edge[cells.of(keypoints[i])]) continue;
+    const float least = noise_contrast[cells.of(keypoints[i])];
+    if (!is_strong(keypoints[i]) && keypoints[i].response < least) continue;
     keypoints[num_kept] = keypoints[i];
     descriptors[num_kept++] = descriptors[i];
   }

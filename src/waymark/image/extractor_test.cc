@@ -196,6 +196,27 @@ TEST(FeatureExtractor, HasFewerCornersOnEdges) {
   EXPECT_LE(count_on_door(extract(with, wall)), num_without / 2);
 }
 
+TEST(FeatureExtractor, KeepsTheCornersOfWhatIsDark) {
+  // A door whose corners are as weak as its sides.
+  PaddedImage wall = make_blank_wall();
+  for (int y = 0; y < wall.height_px(); ++y) {
+    for (int x = 0; x < wall.width_px(); ++x) {
+      wall.row(y)[x] = static_cast<std::uint8_t>(20 + wall.row(y)[x] / 4);
+    }
+  }
+  const auto has_corner_of_door = [](const Extracted& features) {
+    const std::size_t num_corners = features.keypoints.size() - features.num_edges;
+    return std::ranges::any_of(std::span(features.keypoints).first(num_corners), [](auto corner) {
+      const double side = std::min(std::abs(corner.x_px - 300.5), std::abs(corner.x_px - 479.5));
+      return side < 6.0 && corner.response < static_cast<float>(kStrongContrast);
+    });
+  };
+  FeatureExtractor extractor({.edges = true});
+  const Extracted features = extract(extractor, wall);
+  EXPECT_GT(features.num_edges, 10u);
+  EXPECT_TRUE(has_corner_of_door(features));
+}
+
 TEST(FeatureExtractor, AddsNoEdgesWhereTheMaskIs) {
   Image mask(640, 480);
   for (int y = 0; y < 480; ++y) {
