@@ -391,13 +391,9 @@ void GlobalMapper::consolidate() {
 }
 
 MapSnapshot GlobalMapper::snapshot() {
-  std::erase_if(given_out_, [](const MapSnapshot& one) {
-    return one.map.use_count() == 1 && one.places.use_count() == 1;
-  });
   std::shared_ptr<const Map> map = mapper_.freeze();
   positions_.follow(map);
-  given_out_.push_back({std::move(map), std::make_shared<const PlaceIndex>(places_)});
-  return given_out_.back();
+  return in_use_.add({std::move(map), std::make_shared<const PlaceIndex>(places_)});
 }
 
 }  // namespace waymark

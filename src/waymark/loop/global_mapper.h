@@ -126,9 +126,7 @@ class GlobalMapper {
   std::set<KeyframeId> unconsolidated_;  ///< To be compared with what lies beside, last first.
   KeyframeId end_of_noted_{0};           ///< Keyframes below were among these at some time.
   KeyframeId end_of_odometry_{0};        ///< Keyframes below are noted in the map's.
-  /// Those that somebody may still look at. Who lets go of a map last frees what only that map had,
-  /// which takes as long as an adjustment moved things: not for the tracker to do.
-  std::vector<MapSnapshot> given_out_;
+  SnapshotsInUse in_use_;
   LivePositions positions_;
   /// Loops that others contradict, in units before any correction: further ones may agree with
   /// them.

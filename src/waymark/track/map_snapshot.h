@@ -4,6 +4,7 @@
 
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "waymark/map/map.h"
 #include "waymark/place/place_index.h"
@@ -14,6 +15,23 @@ namespace waymark {
 struct MapSnapshot {
   std::shared_ptr<const Map> map = std::make_shared<const Map>();
   std::shared_ptr<const PlaceIndex> places = std::make_shared<const PlaceIndex>();
+};
+
+/// Snapshots that somebody may still look at. Who lets go of a map last frees what only that map
+/// has, which after an adjustment is most of it: not for the tracker to do.
+class SnapshotsInUse {
+ public:
+  /// Frees those before that nobody else has any more.
+  MapSnapshot add(MapSnapshot snapshot) {
+    std::erase_if(snapshots_, [](const MapSnapshot& old) {
+      return old.map.use_count() == 1 && old.places.use_count() == 1;
+    });
+    snapshots_.push_back(snapshot);
+    return snapshot;
+  }
+
+ private:
+  std::vector<MapSnapshot> snapshots_;
 };
 
 /// A frozen map with the index of its keyframes below `end`, else of all.
