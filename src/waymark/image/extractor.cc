@@ -37,7 +37,7 @@ constexpr double kSlopeOfHeight = 0.35;
 constexpr double kLeastHeight = 2.0;
 // A corner of this part of an edge's height is one where edges meet, however dark the image is;
 // what noise makes on an edge is as high as the noise.
-constexpr double kCornerOfHeight = 0.5;
+constexpr double kCornerOfHeight = 0.75;
 
 // Larger images would not fit the 16 bits of a corner.
 constexpr int kMaxSizePx = 32768;
