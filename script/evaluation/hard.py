@@ -105,9 +105,10 @@ def median_figures(runs):
             for key, values in ((k, [r[k] for r in runs]) for k in runs[0])}
 
 
-def measure_once(folder, out, setup, frames, seed):
+def measure_once(folder, out, setup, frames, *options):
+    """Of a run without any pose, too."""
     try:
-        return figures_of(map_sequence(folder, out, setup, "--seed", seed), frames, setup)
+        return figures_of(map_sequence(folder, out, setup, *options), frames, setup)
     except NoPose:
         times = json.loads((out / "summary.json").read_text())["tracking_ms"]
         return {"coverage": 0.0, "parts": 0, "ate_m": None,
@@ -115,7 +116,7 @@ def measure_once(folder, out, setup, frames, seed):
 
 
 def measure(folder, out, setup, seeds, frames):
-    return median_figures([measure_once(folder, out, setup, frames, seed)
+    return median_figures([measure_once(folder, out, setup, frames, "--seed", seed)
                            for seed in range(seeds if setup == "mono" else 1)])
 
 
@@ -177,7 +178,7 @@ def simulated_rows(work, seeds, is_wanted):
                 folder = simulate(work / f"{case.name}_{setup}_{seed}", *case.arguments, "--setup",
                                   setup, "--seed", seed)
                 frames = Frames.of_sequence(Sequence(folder, setup))
-                found.append(figures_of(map_sequence(folder, work / "out", setup), frames, setup))
+                found.append(measure_once(folder, work / "out", setup, frames))
             yield row_of(case.name, setup, median_figures(found))
 
 
