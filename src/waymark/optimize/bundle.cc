@@ -106,7 +106,7 @@ Eigen::Vector2d BundleCalibration::pixel_shift(std::size_t observation,
                                                const Eigen::VectorXd& change) const {
   const auto derivative = by_intrinsics(observation, camera);
   const auto first = static_cast<Eigen::Index>(blocks[camera].first);
-  return derivative.cast<double>() * change.segment(first, derivative.cols());
+  return derivative.cast<double>().lazyProduct(change.segment(first, derivative.cols()));
 }
 
 Eigen::Map<const Eigen::RowVectorXf> BundleCalibration::inverse_range_by(

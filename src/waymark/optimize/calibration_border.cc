@@ -19,8 +19,8 @@ CalibrationBorder::CalibrationBorder(std::size_t num_parameters,
   const auto count = static_cast<Eigen::Index>(num_parameters);
   information_.resize(count, count);
   gradient_.resize(count);
-  poses_.resize(static_cast<Eigen::Index>(6 * num_slots), count);
-  points_.resize(3, count * static_cast<Eigen::Index>(num_points));
+  poses_.resize(count, static_cast<Eigen::Index>(6 * num_slots));
+  points_.resize(count, static_cast<Eigen::Index>(3 * num_points));
   scores_.setZero(count, kNumParts);
 }
 
@@ -41,36 +41,35 @@ void CalibrationBorder::begin_elimination(double damping) {
 void CalibrationBorder::eliminate_point(std::size_t point,
                                         const Eigen::Matrix3d& half,
                                         const Eigen::Vector3d& gradient) {
-  auto eliminated = points_.middleCols(column(point), gradient_.size());
-  for (Eigen::Index i = 0; i < eliminated.cols(); ++i) {
-    eliminated.col(i) = half * eliminated.col(i).eval();
-  }
-  reduced_information_ -= eliminated.transpose().lazyProduct(eliminated);
-  reduced_gradient_ -= eliminated.transpose().lazyProduct(gradient);
+  auto eliminated = points_.middleCols<3>(3 * static_cast<Eigen::Index>(point));
+  eliminated = eliminated.lazyProduct(half.transpose()).eval();
+  reduced_information_ -= eliminated.lazyProduct(eliminated.transpose());
+  reduced_gradient_ -= eliminated.lazyProduct(gradient);
 }
 
 void CalibrationBorder::eliminate_link(std::size_t slot,
                                        std::size_t point,
                                        const Eigen::Matrix<double, 6, 3>& eliminated) {
-  reduced_poses_.middleRows<6>(static_cast<Eigen::Index>(6 * slot)) -=
-      eliminated.lazyProduct(points_.middleCols(column(point), gradient_.size()));
+  reduced_poses_.middleCols<6>(static_cast<Eigen::Index>(6 * slot)) -=
+      of_point(point).lazyProduct(eliminated.transpose());
 }
 
 bool CalibrationBorder::solve(const BlockCholesky& poses, Eigen::VectorXd& gradient) {
-  solved_ = reduced_poses_;
-  poses.solve_in_place(solved_);
+  Eigen::MatrixXd solved = reduced_poses_.transpose();
+  poses.solve_in_place(solved);
   poses.solve_in_place(gradient);
-  reduced_information_.noalias() -= reduced_poses_.transpose() * solved_;
-  reduced_gradient_.noalias() -= reduced_poses_.transpose() * gradient;
+  reduced_information_.noalias() -= reduced_poses_ * solved;
+  reduced_gradient_.noalias() -= reduced_poses_ * gradient;
   const Eigen::LLT<Eigen::MatrixXd> factor(reduced_information_);
   if (factor.info() != Eigen::Success) return false;
   solution_ = factor.solve(reduced_gradient_);
-  gradient.noalias() -= solved_ * solution_;
+  gradient.noalias() -= solved * solution_;
+  solved_ = solved.transpose();
   return true;
 }
 
 Eigen::Vector3d CalibrationBorder::share_of_point(std::size_t point) const {
-  return points_.middleCols(column(point), gradient_.size()) * solution_;
+  return of_point(point).transpose() * solution_;
 }
 
 void CalibrationBorder::add_score(std::size_t pose,

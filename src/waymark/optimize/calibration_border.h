@@ -12,8 +12,9 @@
 
 namespace waymark {
 
-/// Derivative of the residual rows of an observation by the parameters of its camera.
-using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 3, 32>;
+/// Derivative of the residual rows of an observation by the parameters of its camera, transposed: a
+/// column per residual row. Parameters lie side by side wherever there are some, for SIMD.
+using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 32, 3>;
 
 /// The unknown calibration in the normal equations of bundle adjustment: few rows and columns in
 /// which every pose and point takes part, hence a dense border around the sparse reduced system
@@ -34,23 +35,23 @@ class CalibrationBorder {
            std::size_t point,
            const ByPoint& by_point) {
     const auto first = static_cast<Eigen::Index>(first_parameter);
-    const Eigen::Index count = by_calibration.cols();
+    const Eigen::Index count = by_calibration.rows();
     // Of two or three rows: what makes large products fast makes these slow.
     information_.block(first, first, count, count) +=
-        by_calibration.transpose().lazyProduct(by_calibration);
-    gradient_.segment(first, count) += by_calibration.transpose().lazyProduct(residual);
-    points_.middleCols(column(point) + first, count) +=
-        by_point.transpose().lazyProduct(by_calibration);
+        by_calibration.lazyProduct(by_calibration.transpose());
+    gradient_.segment(first, count) += by_calibration.lazyProduct(residual);
+    points_.block(first, 3 * static_cast<Eigen::Index>(point), count, 3) +=
+        by_calibration.lazyProduct(by_point);
   }
   template <class ByPose>
   void add_pose(std::size_t first_parameter,
                 const ByCalibration& by_calibration,
                 std::size_t slot,
                 const ByPose& by_pose) {
-    poses_.block(static_cast<Eigen::Index>(6 * slot),
-                 static_cast<Eigen::Index>(first_parameter),
-                 6,
-                 by_calibration.cols()) += by_pose.transpose().lazyProduct(by_calibration);
+    poses_.block(static_cast<Eigen::Index>(first_parameter),
+                 static_cast<Eigen::Index>(6 * slot),
+                 by_calibration.rows(),
+                 6) += by_calibration.lazyProduct(by_pose);
   }
 
   /// Copies the equations for elimination, damped.
@@ -76,29 +77,25 @@ class CalibrationBorder {
   /// What the solution takes from the gradient of a point that was eliminated, times M.
   Eigen::Vector3d share_of_point(std::size_t point) const;
 
-  /// What a point has to do with the calibration: second derivative of the cost. Not between
-  /// eliminate_point() and begin().
+  /// What a point has to do with the calibration, a row per parameter: second derivative of the
+  /// cost, times M between eliminate_point() and begin().
   auto of_point(std::size_t point) const {
-    return points_.middleCols(column(point), gradient_.size());
+    return points_.middleCols<3>(3 * static_cast<Eigen::Index>(point));
   }
   // After solve():
   /// How a pose follows the calibration, negated.
   auto solved(std::size_t slot) const {
-    return solved_.middleRows<6>(static_cast<Eigen::Index>(6 * slot));
+    return solved_.middleCols<6>(static_cast<Eigen::Index>(6 * slot));
   }
   /// Adds the pull of an observation at a pose of so many, in the order of time.
   void add_score(std::size_t pose, std::size_t num_poses, const Eigen::VectorXd& score);
   CalibrationEvidence evidence() const;
 
  private:
-  Eigen::Index column(std::size_t point) const {
-    return static_cast<Eigen::Index>(point) * gradient_.size();
-  }
-
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
-  Eigen::MatrixXd poses_;    // 6 rows per slot.
-  Eigen::Matrix3Xd points_;  // As many columns as parameters per point.
+  Eigen::MatrixXd poses_;   // 6 columns per slot.
+  Eigen::MatrixXd points_;  // 3 columns per point.
   // The same, on the way of elimination.
   Eigen::MatrixXd reduced_information_;
   Eigen::VectorXd reduced_gradient_;

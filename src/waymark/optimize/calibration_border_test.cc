@@ -43,12 +43,12 @@ TEST_F(CalibrationBorderTest, SolvesAsTheDenseEquationsDo) {
       for (int k = 0; k < 4; ++k) {
         const Eigen::Matrix<double, 2, 6> by_pose = Eigen::Matrix<double, 2, 6>::Random();
         const Matrix23d by_point = Matrix23d::Random();
-        const ByCalibration by_calibration = Eigen::Matrix<double, 2, 3>::Random();
+        const ByCalibration by_calibration = Eigen::Matrix<double, 3, 2>::Random();
         const Eigen::Vector2d residual = Eigen::Vector2d::Random();
         Eigen::MatrixXd row = Eigen::MatrixXd::Zero(2, kSize);
         row.middleCols<6>(6 * pose) = by_pose;
         row.middleCols<3>(kFirstPoint + 3 * point) = by_point;
-        row.rightCols<3>() = by_calibration;
+        row.rightCols<3>() = by_calibration.transpose();
         hessian_ += row.transpose() * row;
         gradient_ += row.transpose() * residual;
         border.add(0, by_calibration, residual, static_cast<std::size_t>(point), by_point);

@@ -22,14 +22,16 @@ void SchurSolver::move_cameras(BundleState& state) const {
   }
 }
 
-/// The pull of each observation of a point on the calibration, all else following.
+/// The pull of each observation of a point on the calibration, all else following. Of equations
+/// that were reduced: point and links are times M.
 void SchurSolver::add_scores(std::size_t entry) {
-  const Eigen::Matrix3d inverse = half_inverses_[entry].transpose() * half_inverses_[entry];
-  Eigen::Matrix3Xd by_poses = border_->of_point(entry);
+  Eigen::MatrixX3d calibration_by_point = border_->of_point(entry);
   for (std::uint32_t link = plan_.first_link[entry]; link < plan_.first_link[entry + 1]; ++link) {
-    by_poses -= blocks_.links[link].transpose() * border_->solved(plan_.slot_of_link[link]);
+    calibration_by_point -=
+        border_->solved(plan_.slot_of_link[link]).lazyProduct(blocks_.links[link]);
   }
-  const Eigen::Matrix3Xd point_by_calibration = -inverse * by_poses;
+  calibration_by_point = -calibration_by_point.lazyProduct(half_inverses_[entry]).eval();
+  Eigen::MatrixXd total;
   for (std::size_t k = plan_.first_observation[entry]; k < plan_.first_observation[entry + 1];
        ++k) {
     const std::size_t i = plan_.observations[k];
@@ -37,13 +39,13 @@ void SchurSolver::add_scores(std::size_t entry) {
     const std::uint32_t slot = plan_.slot_of_pose[observation.pose];
     visit_rows(i, [&](const auto& rows, const Eigen::Vector3d& point_in_rig) {
       const auto by = jacobians(rows, i, point_in_rig);
-      Eigen::MatrixXd total = by.by_point * point_by_calibration;
-      if (slot != kNoSlot) total -= by.by_pose * border_->solved(slot);
+      total = calibration_by_point.lazyProduct(by.by_point.transpose());
+      if (slot != kNoSlot) total -= border_->solved(slot).lazyProduct(by.by_pose.transpose());
       if (const BundleCalibration* calibration = problem_.calibration_of(observation.pose)) {
         const auto first = static_cast<Eigen::Index>(calibration->blocks[observation.camera].first);
-        total.middleCols(first, by.by_calibration.cols()) += by.by_calibration;
+        total.middleRows(first, by.by_calibration.rows()) += by.by_calibration;
       }
-      border_->add_score(observation.pose, problem_.rigs.size(), total.transpose() * rows.residual);
+      border_->add_score(observation.pose, problem_.rigs.size(), total.lazyProduct(rows.residual));
     });
   }
 }
@@ -52,7 +54,6 @@ CalibrationEvidence SchurSolver::calibration_evidence() {
   linearize();
   reduce(kLeastDamping);
   if (!solve_reduced()) return {};
-  linearize();  // Elimination has changed the links.
   for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) add_scores(entry);
   return border_->evidence();
 }

@@ -104,24 +104,27 @@ ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
   const BundleObservation& observation = problem_.observations[i];
   const BundleCalibration& calibration = *problem_.calibration;
   const CalibrationParameters::Block& block = calibration.blocks[observation.camera];
-  ByCalibration by(kRows, static_cast<Eigen::Index>(block.size()));
+  ByCalibration by(static_cast<Eigen::Index>(block.size()), kRows);
   by.setZero();
   const auto by_intrinsics = calibration.by_intrinsics(i, observation.camera);
-  by.topLeftCorner(2, by_intrinsics.cols()) =
-      rows.bearing_root * by_intrinsics.template cast<double>();
+  const Eigen::Index num_intrinsics = by_intrinsics.cols();
+  by.topLeftCorner(num_intrinsics, 2) =
+      rows.bearing_root * by_intrinsics.transpose().template cast<double>();
   if constexpr (kRows == 3) {
     const auto by_range = calibration.inverse_range_by(i);
-    by.row(2).head(by_range.cols()) = rows.range_scale * by_range.template cast<double>();
+    by.col(2).head(by_range.cols()) =
+        rows.range_scale * by_range.transpose().template cast<double>();
   }
   if (!block.has_extrinsics) return by;
   const Eigen::Vector3d& baseline =
       calibration.rig->cameras[observation.camera].cam_from_rig.translation;
   const Eigen::Vector3d point_in_cam = apply(camera_of(observation, state_), point_in_rig);
+  const Eigen::Matrix<double, 3, 2> across = baseline.norm() * across_baseline(baseline);
   for (int row = 0; row < kRows; ++row) {
     const Eigen::Vector3d gradient = rows.by_point_in_cam.row(row).transpose();
-    by.block(row, by_intrinsics.cols(), 1, 3) = point_in_cam.cross(gradient).transpose();
+    by.block(num_intrinsics, row, 3, 1) = point_in_cam.cross(gradient);
+    by.block(num_intrinsics + 3, row, 2, 1) = across.transpose() * gradient;
   }
-  by.rightCols(2) = rows.by_point_in_cam * (baseline.norm() * across_baseline(baseline));
   return by;
 }
 
