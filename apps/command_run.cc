@@ -213,7 +213,7 @@ std::optional<int> finish(const RunOptions& options,
   };
   save_results(options, session, results, autosave, last, reporter);
   if (!again) return status_of(results);
-  first.emplace(*again, std::move(results));
+  first = FirstPass{*again, std::move(results)};
   return std::nullopt;
 }
 

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <string>
 
+#include "input_command.h"
 #include "waymark/report/advice.h"
 #include "waymark/session/quality.h"
 
