@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
+#include "waymark/loop/odometry.h"
 #include "waymark/map/align.h"
 #include "waymark/marker/marker.h"
 
@@ -123,6 +124,8 @@ bool join(Map& map, PlaceIndex& places, SubmapId a, SubmapId b) {
   if (!placing) return false;
   const KeyframeId parent = map.resolve(placing->markers.front().of_a->reference);
   const KeyframeId child = map.resolve(placing->markers.front().of_b->reference);
+  // Of each part for itself, so that places seen again can contradict the markers.
+  note_odometry(map);
   unite_markers(map, b, shared, *placing);
   transform_submap(map, b, Sim3(placing->a_from_b));
   const Rigid3 child_from_parent = map.keyframes().at(child).rig_from_world *

@@ -104,6 +104,21 @@ TEST(JoinByMarkersTest, TheOneOfThreeThatWasMovedBetweenTheRecordingsDoesNoHarm)
   for (const MapMarker& marker : joined.markers()) EXPECT_NE(marker.id, kFirst.id);
 }
 
+/// Or places seen again could not contradict the markers.
+TEST(JoinByMarkersTest, OdometryIsThatOfThePartsBeforeTheyWereJoined) {
+  const auto a = walk(0, 8, kFrameOfA, {kFirst});
+  const auto b = walk(20, 28, kFrameOfB, {kFirst});
+  const Map joined = join_maps(a->map, b->map);
+  EXPECT_EQ(joined.measured_loop_edges().size(), 1u);
+  b->map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+    const KeyframeId now{id.value + a->map.keyframes().end_id().value};
+    ASSERT_TRUE(joined.odometry().contains(now));
+    const KeyframeId parent = joined.odometry().at(now).parent;
+    EXPECT_EQ(parent.is_valid(), keyframe.parent.is_valid());
+    if (parent.is_valid()) EXPECT_EQ(parent.value - now.value, keyframe.parent.value - id.value);
+  });
+}
+
 TEST(JoinByMarkersTest, MarkersThatContradictEachOtherJoinNothing) {
   const auto a = walk(0, 8, kFrameOfA, {kFirst, kSecond});
   const auto b = walk(20, 28, kFrameOfB, {moved(kFirst), kSecond});
