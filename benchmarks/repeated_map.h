@@ -2,9 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
+#include <cstdint>
 #include <memory>
 #include <utility>
+#include <vector>
 
 #include "waymark/base/rng.h"
 #include "waymark/map/map.h"
@@ -44,6 +47,25 @@ inline std::shared_ptr<const Map> repeat_map(const Map& map,
     parts.landmarks[i].landmark.appearance.descriptor = random_descriptor(rng);
   }
   return Map::restore(std::move(parts)).freeze();
+}
+
+/// The last keyframes of a map once more, as if the camera had stood there again.
+inline void repeat_last_keyframes(Map& map, std::uint32_t count) {
+  std::vector<KeyframeId> last;
+  map.keyframes().for_each([&](KeyframeId id, const Keyframe&) { last.push_back(id); });
+  if (last.size() > count) last.erase(last.begin(), last.end() - count);
+  std::uint32_t frame = 0;
+  for (const KeyframeId id : last) frame = std::max(frame, map.keyframes().at(id).frame.value);
+  for (const KeyframeId before : last) {
+    Keyframe keyframe = map.keyframes().at(before);
+    keyframe.frame = FrameId{++frame};
+    keyframe.parent = before;
+    const std::vector<LandmarkId> landmarks = std::exchange(keyframe.landmarks, {});
+    const KeyframeId id = map.add_keyframe(std::move(keyframe));
+    for (std::uint32_t f = 0; f < landmarks.size(); ++f) {
+      if (landmarks[f].is_valid()) map.observe(id, f, landmarks[f]);
+    }
+  }
 }
 
 }  // namespace waymark

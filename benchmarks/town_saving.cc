@@ -8,9 +8,9 @@
 #include <algorithm>
 #include <filesystem>
 #include <string>
-#include <utility>
 #include <vector>
 
+#include "repeated_map.h"
 #include "town_scene.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/mapfile/map_journal.h"
@@ -31,23 +31,6 @@ void save_town(benchmark::State& state) {
   }
   state.counters["file_kb"] = static_cast<double>(std::filesystem::file_size(temporary_file())) /
                               1024.0 / static_cast<double>(state.range(0));
-}
-
-/// The last keyframes of a map once more, as if the camera had stood there again.
-void repeat_last_keyframes(Map& map, std::uint32_t count) {
-  const std::uint32_t end = map.keyframes().end_id().value;
-  for (std::uint32_t i = end - std::min(end, count); i < end; ++i) {
-    const Keyframe* last = map.keyframes().find(KeyframeId{i});
-    if (!last) continue;
-    Keyframe keyframe = *last;
-    keyframe.frame = FrameId{keyframe.frame.value + (1u << 24)};
-    keyframe.parent = KeyframeId{i};
-    const std::vector<LandmarkId> landmarks = std::exchange(keyframe.landmarks, {});
-    const KeyframeId id = map.add_keyframe(std::move(keyframe));
-    for (std::uint32_t f = 0; f < landmarks.size(); ++f) {
-      if (landmarks[f].is_valid()) map.observe(id, f, landmarks[f]);
-    }
-  }
 }
 
 /// What autosaving costs when a map that was saved has become another.
