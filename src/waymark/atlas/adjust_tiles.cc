@@ -8,6 +8,7 @@
 #include <thread>
 #include <utility>
 
+#include "waymark/atlas/anchors.h"
 #include "waymark/atlas/link_tiles.h"
 #include "waymark/map/correction.h"
 #include "waymark/mapping/bundle_window.h"
@@ -66,12 +67,18 @@ std::string adjust_stored_tile(const Atlas& atlas,
                                std::uint32_t index,
                                const ReadShared& read_shared) {
   const TileNeighbourhood around = neighbourhood_of(contents, index, read_shared);
+  const AtlasTile& tile = contents.tiles[index];
+  const bool is_in_metres = frames_in_metres(contents)[tile.frame];
+  // What stereo and depth measure holds in metres only.
+  const double metres = is_in_metres ? tile.atlas_from_tile.scale : 1.0;
+  const Sim3 joined_from_tile({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), metres);
   std::vector<StoredMap> files;
   std::vector<PlacedTile> placed;
   for (const std::uint32_t other : around.tiles) {
     files.push_back(atlas.load_tile(contents.tiles[other]));
-    placed.push_back(
-        {files.back().map.get(), tile_from_other(contents.tiles[index], contents.tiles[other])});
+    placed.push_back({files.back().map.get(),
+                      joined_from_tile * tile_from_other(tile, contents.tiles[other]),
+                      is_in_metres});
   }
   files[0].map = adjust_tile(placed, around.seams).freeze();
   return atlas.store_tile(files[0]);
@@ -103,14 +110,18 @@ Map adjust_tile(std::span<const PlacedTile> tiles, std::span<const TileSeam> sea
                           .max_iterations_per_round = 20,
                           .num_threads = std::thread::hardware_concurrency()});
   MapCorrection correction;
-  correction.keyframes = found.correction.keyframes;
+  const double metres = tiles[0].joined_from_tile.scale;
+  for (MapCorrection::KeyframeMove move : found.correction.keyframes) {
+    move.rig_from_world.translation /= metres;
+    correction.keyframes.push_back(move);
+  }
   const auto& moves = found.correction.landmarks;
   adjusted.landmarks().for_each([&](LandmarkId id, const Landmark&) {
     const LandmarkId survivor = joined.map.resolve(id);
     const auto at =
         std::ranges::lower_bound(moves, survivor, {}, &MapCorrection::LandmarkMove::landmark);
     if (at == moves.end() || at->landmark != survivor) return;
-    correction.landmarks.push_back({id, at->position_in_world});
+    correction.landmarks.push_back({id, at->position_in_world / metres});
   });
   apply_correction(adjusted, correction);
   return adjusted;

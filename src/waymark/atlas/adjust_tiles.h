@@ -16,7 +16,8 @@ namespace waymark {
 
 /// The first of the tiles adjusted, all others held: its keyframes and what they see move to where
 /// that and what the others see of the same landmarks agree best. Ids stay. Seams are those of the
-/// first. Pure; the map as it was where nothing holds it.
+/// first, which is put into the frame of all by a change of units alone. Pure; the map as it was
+/// where nothing holds it.
 Map adjust_tile(std::span<const PlacedTile> tiles, std::span<const TileSeam> seams);
 
 /// Tiles that are to be adjusted, in groups of which each needs the ones before it: no two of a

@@ -87,17 +87,30 @@ PoseGraphEdge edge_of(const AtlasContents& contents, const AtlasLink& link) {
   return edge;
 }
 
+/// The same node, where it is, with lengths of the world.
+Sim3 in_units_of_world(const Sim3& node_from_world) {
+  return {node_from_world.rotation, node_from_world.translation / node_from_world.scale, 1.0};
+}
+
+/// A part begins with a tile in metres if it has one.
 void solve_part(AtlasContents& contents,
                 const std::vector<std::uint32_t>& part,
                 const std::vector<AtlasLink>& links) {
-  if (links.size() < part.size()) return;  // A tree contradicts itself nowhere.
+  const auto is_metric = [&](std::uint32_t tile) { return contents.tiles[tile].is_metric; };
+  const bool has_metres = is_metric(part[0]);
+  const bool is_all_metric = std::ranges::all_of(part, is_metric);
+  // A tree contradicts itself nowhere, unless a way between two in metres goes by others.
+  if (links.size() < part.size() && (!has_metres || is_all_metric)) return;
   PoseGraph graph;
-  graph.is_scale_free = !contents.tiles[part[0]].is_metric;
+  graph.is_scale_free = !is_all_metric;
   std::map<std::uint32_t, std::uint32_t> node_of;
   for (const std::uint32_t tile : part) {
     node_of.emplace(tile, static_cast<std::uint32_t>(graph.node_from_world.size()));
-    graph.node_from_world.push_back(middle_from_tile(contents.tiles[tile]) *
-                                    contents.tiles[tile].atlas_from_tile.inverse());
+    const Sim3 node_from_world =
+        middle_from_tile(contents.tiles[tile]) * contents.tiles[tile].atlas_from_tile.inverse();
+    graph.keeps_scale.push_back(is_metric(tile));
+    graph.node_from_world.push_back(
+        is_metric(tile) && !is_all_metric ? in_units_of_world(node_from_world) : node_from_world);
     graph.is_fixed.push_back(tile == part[0]);
   }
   for (const AtlasLink& link : links) {
@@ -121,7 +134,7 @@ void solve_anchors(AtlasContents& contents) {
   for (std::uint32_t i = 0; i < count; ++i) order[i] = i;
   std::ranges::stable_sort(order, {}, [&](std::uint32_t tile) {
     const AtlasRecording& recording = contents.recordings[contents.tiles[tile].recording];
-    return std::tie(recording.since, recording.checksum);
+    return std::tuple(!contents.tiles[tile].is_metric, recording.since, recording.checksum);
   });
   const LinkedTiles neighbours = list_neighbours(contents);
   std::vector<bool> is_done(count, false);
@@ -138,6 +151,14 @@ void solve_anchors(AtlasContents& contents) {
     links[contents.tiles[link.a].frame].push_back(link);
   }
   for (std::size_t i = 0; i < parts.size(); ++i) solve_part(contents, parts[i], links[i]);
+}
+
+std::vector<bool> frames_in_metres(const AtlasContents& contents) {
+  std::vector<bool> is_in_metres(contents.tiles.size(), false);
+  for (const AtlasTile& tile : contents.tiles) {
+    if (tile.is_metric) is_in_metres[tile.frame] = true;
+  }
+  return is_in_metres;
 }
 
 }  // namespace waymark

@@ -327,9 +327,6 @@ void AtlasDatabase::read_links(AtlasContents& contents) const {
     }
     link.a = at_a->second;
     link.b = at_b->second;
-    if (contents.tiles[link.a].is_metric != contents.tiles[link.b].is_metric) {
-      rows.fail("a, b", "expected both in metres or both of free scale");
-    }
     link.is_border = rows.whole("is_border", 1) != 0;
     link.num_shared = static_cast<std::uint32_t>(rows.whole("shared", kMaxIds));
     link.b_from_a = rows.transform();

@@ -84,8 +84,7 @@ std::vector<AlikeTile> find_alike_tiles(const AtlasContents& contents,
   // What each of the others has of each keyframe: its best score.
   std::map<std::uint32_t, std::map<KeyframeId, double>> votes;
   const auto is_excluded = [&](std::uint32_t other) {
-    return is_of_one_map(contents.tiles[tile], contents.tiles[other]) ||
-           contents.tiles[tile].is_metric != contents.tiles[other].is_metric;
+    return is_of_one_map(contents.tiles[tile], contents.tiles[other]);
   };
   map.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     for (const AtlasCandidate& candidate :

@@ -49,23 +49,31 @@ std::string describe(const Atlas& atlas) {
   return text.str();
 }
 
+enum class Units { kFree, kMetres, kFreeBetweenMetres, kMetresBetweenFree };
+
 /// Three walks that overlap, in frames of their own.
-std::vector<fs::path> save_walks(const fs::path& folder, bool is_metric) {
-  const double scale = is_metric ? 1.0 : 1.7;
-  return {save_walk(folder, "a", *walk_of_steps(0, 22, is_metric)),
-          save_walk(folder, "b", *walk_of_steps(kRound + 14, kRound + 34, is_metric, scale)),
-          save_walk(folder, "c", *walk_of_steps(2 * kRound + 26, 2 * kRound + 46, is_metric))};
+std::vector<fs::path> save_walks(const fs::path& folder, Units units) {
+  const bool is_metric = units == Units::kMetres || units == Units::kFreeBetweenMetres;
+  const bool is_middle_metric = units == Units::kMetres || units == Units::kMetresBetweenFree;
+  const double middle = is_middle_metric ? 1.0 : 1.7;
+  const double last = is_metric || units == Units::kFree ? 1.0 : 0.6;
+  return {
+      save_walk(folder, "a", *walk_of_steps(0, 22, is_metric)),
+      save_walk(folder, "b", *walk_of_steps(kRound + 14, kRound + 34, is_middle_metric, middle)),
+      save_walk(folder, "c", *walk_of_steps(2 * kRound + 26, 2 * kRound + 46, is_metric, last))};
 }
 
 /// Root mean square distance of the keyframes of a map from where the walk has them, after one
-/// similarity. The frame of a keyframe is not its step once maps are one: times would tell.
+/// motion, which scales what is not in metres. The frame of a keyframe is not its step once maps
+/// are one: times would tell.
 double error_of(const Map& map) {
   std::vector<Eigen::Vector3d> mapped, truth;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     mapped.push_back(keyframe.rig_from_world.origin_in_source());
     truth.push_back(LoopScene::true_pose(static_cast<int>(keyframe.timestamp_ns)).translation);
   });
-  const Sim3 truth_from_map = align_similarity(mapped, truth).value();
+  const Sim3 truth_from_map = is_metric(map) ? Sim3(align_rigid(mapped, truth).value())
+                                             : align_similarity(mapped, truth).value();
   double sum = 0.0;
   for (std::size_t i = 0; i < mapped.size(); ++i) {
     sum += (truth_from_map * mapped[i] - truth[i]).squaredNorm();
@@ -92,10 +100,11 @@ TEST(AtlasTest, HoldsTheTilesOfAMap) {
   EXPECT_EQ(describe(atlas), describe(again));
 }
 
-class AtlasOfWalksTest : public ::testing::TestWithParam<bool> {};
+class AtlasOfWalksTest : public ::testing::TestWithParam<Units> {};
 
 TEST_P(AtlasOfWalksTest, IsOneMapInAnyOrder) {
-  const fs::path folder = empty_folder(GetParam() ? "atlas_metric" : "atlas_free");
+  const fs::path folder =
+      empty_folder("atlas_of_walks_" + std::to_string(static_cast<int>(GetParam())));
   const std::vector<fs::path> maps = save_walks(folder, GetParam());
   Atlas atlas = Atlas::open_or_create(folder / "atlas");
   const AddedMaps added = add_maps(atlas, maps, 12, 1);
@@ -105,6 +114,7 @@ TEST_P(AtlasOfWalksTest, IsOneMapInAnyOrder) {
   EXPECT_EQ(find_atlas_faults(folder / "atlas"), std::vector<std::string>());
   const StoredMap whole = export_atlas(atlas);
   EXPECT_EQ(whole.map->broken_invariants(), "");
+  EXPECT_EQ(is_metric(*whole.map), GetParam() != Units::kFree);
   EXPECT_EQ(whole.map->keyframes().size(), 62u);
   EXPECT_LT(error_of(*whole.map), 1e-6);
 
@@ -122,7 +132,12 @@ TEST_P(AtlasOfWalksTest, IsOneMapInAnyOrder) {
   EXPECT_EQ(describe(other), describe(atlas));
 }
 
-INSTANTIATE_TEST_SUITE_P(Scales, AtlasOfWalksTest, ::testing::Bool());
+INSTANTIATE_TEST_SUITE_P(Scales,
+                         AtlasOfWalksTest,
+                         ::testing::Values(Units::kFree,
+                                           Units::kMetres,
+                                           Units::kFreeBetweenMetres,
+                                           Units::kMetresBetweenFree));
 
 TEST(AtlasTest, OptimizingStraightensWhatDrifted) {
   const fs::path folder = empty_folder("atlas_drift");
@@ -141,9 +156,9 @@ TEST(AtlasTest, OptimizingStraightensWhatDrifted) {
 
 TEST(AtlasTest, KeepsApartWhatDoesNotOverlap) {
   const fs::path folder = empty_folder("atlas_apart");
-  const std::vector<fs::path> maps = {save_walk(folder, "a", *walk_of_steps(0, 8, true)),
-                                      save_walk(folder, "b", *walk_of_steps(20, 28, true)),
-                                      save_walk(folder, "c", *walk_of_steps(0, 8, false))};
+  const std::vector<fs::path> maps = {save_walk(folder, "a", *walk_of_steps(0, 4, true)),
+                                      save_walk(folder, "b", *walk_of_steps(13, 17, true)),
+                                      save_walk(folder, "c", *walk_of_steps(26, 30, false))};
   Atlas atlas = Atlas::open_or_create(folder / "atlas");
   EXPECT_EQ(add_maps(atlas, maps, 12, 0).num_links, 0u);
   EXPECT_EQ(export_atlas(atlas).map->submaps().size(), 3u);
@@ -151,7 +166,7 @@ TEST(AtlasTest, KeepsApartWhatDoesNotOverlap) {
 
 TEST(AtlasTest, WhatComesLaterDoesNotMoveTheFrame) {
   const fs::path folder = empty_folder("atlas_later");
-  const std::vector<fs::path> maps = save_walks(folder, true);
+  const std::vector<fs::path> maps = save_walks(folder, Units::kMetres);
   Atlas atlas = Atlas::open_or_create(folder / "atlas");
   for (const fs::path& map : {maps[1], maps[0], maps[2]}) {
     add_maps(atlas, std::array{map}, 12, 1);
@@ -165,7 +180,7 @@ TEST(AtlasTest, WhatComesLaterDoesNotMoveTheFrame) {
 
 TEST(AtlasTest, TwoWritersDoNotUndoEachOther) {
   const fs::path folder = empty_folder("atlas_writers");
-  const std::vector<fs::path> maps = save_walks(folder, true);
+  const std::vector<fs::path> maps = save_walks(folder, Units::kMetres);
   Atlas first = Atlas::open_or_create(folder / "atlas");
   Atlas second = Atlas::open(folder / "atlas");
   add_maps(first, std::array{maps[0]}, 12, 1);

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/atlas/anchors.h"
 #include "waymark/atlas/join_tiles.h"
 
 namespace waymark {
@@ -13,9 +14,10 @@ StoredMap export_atlas(const Atlas& atlas) {
   StoredMap result;
   std::vector<StoredMap> tiles;
   std::vector<PlacedTile> placed;
+  const std::vector<bool> is_in_metres = frames_in_metres(atlas.contents());
   for (const AtlasTile& tile : atlas.contents().tiles) {
     tiles.push_back(atlas.load_tile(tile));
-    placed.push_back({tiles.back().map.get(), tile.atlas_from_tile});
+    placed.push_back({tiles.back().map.get(), tile.atlas_from_tile, is_in_metres[tile.frame]});
   }
   std::vector<TileSeam> seams;
   for (const AtlasLink& link : atlas.contents().links) {

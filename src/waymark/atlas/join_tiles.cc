@@ -58,7 +58,11 @@ JoinedTiles join_tiles(std::span<const PlacedTile> tiles, std::span<const TileSe
     joined.first_keyframe.push_back(parts.end_keyframe.value);
     joined.first_landmark.push_back(parts.end_landmark.value);
     Map moved = Map::thaw(*tile.map);
-    transform_submap(moved, SubmapId{0}, tile.joined_from_tile);
+    if (tile.is_in_metres) {
+      moved = put_into_metres(std::move(moved), SubmapId{0}, tile.joined_from_tile);
+    } else {
+      transform_submap(moved, SubmapId{0}, tile.joined_from_tile);
+    }
     append_parts(moved, parts);
   }
   joined.map = Map::restore(std::move(parts));

@@ -15,6 +15,8 @@ namespace waymark {
 struct PlacedTile {
   const Map* map = nullptr;
   Sim3 joined_from_tile;
+  bool is_in_metres =
+      false;  ///< Lengths of the frame are metres, also where those of the tile are not.
 };
 
 /// What two of several tiles share.

@@ -28,18 +28,59 @@ constexpr std::size_t kSampleSize = 3;
 constexpr int kNumSamples = 100;
 constexpr double kMaxOff = 3.0;
 
-/// Pairs of landmarks of both that became one. Ids of b follow those of a.
-SharedLandmarks became_one(const Map& merged, const Map& a, const Map& b) {
-  const std::uint32_t end = a.landmarks().end_id().value;
+/// A tile beside another in one map.
+struct TileBeside {
+  KeyframeId first_keyframe;
+  KeyframeId end_keyframe;
+  std::uint32_t first_landmark = 0;
+};
+
+struct TilesSideBySide {
+  Map map;
+  TileBeside a;
+  TileBeside b;
+};
+
+/// A map whose units are said to be any.
+Map as_free(const Map& map) {
+  MapParts parts = take_apart(map);
+  for (Submap& submap : parts.submaps) submap.is_metric = false;
+  return Map::restore(std::move(parts));
+}
+
+/// Of two kinds of units the map has those of neither, for one to be scaled to the other. What is
+/// older stays when sub-maps become one: that is the tile in metres, whose cameras measure them.
+TilesSideBySide unite_tiles(const Map& a, const Map& b) {
+  const auto beside = [](const Map& before) {
+    return TileBeside{before.keyframes().end_id(), {}, before.landmarks().end_id().value};
+  };
+  TilesSideBySide both;
+  if (is_metric(a) == is_metric(b)) {
+    both = {unite(a, b), beside(Map()), beside(a)};
+  } else if (is_metric(a)) {
+    both = {unite(as_free(a), b), beside(Map()), beside(a)};
+  } else {
+    both = {unite(as_free(b), a), beside(b), beside(Map())};
+  }
+  both.a.end_keyframe = {both.a.first_keyframe.value + a.keyframes().end_id().value};
+  both.b.end_keyframe = {both.b.first_keyframe.value + b.keyframes().end_id().value};
+  return both;
+}
+
+/// Pairs of landmarks of both that became one.
+SharedLandmarks became_one(const Map& merged,
+                           const Map& a,
+                           const Map& b,
+                           const TilesSideBySide& both) {
   std::map<LandmarkId, LandmarkId> of_a;  // By survivor, the first of each.
   a.landmarks().for_each([&](LandmarkId id, const Landmark&) {
-    const LandmarkId survivor = merged.resolve(id);
+    const LandmarkId survivor = merged.resolve(LandmarkId{id.value + both.a.first_landmark});
     if (survivor.is_valid()) of_a.try_emplace(survivor, id);
   });
   std::set<LandmarkId> done;
   SharedLandmarks shared;
   b.landmarks().for_each([&](LandmarkId id, const Landmark&) {
-    const LandmarkId survivor = merged.resolve(LandmarkId{id.value + end});
+    const LandmarkId survivor = merged.resolve(LandmarkId{id.value + both.b.first_landmark});
     const auto at = of_a.find(survivor);
     if (!survivor.is_valid() || at == of_a.end() || !done.insert(survivor).second) return;
     shared.push_back({at->second, id});
@@ -116,18 +157,20 @@ std::optional<SharedLandmarks> match_tiles(const Map& a,
                                            const Map& b,
                                            std::span<const KeyframeId> queries,
                                            std::uint64_t seed) {
-  if (queries.empty() || is_metric(a) != is_metric(b)) return std::nullopt;
-  Map both = unite(a, b);
-  const KeyframeId first_of_b = a.keyframes().end_id();
-  const auto id_of = [&](KeyframeId query) { return KeyframeId{first_of_b.value + query.value}; };
-  GlobalMapper mapper(both.keyframes().at(id_of(queries[0])).rig, {}, {}, {.refine = "off"}, seed);
-  mapper.take_over(index_map(both.freeze(), first_of_b));
+  if (queries.empty()) return std::nullopt;
+  TilesSideBySide both = unite_tiles(a, b);
+  const auto id_of = [&](KeyframeId query) {
+    return KeyframeId{both.b.first_keyframe.value + query.value};
+  };
+  const auto& rig = both.map.keyframes().at(id_of(queries[0])).rig;
+  GlobalMapper mapper(rig, {}, {}, {.refine = "off"}, seed);
+  mapper.take_over(index_map(both.map.freeze(), both.a.end_keyframe, both.a.first_keyframe));
   const auto tried = queries.first(std::min(queries.size(), kMaxQueries));
   const bool is_found = std::ranges::any_of(
       tried, [&](KeyframeId query) { return mapper.close_alike(id_of(query)); });
   if (!is_found || mapper.num_joins() == 0) return std::nullopt;
   mapper.consolidate();
-  SharedLandmarks shared = became_one(mapper.map(), a, b);
+  SharedLandmarks shared = became_one(mapper.map(), a, b, both);
   if (shared.size() < kMinSharedLandmarks) return std::nullopt;
   return shared;
 }
@@ -135,7 +178,8 @@ std::optional<SharedLandmarks> match_tiles(const Map& a,
 std::optional<Sim3> fit_tiles(const Map& a, const Map& b, const SharedLandmarks& shared) {
   const PointPairs pairs = gather_pairs(a, b, shared);
   if (pairs.in_a.size() < kSampleSize) return std::nullopt;
-  std::optional<Sim3> b_from_a = fit_least_median(pairs, is_metric(b));
+  const bool is_rigid = is_metric(a) && is_metric(b);
+  std::optional<Sim3> b_from_a = fit_least_median(pairs, is_rigid);
   for (int fit = 0; fit < kNumFits && b_from_a; ++fit) {
     const std::vector<double> off = pairs.off(*b_from_a);
     const double limit = kMaxOff * median(std::vector<double>(off));
@@ -143,7 +187,7 @@ std::optional<Sim3> fit_tiles(const Map& a, const Map& b, const SharedLandmarks&
     for (std::size_t i = 0; i < off.size(); ++i) {
       weights.push_back(off[i] <= limit ? pairs.fineness[i] * pairs.fineness[i] : 0.0);
     }
-    b_from_a = fit_pairs(pairs.in_a, pairs.in_b, weights, is_metric(b));
+    b_from_a = fit_pairs(pairs.in_a, pairs.in_b, weights, is_rigid);
   }
   return b_from_a;
 }

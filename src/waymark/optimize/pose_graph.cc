@@ -34,6 +34,7 @@ PoseGraphResidual pose_graph_residual(const PoseGraphEdge& edge,
 
 PoseGraphSummary optimize_pose_graph(PoseGraph& graph, const PoseGraphOptions& options) {
   WAYMARK_CHECK(graph.is_fixed.size() == graph.node_from_world.size());
+  WAYMARK_CHECK(graph.keeps_scale.empty() || graph.keeps_scale.size() == graph.is_fixed.size());
   if (graph.is_scale_free) return minimize_with_huber<7>(graph, options);
   return minimize_with_huber<6>(graph, options);
 }

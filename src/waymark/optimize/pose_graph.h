@@ -32,6 +32,8 @@ struct PoseGraph {
   std::vector<PoseGraphEdge> edges;
   /// Otherwise each node keeps its scale, which in a metric map is 1: the graph is one over SE(3).
   bool is_scale_free = true;
+  /// The nodes that keep their scale where others are free. Per node; empty where there are none.
+  std::vector<std::uint8_t> keeps_scale;
 };
 
 struct PoseGraphOptions {

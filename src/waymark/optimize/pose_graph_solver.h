@@ -142,8 +142,12 @@ class PoseGraphSolver {
     system_->clear();
     for (std::size_t i = 0; i < edges_.size(); ++i) {
       const PoseGraphEdge& edge = edges_[i];
-      const PoseGraphResidual residual = pose_graph_residual(
+      PoseGraphResidual residual = pose_graph_residual(
           edge, graph_.node_from_world[edge.from], graph_.node_from_world[edge.to]);
+      if (!graph_.keeps_scale.empty()) {
+        if (graph_.keeps_scale[edge.from]) residual.by_from.col(6).setZero();
+        if (graph_.keeps_scale[edge.to]) residual.by_to.col(6).setZero();
+      }
       const double squared = residual.value.squaredNorm();
       system_->add(i, residual, robust_value(i, squared).weight);
     }

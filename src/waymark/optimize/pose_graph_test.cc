@@ -98,8 +98,7 @@ Drift make_drift(std::size_t num_nodes, bool is_scale_free) {
 double largest_error(const PoseGraph& graph, std::span<const Sim3> truth) {
   double largest = 0.0;
   for (std::size_t i = 0; i < truth.size(); ++i) {
-    const Eigen::Vector3d error = position(graph.node_from_world[i]) - position(truth[i]);
-    largest = std::max(largest, error.norm());
+    largest = std::max(largest, (position(graph.node_from_world[i]) - position(truth[i])).norm());
   }
   return largest;
 }
@@ -251,7 +250,7 @@ double cost_by_ceres(const PoseGraph& graph, double robust_scale) {
     Eigen::Map<Eigen::Vector3d>(parameters[i].data() + 3) = node.translation;
     parameters[i][6] = std::log(node.scale);
     problem.AddParameterBlock(parameters[i].data(), 7);
-    if (!graph.is_scale_free) {
+    if (!graph.is_scale_free || (!graph.keeps_scale.empty() && graph.keeps_scale[i])) {
       problem.SetManifold(parameters[i].data(), new ceres::SubsetManifold(7, {6}));
     }
     if (graph.is_fixed[i]) problem.SetParameterBlockConstant(parameters[i].data());
@@ -291,6 +290,17 @@ TEST(PoseGraph, AgreesWithCeresInCost) {
       EXPECT_GT(expected, 10.0);
       EXPECT_NEAR(summary.final_cost, expected, 1e-6 * expected) << is_scale_free << seed;
     }
+  }
+}
+
+TEST(PoseGraph, KeepsTheScaleOfSomeNodes) {
+  Drift drift = make_drift(36, true);
+  const std::vector<Sim3> before = drift.graph.node_from_world;
+  for (std::size_t i = 0; i < 36; ++i) drift.graph.keeps_scale.push_back(i % 3 == 1);
+  const double expected = cost_by_ceres(drift.graph, PoseGraphOptions().robust_scale);
+  EXPECT_NEAR(optimize_pose_graph(drift.graph, {}).final_cost, expected, 1e-6 * expected);
+  for (std::size_t i = 1; i < 36; ++i) {
+    EXPECT_EQ(drift.graph.node_from_world[i].scale == before[i].scale, i % 3 == 1) << i;
   }
 }
 

@@ -34,11 +34,14 @@ class SnapshotsInUse {
   std::vector<MapSnapshot> snapshots_;
 };
 
-/// A frozen map with the index of its keyframes below `end`, else of all.
-inline MapSnapshot index_map(std::shared_ptr<const Map> map, KeyframeId end = {}) {
+/// A frozen map with the index of its keyframes from `begin` on and below `end`, else of all.
+inline MapSnapshot index_map(std::shared_ptr<const Map> map,
+                             KeyframeId end = {},
+                             KeyframeId begin = KeyframeId{0}) {
   PlaceIndex places;
   map->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (id < end) places.add(id, keyframe.submap, keyframe.features->corner_descriptors());
+    if (id >= begin && id < end)
+      places.add(id, keyframe.submap, keyframe.features->corner_descriptors());
   });
   return {std::move(map), std::make_shared<const PlaceIndex>(std::move(places))};
 }
