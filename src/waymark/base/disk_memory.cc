@@ -25,9 +25,11 @@ constexpr std::size_t kPageSize = 4096;
 constexpr std::size_t kGrowth = std::size_t{64} << 20;
 /// Between two looks at how much is in RAM: short, as in this time what is read back has no limit.
 constexpr std::chrono::milliseconds kWatchPeriod(10);
-/// All is let go again only when this part of the limit has come back, or a process that needs more
-/// than the limit for other things would do nothing else.
+/// Where all that can be let go is not enough, this part of the limit may come back before more is,
+/// or a process that needs more than the limit for other things would do nothing else.
 constexpr std::size_t kLimitBySlack = 16;
+/// What is let go at once, as a part of that: of much of it some is needed again at once.
+constexpr std::size_t kSlackByStep = 4;
 
 std::size_t whole_pages(std::size_t num_bytes) {
   return std::max<std::size_t>((num_bytes + kPageSize - 1) / kPageSize, 1) * kPageSize;
@@ -153,6 +155,14 @@ void DiskMemory::add_free(std::byte* begin, std::size_t size) {
   free_.emplace(begin, size);
 }
 
+void DiskMemory::let_go_until(std::size_t bytes) {
+  const std::scoped_lock lock(mutex_);
+  for (std::size_t i = 0; i < mappings_.size() && resident_bytes() > bytes; ++i) {
+    next_ = (next_ + 1) % mappings_.size();
+    ::madvise(mappings_[next_].begin, mappings_[next_].size, MADV_DONTNEED);
+  }
+}
+
 void DiskMemory::watch(const std::stop_token& stop) {
   const std::size_t slack = max_resident_bytes_ / kLimitBySlack;
   std::size_t least_now = 0;
@@ -164,9 +174,12 @@ void DiskMemory::watch(const std::stop_token& stop) {
     if (stop.stop_requested()) return;
     const std::size_t resident = resident_bytes();
     least_now = std::min(least_now, resident + slack);
-    if (resident <= std::max(max_resident_bytes_, least_now)) continue;
-    let_go();
-    least_now = resident_bytes() + slack;
+    const std::size_t limit = std::max(max_resident_bytes_, least_now);
+    if (resident <= limit) continue;
+    const std::size_t enough = limit - slack / kSlackByStep;
+    let_go_until(enough);
+    const std::size_t left = resident_bytes();
+    if (left > enough) least_now = left + slack;
   }
 }
 

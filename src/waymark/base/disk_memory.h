@@ -15,8 +15,8 @@ namespace waymark {
 
 /// Memory for what is kept long and read rarely. It lies in a file without a name, so that the
 /// operating system may hold less of it in RAM than there is: when the process has more than
-/// max_resident_bytes in RAM, all of this memory is let go. What is read again comes back by
-/// itself, with the same bits. Blocks start at pages (4 kB): allocate much at a time.
+/// max_resident_bytes in RAM, parts of this memory are let go in turns. What is read again comes
+/// back by itself, with the same bits. Blocks start at pages (4 kB): allocate much at a time.
 ///
 /// Thread safety: any thread may allocate, free and read at any time.
 class DiskMemory : public std::pmr::memory_resource {
@@ -48,6 +48,9 @@ class DiskMemory : public std::pmr::memory_resource {
   std::byte* take_free(std::size_t size);
   void add_mapping(std::size_t min_size);
   void add_free(std::byte* begin, std::size_t size);
+  /// Takes mappings out of RAM, one after the other, until the process has no more than this in it
+  /// or none is left.
+  void let_go_until(std::size_t resident_bytes);
   void watch(const std::stop_token& stop);
 
   const std::filesystem::path folder_;
@@ -57,6 +60,7 @@ class DiskMemory : public std::pmr::memory_resource {
   std::condition_variable_any wake_;
   // --- guarded by mutex_ ---
   std::vector<Mapping> mappings_;
+  std::size_t next_ = 0;                    ///< Of the mappings, to be let go.
   std::map<std::byte*, std::size_t> free_;  ///< Sizes of free runs of pages, none beside another.
   std::size_t file_size_ = 0;
   std::size_t num_bytes_ = 0;
