@@ -62,9 +62,11 @@ class Atlas(CliTest):
         self.task("atlas", "export", atlas, "-o", self.path("whole"))
         self.make_map("b", self.sequence("stereo"))
         self.assert_fails(waymark("map", "tile", self.path("b"), "-o", atlas), 2, "another map")
-        # What is in metres is not tied to what is not.
-        self.assertIn("0 of 0 pairs", self.task("atlas", "add", atlas, self.path("b")))
-        self.assertIn("2 connected parts", self.task("atlas", "info", atlas))
+        # What is in metres gives its scale to what is not.
+        self.assertIn("1 of 1 pairs", self.task("atlas", "add", atlas, self.path("b")))
+        self.assertIn("1 connected part\n", self.task("atlas", "info", atlas))
+        self.task("atlas", "export", atlas, "-o", self.path("both"))
+        self.assertIn("in metres", self.task("map", "info", self.path("both")))
 
     def test_wrong_input(self):
         self.assert_fails(waymark("atlas", "info", self.folder), 2, "atlas.db")
