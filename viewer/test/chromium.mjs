@@ -7,6 +7,9 @@ const FLAGS = [
   "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ];
 
+/** Drawing in software takes seconds per picture where other work has the processors. */
+export const PATIENCE_MS = 180000;
+
 /** Chromium without a window, which draws in software; with more flags if needed. */
 export function launch(more = []) {
   return chromium.launch({ executablePath: process.env.CHROMIUM ?? "/usr/bin/chromium", headless: true, args: [...FLAGS, ...more] });
@@ -19,6 +22,7 @@ export async function open(browser, url, { isPhone = false, isDark = false, size
     viewport, deviceScaleFactor: isPhone ? 2 : 1, isMobile: isPhone, hasTouch: isPhone, colorScheme: isDark ? "dark" : "light",
     acceptDownloads: true,
   });
+  context.setDefaultTimeout(PATIENCE_MS);
   const page = await context.newPage();
   page.problems = [];
   page.on("pageerror", (error) => page.problems.push(String(error.stack ?? error)));
@@ -43,10 +47,17 @@ export const report = (page) =>
   });
 
 /** Waits until the page says so; `condition` is evaluated in the page with its report. */
-export async function until(page, condition, argument, timeout = 60000) {
+export async function until(page, condition, argument) {
   const check = new Function("argument", `return (${condition})(window.waymark, argument)`);
-  await page.waitForFunction(check, argument, { timeout, polling: 100 });
+  await page.waitForFunction(check, argument, { timeout: PATIENCE_MS, polling: 100 });
 }
+
+/** Presses a control that asks first, and again before it forgets that, however slow the page is. */
+export const pressTwice = (page, control) =>
+  page.locator(`[data-control=${control}]`).evaluate((button) => {
+    if (!button.classList.contains("sure")) button.click();
+    button.click();
+  });
 
 /** Presses a keyframe or landmark near the middle of the map: tries places until something is hit. */
 export async function pickSomething(page) {
@@ -65,6 +76,6 @@ export async function picture(page, path) {
   const before = page.viewportSize();
   if (before.width > 800) await page.setViewportSize({ width: 1440, height: 900 });
   await page.waitForTimeout(1500);
-  await page.screenshot({ path, timeout: 60000 });
+  await page.screenshot({ path });
   await page.setViewportSize(before);
 }

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 import assert from "node:assert/strict";
 import { MockServer } from "../dev/mock_server.mjs";
-import { launch, open, pickSomething, picture, report, until } from "./chromium.mjs";
+import { launch, open, pickSomething, picture, pressTwice, report, until } from "./chromium.mjs";
 
 const isOpen = (w) => w.connection === "open" && !w.isLoading && w.generation > 0;
 
@@ -57,10 +57,9 @@ async function controlsAct(context) {
   const { generation } = await report(page);
   await press("reset");
   assert.ok(!mock.requests.some((request) => request.do === "reset"), "it asks first");
-  await press("reset");
+  await pressTwice(page, "reset");
   await until(page, (w, g) => w.generation > g && !w.isLoading, generation);
-  await press("stop");
-  await press("stop");
+  await pressTwice(page, "stop");
   await until(page, (w) => w.session.phase === "done");
   assert.deepEqual(mock.requests.map((request) => request.do), ["pause", "resume", "mapping", "mapping", "save", "reset", "stop"]);
   assert.deepEqual(page.problems, []);
@@ -228,7 +227,7 @@ async function followsItsWindow(context) {
       const sizes = [document.documentElement.scrollWidth, document.querySelector("#timeline").offsetWidth, clientWidth];
       const expected = [width, isNarrow ? width : width - 288, isNarrow ? width : width - 288];
       return String([...sizes, drawn, height]) === String([...expected, clientWidth, clientHeight]);
-    }, size.width, { timeout: 10000 });
+    }, size.width);
   }
   assert.deepEqual(page.problems, []);
 }
@@ -243,7 +242,7 @@ async function followsItsScreen(context) {
     await page.waitForFunction((ratio) => {
       const canvas = document.querySelector("#scene");
       return canvas.width === ratio * canvas.clientWidth && canvas.height === ratio * canvas.clientHeight;
-    }, deviceScaleFactor, { timeout: 10000 });
+    }, deviceScaleFactor);
   }
   assert.deepEqual(page.problems, []);
 }
@@ -371,7 +370,7 @@ async function showsMarkersAndEdges(context) {
 /** Half a million landmarks and five thousand keyframes. Times are told, not judged: they depend on the machine. */
 async function drawsLargeMaps(context) {
   const { page } = await serve(context, { world: "large" }, { isDark: true, size: { width: 800, height: 500 } });
-  await until(page, (w) => w.landmarks === 500000 && w.keyframes === 5000 && !w.isLoading, null, 60000);
+  await until(page, (w) => w.landmarks === 500000 && w.keyframes === 5000 && !w.isLoading);
   await page.click("[data-layer=covisibility]");
   await page.click("[data-layer=tree]");
   await page.waitForTimeout(2000);

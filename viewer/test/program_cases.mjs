@@ -7,7 +7,7 @@ import { createServer as createHttpServer } from "node:http";
 import { createServer } from "node:net";
 import { tmpdir } from "node:os";
 import { join } from "node:path";
-import { open, picture, pickSomething, report, until } from "./chromium.mjs";
+import { open, PATIENCE_MS, picture, pickSomething, pressTwice, report, until } from "./chromium.mjs";
 
 const isOpen = (w) => w.connection === "open" && !w.isLoading && w.generation > 0;
 
@@ -37,7 +37,7 @@ async function start({ waymark, cleanUp }, port, ...args) {
     return status;
   };
   cleanUp.push(end);
-  for (let i = 0; i < 300 && child.exitCode === null; ++i) {
+  for (let i = 0; i < PATIENCE_MS / 100 && child.exitCode === null; ++i) {
     const answer = await fetch(`http://127.0.0.1:${port}/status`).catch(() => null);
     if (answer?.ok) return { end, ended, output: () => output };
     await new Promise((resolve) => setTimeout(resolve, 100));
@@ -64,7 +64,7 @@ async function agrees(page, port) {
 async function showsARun(context) {
   const out = folder(context);
   const port = await freePort();
-  const args = [context.input, "--viewer", String(port), "--pace", "0.5", "-o", out, "--map-out", join(out, "map.wmap")];
+  const args = [context.input, "--viewer", String(port), "--pace", "0.05", "-o", out, "--map-out", join(out, "map.wmap")];
   const program = await start(context, port, "run", ...args);
   const page = await open(context.browser, `http://127.0.0.1:${port}/`, { isDark: true });
   await until(page, (w) => w.connection === "open" && w.landmarks > 0 && w.keyframes > 0 && w.trajectory > 0);
@@ -102,12 +102,10 @@ async function showsARun(context) {
   await picture(page, `${context.pictures}/program_desktop_dark.png`);
 
   const { generation } = await report(page);
-  await press("reset");
-  await press("reset");
+  await pressTwice(page, "reset");
   await until(page, (w, g) => w.generation > g && !w.isLoading, generation);
-  await press("stop");
-  await press("stop");
-  await until(page, (w) => w.connection === "waiting", null, 60000);
+  await pressTwice(page, "stop");
+  await until(page, (w) => w.connection === "waiting");
   assert.equal(await program.ended, 0, program.output());
   assert.deepEqual(page.problems, []);
 }
@@ -125,7 +123,7 @@ async function refusesToBeFramed(context) {
   await new Promise((resolve) => foreign.listen(0, "127.0.0.1", resolve));
   context.cleanUp.push(() => foreign.close());
   const page = await context.browser.newPage();
-  const refusal = page.waitForEvent("console", { predicate: (message) => message.text().includes("frame-ancestors"), timeout: 20000 });
+  const refusal = page.waitForEvent("console", { predicate: (message) => message.text().includes("frame-ancestors"), timeout: PATIENCE_MS });
   await page.goto(`http://127.0.0.1:${foreign.address().port}/`);
   await refusal;
   assert.equal((await status(port)).clients, 0);
@@ -137,7 +135,7 @@ async function outlivesARestart(context) {
   const args = ["run", context.input, "--viewer", String(port), "--pace", "2", "-o", out, "--map-out", join(out, "map.wmap")];
   const first = await start(context, port, ...args);
   const page = await open(context.browser, `http://127.0.0.1:${port}/`);
-  await until(page, (w) => w.connection === "waiting" && w.landmarks > 0, null, 90000);
+  await until(page, (w) => w.connection === "waiting" && w.landmarks > 0);
   assert.equal(await first.ended, 0, first.output());
   const shown = await report(page);
   assert.deepEqual([shown.landmarks, shown.keyframes], [shown.session.landmarks, shown.session.keyframes], "the last map stays");
