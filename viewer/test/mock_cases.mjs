@@ -354,11 +354,10 @@ async function showsMarkersAndEdges(context) {
   mock.hold();
   await page.click("#view-choice [data-value=orbit]");
   await picture(page, `${context.pictures}/desktop_markers.png`);
-  const calls = () => page.evaluate(() => window.waymark.performance.drawCalls);
-  const before = await calls();
+  const before = await page.evaluate(() => window.waymark.performance.drawCalls);
   await page.click("[data-layer=markers]");
-  await page.waitForTimeout(500);
-  assert.equal(await calls(), before - 2, "squares and signs are a draw call each");
+  // Squares and signs are a draw call each.
+  await until(page, (w, b) => w.performance.drawCalls === b - 2, before);
   const large = await serve(context, { world: "empty" });
   await large.page.waitForFunction(() => document.querySelector("[data-layer=markers]").hidden);
   const phone = await serve(context, { world: "map", skip: 700 }, { isPhone: true, isDark: true });
