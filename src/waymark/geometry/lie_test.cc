@@ -18,7 +18,8 @@ using testing::random_vector;
 
 // Angles on both sides of every change of formula, up to almost pi.
 std::vector<double> angles() {
-  return {0.0, 1e-12, 1e-8, 1e-5, 0.009999, 0.010001, 0.02, 0.3, 1.0, 2.0, 3.1, M_PI - 1e-6};
+  return {
+      0.0, 1e-12, 1e-8, 1e-5, 0.009999, 0.010001, 0.02, 0.0499, 0.3, 1.0, 2.0, 3.1, M_PI - 1e-6};
 }
 
 TEST(So3, SkewIsTheCrossProduct) {

@@ -19,7 +19,8 @@ namespace {
 /// then it gets narrower by this factor.
 constexpr double kFirstWidth = 2.0;
 constexpr double kNarrowing = 2.0;
-/// Each pass takes edges whose expected residual may be twice as long; so many at most.
+/// Each pass takes edges whose expected residual may be twice as long, or as long as the next edge
+/// needs; so many at most.
 constexpr double kReachGrowth = 2.0;
 constexpr int kMaxPasses = 20;
 /// Steps at the narrowest loss, and the share of the cost that is not worth one.
@@ -66,26 +67,28 @@ class EdgeSwitcher {
 
   std::vector<std::uint8_t> switch_edges() {
     double reach = 0.0;
+    bool is_settled = true;
     for (int pass = 0; pass < kMaxPasses; ++pass) {
       std::vector<double> expected = expect_residuals(graph_, is_on_);
       for (const std::size_t edge : left_out_) expected[edge] = 0.0;
-      reach = std::max(kReachGrowth * reach, least_of_undecided(expected));
-      const bool is_last = reach >= *std::ranges::max_element(expected);
+      const double next = least_beyond(reach, expected);
+      if (pass > 0 && is_settled && !std::isfinite(next)) break;
+      reach = std::max(kReachGrowth * reach, is_settled && std::isfinite(next) ? next : 0.0);
       admit(expected, reach);
       narrow_down();
-      const bool is_same = take_agreeing();
-      if (is_last && is_same) break;
+      is_settled = take_agreeing();
     }
     return is_on_;
   }
 
  private:
-  double least_of_undecided(std::span<const double> expected) const {
+  /// Of the edges that are off; infinite where there are none.
+  double least_beyond(double reach, std::span<const double> expected) const {
     double least = std::numeric_limits<double>::infinity();
     for (std::size_t i = 0; i < expected.size(); ++i) {
-      if (!is_on_[i] && expected[i] > 0.0) least = std::min(least, expected[i]);
+      if (!is_on_[i] && expected[i] > reach) least = std::min(least, expected[i]);
     }
-    return std::isfinite(least) ? least : narrowest_;
+    return least;
   }
 
   /// Sets the first widths of the losses: 0 for what is out of reach.
