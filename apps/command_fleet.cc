@@ -5,6 +5,7 @@
 #include <stdlib.h>
 #include <unistd.h>
 
+#include <cstdlib>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -50,16 +51,47 @@ std::vector<std::string> words_of(const FleetOptions& options) {
   return words;
 }
 
+/// Goes on to the fleet if all of its modules are there; Python itself would say in many words that
+/// one is not.
+constexpr const char* kStart = R"(
+import importlib.util, os, sys
+needed = {"waymark": "it installed, or its folder in PYTHONPATH", "distributed": "the package python3-distributed",
+          "fsspec": "the package python3-fsspec"}
+for module, expected in needed.items():
+    if importlib.util.find_spec(module) is None:
+        print(f"error: {sys.executable}: no module {module}, expected {expected}", file=sys.stderr)
+        sys.exit(2)
+os.execv(sys.executable, [sys.executable, *sys.argv[1:]])
+)";
+
+/// The module of a program lies in its build folder, or below the same prefix; Python looks there
+/// after what PYTHONPATH names.
+void let_python_find_module(const std::filesystem::path& program) {
+  const std::filesystem::path folder = program.parent_path();
+  const auto prefix = folder.parent_path();
+  for (const auto& modules : {folder / "python", prefix / "lib/python3/dist-packages"}) {
+    std::error_code error;
+    if (!std::filesystem::exists(modules / "waymark/fleet.py", error)) continue;
+    const char* const named = std::getenv("PYTHONPATH");
+    const std::string before = named && *named ? std::string(named) + ":" : "";
+    ::setenv("PYTHONPATH", (before + modules.string()).c_str(), /*overwrite=*/1);
+    return;
+  }
+}
+
 /// Becomes the other program, whose exit status is ours.
 int run_fleet(const FleetOptions& options) {
   std::error_code error;
   const auto self = std::filesystem::read_symlink("/proc/self/exe", error);
-  if (!error) ::setenv("WAYMARK_PROGRAM", self.c_str(), /*overwrite=*/0);
+  if (!error) {
+    ::setenv("WAYMARK_PROGRAM", self.c_str(), /*overwrite=*/0);
+    let_python_find_module(self);
+  }
   // Modules of the distribution are for its own Python.
   const char* const python =
       ::access("/usr/bin/python3", X_OK) == 0 ? "/usr/bin/python3" : "python3";
   std::vector<std::string> words = words_of(options);
-  words.insert(words.begin(), python);
+  words.insert(words.begin(), {python, "-c", kStart});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);

@@ -2,8 +2,10 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """waymark.fleet: three short recordings of a room, by local clusters."""
+import importlib.util
 import os
 import pathlib
+import shutil
 import signal
 import subprocess
 import unittest
@@ -84,6 +86,22 @@ class Fleet(Test):
         self.assertNotIn("\n", result["failed"][0]["error"])
         self.assertEqual(len(result["contents"]["recordings"]), 1)
         self.assertIn("failed", (self.folder / "report.html").read_text())
+
+    def test_the_program_finds_its_module(self):
+        """That of its build folder, whatever else is installed; elsewhere it says that there is none."""
+        clean = {key: value for key, value in os.environ.items() if key != "PYTHONPATH"}
+        arguments = ["fleet", str(self.recordings[0]), "-o", str(self.folder / "atlas"), "--workers", "1"]
+        done = subprocess.run([str(PROGRAM), *arguments], env=clean, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertTrue((self.folder / "atlas" / "atlas.db").exists())
+        if importlib.util.find_spec("waymark").origin.startswith("/usr/lib"):
+            return
+        alone = self.folder / "alone"
+        alone.mkdir()
+        shutil.copy(PROGRAM, alone / "waymark")
+        done = subprocess.run([str(alone / "waymark"), *arguments], env=clean, capture_output=True, text=True)
+        self.assertEqual(done.returncode, 2, done.stderr)
+        self.assertRegex(done.stderr, "^error: .*no module waymark, expected .*\n$")
 
     def test_a_worker_that_is_killed_changes_nothing(self):
         whole = self.run_fleet("whole")
