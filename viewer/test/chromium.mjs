@@ -2,12 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 import { chromium } from "playwright-core";
 
+// Debian's Chromium draws whole pages by the graphics processor. Where that is software, a page takes a second per picture.
 const FLAGS = [
+  "--disable-gpu-rasterization", "--disable-accelerated-2d-canvas",
   "--headless", "--no-sandbox", "--use-angle=swiftshader", "--enable-unsafe-swiftshader", "--disable-quic", "--no-first-run",
   "--disable-background-networking", "--disable-component-update", "--disable-sync",
 ];
 
-/** Drawing in software takes seconds per picture where other work has the processors. */
+/** Longer than anything takes on a machine with other work. */
 export const PATIENCE_MS = 180000;
 
 /** Chromium without a window, which draws in software; with more flags if needed. */
