@@ -71,6 +71,7 @@ class EdgeSwitcher {
     for (int pass = 0; pass < kMaxPasses; ++pass) {
       std::vector<double> expected = expect_residuals(graph_, is_on_);
       for (const std::size_t edge : left_out_) expected[edge] = 0.0;
+      // Where nothing changed, what is within reach is decided.
       const double next = least_beyond(reach, expected);
       if (pass > 0 && is_settled && !std::isfinite(next)) break;
       reach = std::max(kReachGrowth * reach, is_settled && std::isfinite(next) ? next : 0.0);
