@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "paths.h"
 #include "terminal.h"
 #include "waymark/atlas/add.h"
 #include "waymark/atlas/atlas.h"
@@ -22,8 +23,6 @@ namespace {
 
 void say_step(const std::string& what) { print_message("{}\n", what); }
 
-const char* plural_of(std::size_t count) { return count == 1 ? "" : "s"; }
-
 void print_atlas_recordings(const AtlasContents& contents) {
   for (std::uint32_t i = 0; i < contents.recordings.size(); ++i) {
     std::size_t num_tiles = 0, num_keyframes = 0;
@@ -36,62 +35,22 @@ void print_atlas_recordings(const AtlasContents& contents) {
     }
     std::ranges::sort(frames);
     frames.erase(std::unique(frames.begin(), frames.end()), frames.end());
-    print_result("recording {}: {} tile{}, {} keyframes, part{} {}\n",
+    print_result("recording {}: {}, {}, {} {}\n",
                  printable(contents.recordings[i].name),
-                 num_tiles,
-                 plural_of(num_tiles),
-                 num_keyframes,
-                 plural_of(frames.size()),
+                 count_of(num_tiles, "tile"),
+                 count_of(num_keyframes, "keyframe"),
+                 frames.size() == 1 ? "part" : "parts",
                  fmt::join(frames, ", "));
   }
-}
-
-int print_atlas_info(const std::filesystem::path& folder) {
-  const Atlas atlas = Atlas::open(folder);
-  const AtlasContents& contents = atlas.contents();
-  print_atlas_recordings(contents);
-  std::uint32_t num_parts = 0;
-  std::uint64_t num_keyframes = 0, num_landmarks = 0;
-  for (const AtlasTile& tile : contents.tiles) {
-    num_parts = std::max(num_parts, tile.frame + 1);
-    num_keyframes += tile.num_keyframes;
-    num_landmarks += tile.num_landmarks;
-  }
-  const auto num_borders =
-      static_cast<std::size_t>(std::ranges::count(contents.links, true, &AtlasLink::is_border));
-  print_result("{}: {} recording{}, {} tile{}, {} keyframes, {} landmarks, {} connected part{}\n",
-               folder.string(),
-               contents.recordings.size(),
-               plural_of(contents.recordings.size()),
-               contents.tiles.size(),
-               plural_of(contents.tiles.size()),
-               num_keyframes,
-               num_landmarks,
-               num_parts,
-               plural_of(num_parts));
-  print_result("{} borders within recordings, {} places that several show\n",
-               num_borders,
-               contents.links.size() - num_borders);
-  return kDone;
-}
-
-int check_atlas(const std::filesystem::path& folder) {
-  const std::vector<std::string> faults = find_atlas_faults(folder);
-  for (const std::string& fault : faults) print_result("{}\n", fault);
-  if (!faults.empty()) {
-    throw InputError(folder.string(), fmt::format("has {} faults, expected none", faults.size()));
-  }
-  print_result("{}: sound\n", folder.string());
-  return kDone;
 }
 
 int optimize_folder(const std::filesystem::path& folder) {
   Atlas atlas = Atlas::open(folder);
   const OptimizedAtlas optimized = optimize_atlas(atlas, say_step);
-  print_result("{}: {} of {} tiles adjusted\n",
+  print_result("{}: {} of {} adjusted\n",
                folder.string(),
                optimized.num_adjusted,
-               atlas.contents().tiles.size());
+               count_of(atlas.contents().tiles.size(), "tile"));
   return kDone;
 }
 
@@ -102,7 +61,7 @@ void add_atlas_task(CLI::App& atlases,
                     Command& command) {
   const auto path = std::make_shared<std::filesystem::path>();
   CLI::App& added = *atlases.add_subcommand(name, help);
-  added.add_option("ATLAS", *path, "Folder of an atlas")->required();
+  reads(added.add_option("ATLAS", *path, "Folder of an atlas"))->required();
   added.callback([path, task, &command] { command = [path, task] { return task(*path); }; });
 }
 
@@ -121,12 +80,10 @@ int add_to_folder(const AddOptions& options) {
   Atlas atlas = Atlas::open_or_create(options.atlas);
   const AddedMaps added =
       add_maps(atlas, options.maps, options.num_keyframes, options.seed, say_step);
-  print_result("{}: {} map{} added with {} tile{}; {} of {} pairs of tiles show the same place\n",
+  print_result("{}: {} added with {}; {} of {} pairs of tiles show the same place\n",
                options.atlas.string(),
-               added.num_added,
-               plural_of(added.num_added),
-               added.num_tiles,
-               plural_of(added.num_tiles),
+               count_of(added.num_added, "map"),
+               count_of(added.num_tiles, "tile"),
                added.num_links,
                added.num_pairs);
   return kDone;
@@ -136,8 +93,9 @@ void add_adding_task(CLI::App& atlases, Command& command) {
   const auto options = std::make_shared<AddOptions>();
   CLI::App& task = *atlases.add_subcommand(
       "add", "Cut maps into tiles, find what they share with those there, and put them in place");
-  task.add_option("ATLAS", options->atlas, "Folder of an atlas; made if it is missing")->required();
-  task.add_option("MAP", options->maps, "Map files (.wmap)")->required();
+  writes(task.add_option("ATLAS", options->atlas, "Folder of an atlas; made if it is missing"))
+      ->required();
+  reads(task.add_option("MAP", options->maps, "Map files (.wmap)"))->required();
   add_tile_size_option(task, options->num_keyframes);
   task.add_option("--seed", options->seed, "Of random numbers [0]");
   task.callback([options, &command] { command = [options] { return add_to_folder(*options); }; });
@@ -151,22 +109,58 @@ struct ExportAtlasOptions {
 int export_folder(const ExportAtlasOptions& options) {
   const StoredMap stored = export_atlas(Atlas::open(options.atlas));
   save_map(options.out, stored);
-  print_result("{}: {} keyframes, {} landmarks\n",
+  print_result("{}: {}, {}\n",
                options.out.string(),
-               stored.map->keyframes().size(),
-               stored.map->landmarks().size());
+               count_of(stored.map->keyframes().size(), "keyframe"),
+               count_of(stored.map->landmarks().size(), "landmark"));
   return kDone;
 }
 
 void add_atlas_export_task(CLI::App& atlases, Command& command) {
   const auto options = std::make_shared<ExportAtlasOptions>();
   CLI::App& task = *atlases.add_subcommand("export", "Write all of an atlas as one map");
-  task.add_option("ATLAS", options->atlas, "Folder of an atlas")->required();
-  task.add_option("-o,--out", options->out, "Map file to write (.wmap)")->required();
+  reads(task.add_option("ATLAS", options->atlas, "Folder of an atlas"))->required();
+  writes(task.add_option("-o,--out", options->out, "Map file to write (.wmap)"))->required();
   task.callback([options, &command] { command = [options] { return export_folder(*options); }; });
 }
 
 }  // namespace
+
+int print_atlas_info(const std::filesystem::path& folder) {
+  const Atlas atlas = Atlas::open(folder);
+  const AtlasContents& contents = atlas.contents();
+  print_atlas_recordings(contents);
+  std::uint32_t num_parts = 0;
+  std::uint64_t num_keyframes = 0, num_landmarks = 0;
+  for (const AtlasTile& tile : contents.tiles) {
+    num_parts = std::max(num_parts, tile.frame + 1);
+    num_keyframes += tile.num_keyframes;
+    num_landmarks += tile.num_landmarks;
+  }
+  const auto num_borders =
+      static_cast<std::size_t>(std::ranges::count(contents.links, true, &AtlasLink::is_border));
+  print_result("{}: {}, {}, {}, {}, {}\n",
+               folder.string(),
+               count_of(contents.recordings.size(), "recording"),
+               count_of(contents.tiles.size(), "tile"),
+               count_of(num_keyframes, "keyframe"),
+               count_of(num_landmarks, "landmark"),
+               count_of(num_parts, "connected part"));
+  print_result("{} within recordings, {} that several show\n",
+               count_of(num_borders, "border"),
+               count_of(contents.links.size() - num_borders, "place"));
+  return kDone;
+}
+
+int check_atlas(const std::filesystem::path& folder) {
+  const std::vector<std::string> faults = find_atlas_faults(folder);
+  for (const std::string& fault : faults) print_result("{}\n", fault);
+  if (!faults.empty()) {
+    throw InputError(folder.string(), fmt::format("has {} faults, expected none", faults.size()));
+  }
+  print_result("{}: sound\n", folder.string());
+  return kDone;
+}
 
 void add_tile_size_option(CLI::App& command, std::size_t& num_keyframes) {
   command

@@ -4,15 +4,17 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 #include <vector>
 
 #include "commands.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
+#include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/exchange/config_file.h"
-#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/system/settings.h"
 
@@ -25,11 +27,8 @@ int print_settings(bool is_markdown) {
 }
 
 int check_settings(const std::vector<std::filesystem::path>& files) {
-  std::vector<ConfigSource> sources;
   std::vector<std::string> notes;
-  for (const std::filesystem::path& file : files) {
-    sources.push_back(read_config_file(file, notes));
-  }
+  const std::vector<ConfigSource> sources = read_config_files(files, notes);
   for (const std::string& note : notes) print_result("note: {}\n", note);
   const ConfigNode config = merge_configs(sources);
   Settings settings;
@@ -39,18 +38,28 @@ int check_settings(const std::vector<std::filesystem::path>& files) {
     num_cameras = make_rig(*chain).cameras.size();
     for (const std::string& note : chain->notes) print_result("note: {}\n", note);
   }
-  print_result("valid: {} cameras\n", num_cameras);
+  print_result("valid: {}\n", count_of(num_cameras, "camera"));
   return kDone;
 }
 
 using CalibrationReader = CameraChain (*)(const ConfigSource& source);
 
+CameraChain read_any(const ConfigSource& source) {
+  if (auto chain = read_foreign_cameras(source)) return *std::move(chain);
+  throw InputError(source.name,
+                   "is no calibration of another program that is known, expected one of those in "
+                   "docs/calibration.md");
+}
+
 int print_camchain(CalibrationReader read, const std::vector<std::filesystem::path>& files) {
-  if (files.size() != 1) {
+  const bool is_pair = read == read_ros_calibration && files.size() == 2;
+  if (files.size() != 1 && !is_pair) {
     throw InputError("command line",
                      fmt::format("--from has {} files, expected one calibration", files.size()));
   }
-  const CameraChain chain = read(read_calibration_source(files[0]));
+  const ConfigSource source = read_calibration_source(files[0]);
+  const CameraChain chain =
+      is_pair ? read_ros_pair(source, read_calibration_source(files[1])) : read(source);
   for (const std::string& note : chain.notes) print_message("note: {}\n", note);
   print_result("{}", format_camchain(chain));
   return kDone;
@@ -71,9 +80,11 @@ void add_config_command(CLI::App& program, Command& command) {
                                  {"ros", read_ros_calibration},
                                  {"colmap", read_colmap_calibration},
                                  {"nerfstudio", read_nerfstudio_calibration},
-                                 {"orbslam", read_orbslam_settings}},
-                                "FILE is a calibration of opencv, ros, colmap, nerfstudio or "
-                                "orbslam: print a camchain");
+                                 {"orbslam", read_slam_settings},
+                                 {"any", read_any}},
+                                "FILE is a calibration of opencv, ros (or two, of a pair), colmap, "
+                                "nerfstudio, orbslam, or of any program that is known: print a "
+                                "camchain");
   const auto is_markdown = std::make_shared<bool>(false);
   config.add_flag(
       "--markdown", *is_markdown, "Print the settings as tables of a page, docs/settings.md");

@@ -11,7 +11,9 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "paths.h"
 #include "terminal.h"
+#include "waymark/atlas/export_atlas.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/exchange/export_map.h"
@@ -69,18 +71,18 @@ int run_export(ExportOptions options) {
     what.trajectory = read_trajectory(options.trajectory);
     what.trajectory_name = options.trajectory.string();
   }
-  const StoredMap stored = load_map(options.map);
+  const StoredMap stored = load_map_or_atlas(options.map);
   const MapExportCounts counts = export_map(stored, options.map.string(), what);
   const std::string models =
       counts.num_views == 0
           ? ""
-          : fmt::format(": {} views, {} images", counts.num_views, counts.num_images);
-  print_result("{} sub-map{} of {} to {}{}\n",
-               counts.num_submaps,
-               counts.num_submaps == 1 ? "" : "s",
+          : ": " + count_of(counts.num_views, "view") + ", " + count_of(counts.num_images, "image");
+  print_result("{} of {} to {}{}\n",
+               count_of(counts.num_submaps, "sub-map"),
                options.map.string(),
                what.out.string(),
                models);
+  if (counts.is_again) print_message("{}: the earlier one was replaced\n", what.out.string());
   const bool has_colors = what.format != ExportFormat::kTum &&
                           what.format != ExportFormat::kKitti &&
                           what.format != ExportFormat::kMarkers;
@@ -99,17 +101,17 @@ void add_frame_options(CLI::App& exporting, ExportOptions& options) {
           "sharpest of each of N parts of the way [keyframes]")
       ->expected(1, 2)
       ->type_name("WHICH [N]");
-  exporting
-      .add_option("--input",
-                  options.input,
-                  "The recording that the map was made of, for images the map does not hold: of "
-                  "other frames than keyframes, and of camera 1 [none]")
+  reads(exporting.add_option(
+            "--input",
+            options.input,
+            "The recording that the map was made of, for images the map does not hold: of "
+            "other frames than keyframes, and of camera 1 [none]"))
       ->expected(1, 2)
       ->type_name("INPUT [RIGHT]");
-  exporting.add_option("--trajectory",
-                       options.trajectory,
-                       "Poses of camera 0 in the run that made the map, for --frames (its "
-                       "trajectory.txt) [none]");
+  reads(exporting.add_option("--trajectory",
+                             options.trajectory,
+                             "Poses of camera 0 in the run that made the map, for --frames (its "
+                             "trajectory.txt) [none]"));
 }
 
 }  // namespace
@@ -117,11 +119,12 @@ void add_frame_options(CLI::App& exporting, ExportOptions& options) {
 void add_export_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<ExportOptions>();
   CLI::App& exporting = *program.add_subcommand("export", "Write a saved map for other tools");
-  exporting.add_option("MAP", options->map, "Map file (.wmap)")->required();
-  exporting
-      .add_option("-o,--out",
-                  options->what.out,
-                  "File for ply, tum, kitti (of keyframes), markers; folder for colmap, nerfstudio")
+  reads(exporting.add_option("MAP", options->map, "Map file (.wmap), or folder of an atlas"))
+      ->required();
+  writes(exporting.add_option(
+             "-o,--out",
+             options->what.out,
+             "File for ply, tum, kitti (of keyframes), markers; folder for colmap, nerfstudio"))
       ->required();
   add_choice<ExportFormat>(exporting,
                            "--format",
@@ -141,6 +144,10 @@ void add_export_command(CLI::App& program, Command& command) {
                   "Split 360 degree and fisheye keyframes into so many perspective views of 90 "
                   "degrees; 6 of 360 degrees are a cube")
       ->check(CLI::Range(kMinSplitViews, kMaxSplitViews));
+  exporting.add_flag(
+      "--undistort",
+      options->what.is_undistorted,
+      "Images and cameras without distortion, for programs that know none (PINHOLE)");
   add_frame_options(exporting, *options);
   exporting.callback([options, &command] { command = [options] { return run_export(*options); }; });
 }

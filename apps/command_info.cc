@@ -29,6 +29,7 @@ void add_info_command(CLI::App& program, Command& command) {
   CLI::App& info = *program.add_subcommand(
       "info", "Say what INPUT holds: cameras, sizes, rate, gaps, calibration, topics");
   add_reading_options(info, options->input, options->reading);
+  info.option_defaults()->group("Results and messages");
   info.add_flag("--json", options->is_json, "Print one JSON object");
   info.callback([options, &command] { command = [options] { return show_input(*options); }; });
 }

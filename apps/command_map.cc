@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "paths.h"
 #include "terminal.h"
 #include "waymark/atlas/add.h"
 #include "waymark/base/check.h"
@@ -42,10 +43,10 @@ void print_submaps(const Map& map) {
     if (submap.joined_into.is_valid()) {
       print_result("sub-map {}: joined into sub-map {}\n", i, submap.joined_into.value);
     } else {
-      print_result("sub-map {}: {} keyframes, {} landmarks, {}\n",
+      print_result("sub-map {}: {}, {}, {}\n",
                    i,
-                   sizes[i].num_keyframes,
-                   sizes[i].num_landmarks,
+                   count_of(sizes[i].num_keyframes, "keyframe"),
+                   count_of(sizes[i].num_landmarks, "landmark"),
                    submap.is_metric ? "in metres" : "scale free");
     }
   }
@@ -54,7 +55,7 @@ void print_submaps(const Map& map) {
 void print_rigs(const Map& map) {
   std::vector<const Rig*> rigs;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    const Rig* rig = keyframe.rig.get();
+    const Rig* rig = keyframe.features->rig.get();
     if (std::find(rigs.begin(), rigs.end(), rig) == rigs.end()) rigs.push_back(rig);
   });
   for (std::size_t i = 0; i < rigs.size(); ++i) {
@@ -74,6 +75,7 @@ void print_rigs(const Map& map) {
 }
 
 int print_info(const std::filesystem::path& path) {
+  if (is_atlas(path)) return print_atlas_info(path);
   const StoredMap stored = load_map(path);
   const Map& map = *stored.map;
   const auto num_bytes = static_cast<double>(std::filesystem::file_size(path));
@@ -83,19 +85,20 @@ int print_info(const std::filesystem::path& path) {
                1e-6 * num_bytes);
   print_rigs(map);
   print_submaps(map);
-  print_result("{} keyframes, {} landmarks, {} loop edges, {} images\n",
-               map.keyframes().size(),
-               map.landmarks().size(),
-               map.measured_loop_edges().size(),
-               stored.images.size());
+  print_result("{}, {}, {}, {}\n",
+               count_of(map.keyframes().size(), "keyframe"),
+               count_of(map.landmarks().size(), "landmark"),
+               count_of(map.measured_loop_edges().size(), "loop edge"),
+               count_of(stored.images.size(), "image"));
   return kDone;
 }
 
 int check_map(const std::filesystem::path& path) {
+  if (is_atlas(path)) return check_atlas(path);
   const std::vector<std::string> faults = find_map_faults(path);
   for (const std::string& fault : faults) print_result("{}\n", fault);
   if (!faults.empty()) {
-    throw InputError(path.string(), fmt::format("has {} faults, expected none", faults.size()));
+    throw InputError(path.string(), "has " + count_of(faults.size(), "fault") + ", expected none");
   }
   print_result("{}: sound\n", path.string());
   return kDone;
@@ -108,7 +111,7 @@ void add_task(CLI::App& maps,
               Command& command) {
   const auto path = std::make_shared<std::filesystem::path>();
   CLI::App& added = *maps.add_subcommand(name, help);
-  added.add_option("MAP", *path, "Map file (.wmap)")->required();
+  reads(added.add_option("MAP", *path, "Map file (.wmap), or folder of an atlas"))->required();
   added.callback([path, task, &command] { command = [path, task] { return task(*path); }; });
 }
 
@@ -129,17 +132,16 @@ void report(const MergeOptions& options, const MergedStored& merged) {
       print_result("one is in metres, the scale of the other is free: map align makes it metres\n");
     }
   } else {
-    print_result("joined: {} sub-maps are {} now, {} further places were seen in both\n",
+    print_result("joined: {} sub-maps are {} now, {} seen in both\n",
                  merged.num_parts_before,
                  merged.num_parts,
-                 merged.num_loops);
+                 count_of(merged.num_loops, "further place"));
   }
-  print_result("{}: {} keyframes, {} landmarks, {} sub-map{}\n",
+  print_result("{}: {}, {}, {}\n",
                options.out.string(),
-               merged.stored.map->keyframes().size(),
-               merged.stored.map->landmarks().size(),
-               merged.num_parts,
-               merged.num_parts == 1 ? "" : "s");
+               count_of(merged.stored.map->keyframes().size(), "keyframe"),
+               count_of(merged.stored.map->landmarks().size(), "landmark"),
+               count_of(merged.num_parts, "sub-map"));
 }
 
 int merge_files(const MergeOptions& options) {
@@ -153,9 +155,10 @@ void add_merge_task(CLI::App& maps, Command& command) {
   const auto options = std::make_shared<MergeOptions>();
   CLI::App& merge = *maps.add_subcommand(
       "merge", "Put two maps into one file and join what shows the same places");
-  merge.add_option("A", options->a, "Map file (.wmap); the result is in its frame")->required();
-  merge.add_option("B", options->b, "Map file (.wmap)")->required();
-  merge.add_option("-o,--out", options->out, "Map file to write")->required();
+  reads(merge.add_option("A", options->a, "Map file (.wmap); the result is in its frame"))
+      ->required();
+  reads(merge.add_option("B", options->b, "Map file (.wmap)"))->required();
+  writes(merge.add_option("-o,--out", options->out, "Map file to write"))->required();
   merge.add_option("--seed", options->seed, "Of random numbers [0]");
   merge.callback([options, &command] { command = [options] { return merge_files(*options); }; });
 }
@@ -175,15 +178,15 @@ int tile_map(const TileOptions& options) {
                      "holds another map; waymark atlas add finds what they share");
   }
   add_maps(atlas, std::span(&options.map, 1), options.num_keyframes, /*seed=*/0);
-  print_result("{}: {} tiles\n", options.out.string(), atlas.contents().tiles.size());
+  print_result("{}: {}\n", options.out.string(), count_of(atlas.contents().tiles.size(), "tile"));
   return kDone;
 }
 
 void add_tile_task(CLI::App& maps, Command& command) {
   const auto options = std::make_shared<TileOptions>();
   CLI::App& tile = *maps.add_subcommand("tile", "Cut a map into the tiles of an atlas");
-  tile.add_option("MAP", options->map, "Map file (.wmap)")->required();
-  tile.add_option("-o,--out", options->out, "Folder for the atlas")->required();
+  reads(tile.add_option("MAP", options->map, "Map file (.wmap)"))->required();
+  writes(tile.add_option("-o,--out", options->out, "Folder for the atlas"))->required();
   add_tile_size_option(tile, options->num_keyframes);
   tile.callback([options, &command] { command = [options] { return tile_map(*options); }; });
 }

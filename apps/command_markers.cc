@@ -10,6 +10,7 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "paths.h"
 #include "terminal.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
@@ -101,9 +102,10 @@ void add_markers_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<MarkersOptions>();
   CLI::App& markers =
       *program.add_subcommand("markers", "Square markers: the families there are, sheets to print");
-  markers.add_option("--print",
-                     options->print,
-                     "PDF file of sheets, or SVG file for one, further ones FILE-2.svg ...");
+  writes(
+      markers.add_option("--print",
+                         options->print,
+                         "PDF file of sheets, or SVG file for one, further ones FILE-2.svg ..."));
   markers.add_option("--family", options->family, "Which markers")->capture_default_str();
   markers.add_option("--size", options->size_m, "Side of the black square in metres")
       ->check(number_between(0.001, 10.0))

@@ -12,6 +12,7 @@
 #include "input_command.h"
 #include "live_control.h"
 #include "numbers.h"
+#include "paths.h"
 #include "reporter.h"
 #include "run_messages.h"
 #include "waymark/base/atomic_file.h"
@@ -74,6 +75,7 @@ SessionResults map_input(Session& session,
                          Reporter& reporter) {
   CalibrationWatch watch(session,
                          [&reporter](const std::string& mistake) { reporter.warning(mistake); });
+  watch.compare_with(session.system->map());
   SessionHooks hooks;
   hooks.watch = &watch;
   hooks.should_stop = is_interrupted;
@@ -85,7 +87,7 @@ SessionResults map_input(Session& session,
   }
   hooks.on_result = [&, live, overlay](const FrameImages& frame, const TrackingResult& result) {
     if (live) live->show(frame, result);
-    if (overlay) overlay->add(frame, result, session.system->details());
+    if (overlay) overlay->add(frame, result);
   };
   SessionResults results = run_session(input, *session.system, hooks);
   try {
@@ -93,7 +95,9 @@ SessionResults map_input(Session& session,
   } catch (const OutputError&) {  // Told once the rest is saved.
     if (!results.failure) results.failure = std::current_exception();
   }
-  if (const FocalCheck* check = session.system->focal_check()) reporter.detail(describe(*check));
+  if (overlay && !overlay->is_h264()) {
+    reporter.warning("--overlay: OpenCV has no encoder for H.264, browsers may not play the video");
+  }
   return results;
 }
 
@@ -110,25 +114,15 @@ void save_final_map(const System& system,
   reporter.info(fmt::format("map in {}", options.map_out.string()));
 }
 
-void start_viewer(const RunOptions& options,
-                  const Session& session,
-                  const ControlledParts& parts,
-                  Reporter& reporter,
-                  std::optional<LiveControl>& live) {
-  const InputInfo& input = session.input->info();
+/// Before the input is opened and its calibration found, which may take long.
+void start_viewer(const RunOptions& options, Reporter& reporter, std::optional<LiveControl>& live) {
   SessionInfo info;
   info.program = std::string("waymark ") + WAYMARK_VERSION;
   info.input = options.session.input.filename().string();
-  info.setup = to_string(input.setup);
   info.timing = to_string(options.session.timing);
   info.can_save = !options.map_out.empty();
   info.keeps_images = options.session.reading.has_jpeg;
-  live.emplace(parse_viewer_address(options.viewer, "--viewer"),
-               std::move(info),
-               *session.system,
-               parts,
-               input.num_frames,
-               reporter);
+  live.emplace(parse_viewer_address(options.viewer, "--viewer"), std::move(info), reporter);
   reporter.info(fmt::format("viewer: open {} in a browser", live->url()));
 }
 
@@ -144,7 +138,7 @@ bool has_ended_early(const SessionResults& results, const LiveControl* live) {
 }
 
 /// The calibration with which the input is to be mapped once more, if it is.
-std::optional<CameraChain> begin_again(const Session& session, const RunOptions& options) {
+std::optional<AnotherPass> begin_again(const Session& session, const RunOptions& options) {
   const bool is_paced = options.pace > 0.0 || options.session.timing == Timing::kRealtime;
   // A map to go on in is another one by now where it is saved to the same file.
   if (is_paced || !options.session.map_in.empty()) return std::nullopt;
@@ -170,7 +164,8 @@ void save_results(const RunOptions& options,
   const std::filesystem::path& out = options.report.out;
   save_each({[&] { write_results(out, results); },
              [&] {
-               if (options.has_report) write_report(out);
+               if (options.has_report) return write_report(out);
+               std::filesystem::remove(out / "report.html");  // Of an earlier run.
              },
              [&] { write_calibration(out, session, *session.system->rig(), results.summary); },
              [&] {
@@ -207,18 +202,24 @@ std::optional<int> finish(const RunOptions& options,
   }
   const auto again = first || has_ended ? std::nullopt : begin_again(session, options);
   if (first) add_first(first->results.summary, results.summary);
+  if (again && !again->mistake.empty()) {
+    reporter.warning(again->mistake);
+    if (!results.summary.mistakes) results.summary.mistakes.emplace();
+    results.summary.mistakes->push_back(again->mistake);
+  }
   results.summary.advice = advise(results.table, results.summary);
   const auto last = [&] {
     if (!again) report(results);
   };
   save_results(options, session, results, autosave, last, reporter);
   if (!again) return status_of(results);
-  first = FirstPass{*again, std::move(results)};
+  first = FirstPass{again->calibration, std::move(results)};
   return std::nullopt;
 }
 
 /// Maps the input; see finish().
 std::optional<int> map_once(const RunOptions& options,
+                            LiveControl* live,
                             std::optional<FirstPass>& first,
                             Reporter& reporter) {
   Session session = open_session(options.session);
@@ -226,7 +227,7 @@ std::optional<int> map_once(const RunOptions& options,
     for (const std::string& line : session.description) reporter.info(line);
   }
   warn_unless_sure(reporter, session, "expect a bent map");
-  prepare_results(options.report.out);
+  if (prepare_results(options.report.out) && !first) report_replacement(reporter, options.report);
   if (options.max_memory_gb) {
     session.system->keep_map_in(std::make_shared<DiskMemory>(
         options.report.out, static_cast<std::size_t>(*options.max_memory_gb * 1e9)));
@@ -253,15 +254,10 @@ std::optional<int> map_once(const RunOptions& options,
                     settings_as_yaml(session.settings),
                     images);
 
-  std::optional<LiveControl> live;
-  if (!options.viewer.empty()) {
-    start_viewer(options, session, {autosave, images, is_paused}, reporter, live);
-  }
-  LiveControl* const shown = live ? &*live : nullptr;
+  if (live) live->begin({*session.system, autosave, images, is_paused}, session.input->info());
   std::optional<OverlayVideo> overlay = start_overlay(options.overlay);
   OverlayVideo* const drawn = overlay ? &*overlay : nullptr;
-  SessionResults results =
-      map_input(session, images, autosave, shown, drawn, reads_ahead, reporter);
+  SessionResults results = map_input(session, images, autosave, live, drawn, reads_ahead, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(options.session.timing);
@@ -269,18 +265,24 @@ std::optional<int> map_once(const RunOptions& options,
   results.summary.version = WAYMARK_VERSION;
   results.summary.refined_calibration = session.system->calibration();
   add_input(session, results.summary);
-  return finish(options, session, std::move(results), autosave, shown, first, reporter);
+  return finish(options, session, std::move(results), autosave, live, first, reporter);
 }
 
 int run(RunOptions options, Reporter& reporter) {
   const Timing suitable = is_camera(options.session.input) ? Timing::kRealtime : Timing::kLockstep;
   options.session.timing = options.timing.value_or(suitable);
   options.session.calibrate = reported(options.calibrate, reporter);
+  std::optional<LiveControl> live;
+  if (!options.viewer.empty()) {
+    start_viewer(options, reporter, live);
+    options.session.calibrate = live->shown(*options.session.calibrate);
+  }
+  LiveControl* const shown = live ? &*live : nullptr;
   std::optional<FirstPass> first;
-  if (const auto status = map_once(options, first, reporter)) return *status;
+  if (const auto status = map_once(options, shown, first, reporter)) return *status;
   reporter.info("the calibration is another than stated: once more with what the images tell");
   options.session.calibration = first->calibration;
-  return *map_once(options, first, reporter);
+  return *map_once(options, shown, first, reporter);
 }
 
 void add_pace_option(CLI::App& command, RunOptions& options) {
@@ -295,11 +297,15 @@ void add_pace_option(CLI::App& command, RunOptions& options) {
 }
 
 void add_map_options(CLI::App& command, RunOptions& options) {
-  command.add_option("--map-in",
-                     options.session.map_in,
-                     "Start from a saved map: find the camera in it and extend it [a new map]");
-  CLI::Option& map_out = *command.add_option(
-      "--map-out", options.map_out, "Save the map to this file (.wmap) [not saved]");
+  command.option_defaults()->group("Map");
+  reads(command.add_option(
+      "--map-in",
+      options.session.map_in,
+      "Start from a saved map: find the camera in it and extend it [a new map]"));
+  CLI::Option& map_out = *writes(command.add_option(
+      "--map-out",
+      options.map_out,
+      "Save the map to this file (.wmap), which may be that of --map-in [not saved]"));
   command
       .add_option("--autosave",
                   options.autosave_s,
@@ -327,6 +333,7 @@ void add_run_command(CLI::App& program, Command& command) {
   add_input_options(run_command, options->session);
   add_selection_options(run_command, options->session.reading);
   add_fov_option(run_command, options->calibrate);
+  run_command.option_defaults()->group("How it runs");
   add_pace_option(run_command, *options);
   add_choice<std::optional<Timing>>(
       run_command,
@@ -344,13 +351,20 @@ void add_run_command(CLI::App& program, Command& command) {
                   "Show the session in the browser, at this port of this machine [off]")
       ->type_name("[HOST:]PORT");
   add_map_options(run_command, *options);
-  run_command.add_option("--overlay",
-                         options->overlay,
-                         "Video (.mp4) of the images with their features drawn in [none]");
+  run_command.option_defaults()->group("Results and messages");
+  writes(run_command.add_option("--overlay",
+                                options->overlay,
+                                "Video (.mp4) of the images with their features drawn in [none]"));
   run_command.add_flag("--report",
                        options->has_report,
                        "Write a page on the run, report.html, among the results [off]");
   add_report_options(run_command, options->report, options->session.seed);
+  run_command.footer(
+      "Examples:\n"
+      "  waymark run MH_01_easy\n"
+      "  waymark run walk.mp4 --map-out walk.wmap --keep-images --report\n"
+      "  waymark run left right -c camchain.yaml --viewer 8080\n"
+      "  waymark run again.mp4 --map-in walk.wmap --map-out walk.wmap");
   run_command.callback([options, &command] {
     command = [options] {
       return run_and_log(options->report,

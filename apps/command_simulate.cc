@@ -13,11 +13,13 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "paths.h"
 #include "reporter.h"
 #include "terminal.h"
-#include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
+#include "waymark/base/text.h"
+#include "waymark/exchange/export_folder.h"
 #include "waymark/input/input.h"
 #include "waymark/simulate/dataset.h"
 #include "waymark/simulate/named_cameras.h"
@@ -174,14 +176,20 @@ int simulate(const SimulateOptions& options) {
   }
   Reporter reporter(options.is_quiet ? Verbosity::kQuiet : Verbosity::kNormal, {});
   SimulatedSequence sequence(spec_of(options), std::max(1u, std::thread::hardware_concurrency()));
-  make_output_folder(options.out);
+  ExportFolder folder(options.out);
+  if (folder.is_again()) reporter.info(options.out.string() + ": the earlier one is replaced");
   const auto num_frames = static_cast<std::size_t>(sequence.num_frames());
-  write_dataset(sequence, options.out, [&](int frame) {
-    reporter.progress(static_cast<std::size_t>(frame) + 1, num_frames, "rendering");
-  });
+  try {
+    write_dataset(sequence, folder.unfinished(), [&](int frame) {
+      reporter.progress(static_cast<std::size_t>(frame) + 1, num_frames, "rendering");
+    });
+  } catch (const OutputError& error) {  // It names a folder that is gone by then.
+    throw OutputError(options.out.string(), std::string("cannot be made: ") + error.what());
+  }
+  folder.finish();
   reporter.finish_progress();
-  reporter.info(
-      fmt::format("{} frames of {} in {}", num_frames, options.name, options.out.string()));
+  reporter.info(fmt::format(
+      "{} of {} in {}", count_of(num_frames, "frame"), options.name, options.out.string()));
   return kDone;
 }
 
@@ -258,11 +266,11 @@ void add_simulate_command(CLI::App& program, Command& command) {
       *program.add_subcommand("simulate", "Images with exact ground truth, as a data set");
   simulation.add_option(
       "WORLD", options->name, "A world, or a sequence of the evaluation suite; see --list");
-  simulation.add_option("-o,--out", options->out, "Folder for the data set");
-  simulation.add_option(
+  writes(simulation.add_option("-o,--out", options->out, "Folder for the data set"));
+  reads(simulation.add_option(
       "--camera",
       options->camera,
-      "Camchain file, or a name, see --list [640x480 pinhole, a pair 11 cm apart]");
+      "Camchain file, or a name, see --list [640x480 pinhole, a pair 11 cm apart]"));
   add_choice<Setup>(simulation,
                     "--setup",
                     options->setup,

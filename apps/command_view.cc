@@ -11,7 +11,9 @@
 #include <utility>
 
 #include "commands.h"
+#include "paths.h"
 #include "terminal.h"
+#include "waymark/atlas/export_atlas.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/exchange/align_map.h"
 #include "waymark/input/decode.h"
@@ -50,7 +52,7 @@ ViewReply write_scaled(const ViewRequest& request,
 int view(const ViewOptions& options) {
   silence_image_library();
   const ViewerOptions address = parse_viewer_address(options.address, "--port");
-  const StoredMap stored = load_map(options.map);
+  const StoredMap stored = load_map_or_atlas(options.map);
   SessionInfo info;
   info.program = std::string("waymark ") + WAYMARK_VERSION;
   info.is_live = false;
@@ -83,10 +85,12 @@ void add_view_command(CLI::App& program, Command& command) {
   const auto options = std::make_shared<ViewOptions>();
   CLI::App& view_command =
       *program.add_subcommand("view", "Show a saved map in the browser, until Ctrl-C");
-  view_command.add_option("MAP", options->map, "Map file (.wmap)")->required();
-  view_command.add_option("-o,--out",
-                          options->out,
-                          "Map file that the page may write the map to, scaled by a distance");
+  reads(view_command.add_option("MAP", options->map, "Map file (.wmap), or folder of an atlas"))
+      ->required();
+  writes(
+      view_command.add_option("-o,--out",
+                              options->out,
+                              "Map file that the page may write the map to, scaled by a distance"));
   view_command
       .add_option("--port",
                   options->address,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <filesystem>
 #include <functional>
 #include <map>
 #include <string>
@@ -43,6 +44,10 @@ inline constexpr int kNoPose = 3;          ///< Ran, but found no pose at all.
 
 /// What `map` has besides; adds one subcommand to it.
 void add_align_task(CLI::App& maps, Command& command);
+
+/// What `atlas info` and `atlas check` do.
+int print_atlas_info(const std::filesystem::path& folder);
+int check_atlas(const std::filesystem::path& folder);
 
 /// How many keyframes a tile has at most.
 void add_tile_size_option(CLI::App& command, std::size_t& num_keyframes);

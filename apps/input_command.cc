@@ -16,12 +16,15 @@
 
 #include "commands.h"
 #include "numbers.h"
+#include "paths.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
 #include "waymark/base/frame_state.h"
+#include "waymark/base/text.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/input/decode.h"
+#include "waymark/report/documentation.h"
 
 namespace waymark {
 namespace {
@@ -47,37 +50,18 @@ std::string read_standard_input() {
 }  // namespace
 
 void add_input_argument(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
-  command
-      .add_option("INPUT",
-                  input,
-                  "Data set folder, folder of images, video file, bag of ROS, camera or address; - "
-                  "reads a list of images")
+  reads(command.add_option(
+            "INPUT",
+            input,
+            "Data set folder, folder of images, video file, bag of ROS, camera or address; - "
+            "reads a list of images"))
       ->required()
       ->each([&reading](const std::string& path) {
         if (path == "-") reading.image_list = read_standard_input();
       });
 }
 
-void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
-  add_input_argument(command, input, reading);
-  command.add_option(
-      "RIGHT", reading.right, "Images or video of camera 1, INPUT being those of camera 0 [none]");
-  command
-      .add_option("--format",
-                  reading.format,
-                  "Kind of INPUT: euroc, kitti, tum, replica, images, video or bag [recognised]")
-      ->check(CLI::IsMember({"euroc", "kitti", "tum", "replica", "images", "video", "bag"}));
-  command
-      .add_option("--topics",
-                  reading.topics,
-                  "Of a bag: the images of camera 0, and those of camera 1 or the depth [found]")
-      ->delimiter(',')
-      ->type_name("A[,B]")
-      ->allow_extra_args(false);
-  command.add_option("--depth", reading.depth, "Depth images of a folder of images [none]");
-  command
-      .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")
-      ->check(number_between(0.01, 10000.0));
+void add_change_options(CLI::App& command, InputOptions& reading) {
   command
       .add_option("--rotate",
                   reading.rotate_deg,
@@ -91,6 +75,47 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
                   "Makes images smaller, to this width in pixels, and the calibration with them "
                   "[as they are]")
       ->check(whole_from(16));
+}
+
+void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading) {
+  command.option_defaults()->group("Input");
+  add_input_argument(command, input, reading);
+  reads(command.add_option(
+      "RIGHT", reading.right, "Images or video of camera 1, INPUT being those of camera 0 [none]"));
+  command
+      .add_option("--format",
+                  reading.format,
+                  "Kind of INPUT: euroc, kitti, tum, replica, images, video or bag [recognised]")
+      ->check(CLI::IsMember({"euroc", "kitti", "tum", "replica", "images", "video", "bag"}));
+  command
+      .add_option("--topics",
+                  reading.topics,
+                  "Of a bag: the images of camera 0, and those of camera 1 or the depth [found]")
+      ->delimiter(',')
+      ->type_name("A[,B]")
+      ->allow_extra_args(false);
+  add_choice<std::optional<BagTimes>>(
+      command,
+      "--times",
+      reading.times,
+      {{"headers", BagTimes::kHeaders}, {"bag", BagTimes::kRecording}},
+      "Of a bag: the stamps of its images, headers, or when they were recorded, bag [headers, bag "
+      "where their clock was set back]");
+  add_choice<std::optional<Split>>(command,
+                                   "--split",
+                                   reading.split,
+                                   {{"side-by-side", Split::kSideBySide},
+                                    {"top-bottom", Split::kTopBottom},
+                                    {"tracks", Split::kTracks},
+                                    {"none", Split::kNone}},
+                                   "Two cameras in each picture, side-by-side or top-bottom, or in "
+                                   "two tracks of a video, tracks "
+                                   "[found, none turns that off]");
+  reads(command.add_option("--depth", reading.depth, "Depth images of a folder of images [none]"));
+  command
+      .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")
+      ->check(number_between(0.01, 10000.0));
+  add_change_options(command, reading);
   add_choice<std::optional<Setup>>(
       command,
       "--setup",
@@ -101,11 +126,12 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
 
 void add_input_options(CLI::App& command, SessionOptions& options) {
   add_reading_options(command, options.input, options.reading);
-  command
-      .add_option("-c,--config",
-                  options.configs,
-                  "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
-                  "files override [none]")
+  command.option_defaults()->group("Cameras and settings");
+  reads(command.add_option(
+            "-c,--config",
+            options.configs,
+            "YAML file with cameras (Kalibr camchain) and settings; may be repeated, later "
+            "files override [none]"))
       ->allow_extra_args(false);
   command
       .add_option(
@@ -114,25 +140,32 @@ void add_input_options(CLI::App& command, SessionOptions& options) {
 }
 
 void add_selection_options(CLI::App& command, InputOptions& reading) {
+  command.option_defaults()->group("Part of the input");
   command.add_option("--first", reading.first, "Index of the first frame to use [0]")
       ->check(whole_from(0));
   command.add_option("--frames", reading.frames, "Use at most so many frames [all]")
       ->check(whole_from(1));
   command.add_option("--every", reading.every, "Use each N-th frame [1]")->check(whole_from(1));
-  command.add_option(
+  reads(command.add_option(
       "--mask",
       reading.mask,
       "Mask image, a folder with one per frame by name or in order, or a video of them; black is "
-      "not used [none]");
+      "not used [none]"));
 }
 
 void add_fov_option(CLI::App& command, CalibrateOptions& options) {
+  command.option_defaults()->group("Cameras and settings");
   command
       .add_option("--fov",
                   options.fov_deg,
                   "Horizontal field of view in degrees, roughly, of an INPUT without calibration "
                   "[estimated]")
       ->check(number_between(5.0, 240.0));
+}
+
+void report_replacement(Reporter& reporter, const ReportOptions& options) {
+  reporter.info(
+      fmt::format("{}: the results of an earlier run are replaced", options.out.string()));
 }
 
 CalibrateOptions reported(CalibrateOptions options, Reporter& reporter) {
@@ -184,10 +217,14 @@ void write_calibration(const std::filesystem::path& folder,
                        const PreparedInput& prepared,
                        const Rig& rig,
                        const RunSummary& summary) {
-  if (!prepared.estimated && summary.refined_calibration.empty()) return;
-  std::optional<CameraChain> chain = chain_of(rig, summary.refined_calibration);
-  if (!chain) return;
-  std::string text = format_camchain(*chain);
+  const std::filesystem::path file = folder / "calibration.yaml";
+  const bool is_news = prepared.estimated || !summary.refined_calibration.empty();
+  const auto chain = is_news ? chain_of(rig, summary.refined_calibration) : std::nullopt;
+  if (!chain) {
+    std::filesystem::remove(file);  // Of an earlier run.
+    return;
+  }
+  std::string text = format_camchain(prepared.input->of_unchanged_images(*chain));
   if (prepared.input->info().setup == Setup::kRgbd) {
     const DepthSettings& depth = prepared.settings.depth;
     text += fmt::format("depth: {{factor: {:.6g}, lag_ms: {:.6g}, inverse_offset: {:.6g}}}\n",
@@ -195,16 +232,18 @@ void write_calibration(const std::filesystem::path& folder,
                         depth.lag_ms,
                         rig.inverse_depth_offset);
   }
-  write_file_atomically(folder / "calibration.yaml", text);
+  write_file_atomically(file, text);
 }
 
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed) {
-  command.add_option("-o,--out", options.out, "Folder for the results [waymark-out]");
+  command.option_defaults()->group("Results and messages");
+  writes_results(command.add_option("-o,--out", options.out, "Folder for the results"))
+      ->capture_default_str();
   command.add_option("--seed", seed, "Seed of all random numbers [0]")
       ->check(CLI::Range(0, 1000000000));
   CLI::Option& quiet = *command.add_flag("--quiet", options.is_quiet, "Errors only [off]");
   command.add_flag("--verbose", options.is_verbose, "A line per frame [off]")->excludes(&quiet);
-  command.add_option("--log", options.log, "Write all messages to this file, too [none]");
+  writes(command.add_option("--log", options.log, "Write all messages to this file, too [none]"));
 }
 
 FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
@@ -229,20 +268,20 @@ FrameObserver report_frames(Reporter& reporter, const InputInfo& info) {
     }
     const int num_candidates = frame.num_candidates;
     reporter.detail(
-        fmt::format("frame {}: {}, {} inliers of {} matches{}",
+        fmt::format("frame {}: {}, {} of {}{}",
                     frame.index,
                     state,
-                    frame.num_inliers,
-                    frame.num_matches,
-                    num_candidates > 0 ? fmt::format(", best of {} places", num_candidates) : ""));
+                    count_of(frame.num_inliers, "inlier"),
+                    count_of(frame.num_matches, "match", "matches"),
+                    num_candidates > 0 ? ", best of " + count_of(num_candidates, "place") : ""));
     reporter.progress(++num_done, total, to_string(frame.state));
   };
 }
 
 void report_reasons(Reporter& reporter, const FrameTable& table, const RunSummary& summary) {
   if (summary.missing_at_end > 0) {
-    reporter.warning(
-        fmt::format("the video ends {} frames before its container says", summary.missing_at_end));
+    reporter.warning(fmt::format("the video ends {} before its container says",
+                                 count_of(summary.missing_at_end, "frame")));
   }
   std::map<FrameReason, int> counts;
   int num_without_partner = 0;
@@ -251,9 +290,8 @@ void report_reasons(Reporter& reporter, const FrameTable& table, const RunSummar
     num_without_partner += is_without_partner(frame);
   }
   if (num_without_partner > 0) {
-    reporter.info(
-        fmt::format("used with camera 0 alone, as other files could not be read: {} frames",
-                    num_without_partner));
+    reporter.info(fmt::format("used with camera 0 alone, as other files could not be read: {}",
+                              count_of(num_without_partner, "frame")));
   }
   if (counts.empty()) return;
   std::vector<std::pair<FrameReason, int>> sorted(counts.begin(), counts.end());
@@ -269,7 +307,8 @@ void report_reasons(Reporter& reporter, const FrameTable& table, const RunSummar
 
 void report_advice(Reporter& reporter, const RunSummary& summary) {
   for (const RunAdvice& advice : summary.advice) {
-    reporter.info(fmt::format("{}; try: {} ({})", advice.seen, advice.remedy, advice.see));
+    reporter.info(
+        fmt::format("{}; try: {} ({})", advice.seen, advice.remedy, documentation(advice.see)));
   }
 }
 

@@ -34,6 +34,8 @@ struct ReportOptions {
 
 /// INPUT. Where it is "-" the list of images is read while the command line is.
 void add_input_argument(CLI::App& command, std::filesystem::path& input, InputOptions& reading);
+/// --rotate and --resize.
+void add_change_options(CLI::App& command, InputOptions& reading);
 /// INPUT and how to read it.
 void add_reading_options(CLI::App& command, std::filesystem::path& input, InputOptions& reading);
 /// The same, its cameras, the settings.
@@ -44,6 +46,9 @@ void add_selection_options(CLI::App& command, InputOptions& reading);
 void add_fov_option(CLI::App& command, CalibrateOptions& options);
 /// Where results and messages go, and the seed.
 void add_report_options(CLI::App& command, ReportOptions& options, std::optional<int>& seed);
+
+/// Tells that the results of an earlier run go.
+void report_replacement(Reporter& reporter, const ReportOptions& options);
 
 /// Lets a calibration tell what it does, and be interrupted.
 CalibrateOptions reported(CalibrateOptions options, Reporter& reporter);

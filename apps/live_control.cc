@@ -15,33 +15,52 @@ constexpr auto kPollInterval = 20ms;
 
 }  // namespace
 
-LiveControl::LiveControl(const ViewerOptions& options,
-                         SessionInfo info,
-                         System& system,
-                         const ControlledParts& parts,
-                         std::optional<std::size_t> num_frames,
-                         Reporter& reporter)
-    : system_(system),
-      parts_(parts),
-      viewer_(options, std::move(info)),
-      publisher_(viewer_, num_frames),
-      reporter_(reporter) {}
+LiveControl::LiveControl(const ViewerOptions& options, SessionInfo info, Reporter& reporter)
+    : info_(std::move(info)), viewer_(options, info_), reporter_(reporter) {
+  prepare("opening the input");
+}
+
+CalibrateOptions LiveControl::shown(CalibrateOptions options) {
+  options.on_progress = [this, tell = std::move(options.on_progress)](const std::string& text) {
+    tell(text);
+    prepare(text);
+  };
+  options.should_stop = [this, is_over = std::move(options.should_stop)] {
+    take_requests();
+    return is_stopped_ || is_over();
+  };
+  return options;
+}
+
+void LiveControl::prepare(const std::string& doing) {
+  ViewUpdate update;
+  update.status.doing = doing;
+  viewer_.try_push(update);
+}
+
+void LiveControl::begin(const ControlledParts& parts, const InputInfo& input) {
+  info_.setup = to_string(input.setup);
+  parts_.emplace(parts);
+  const bool is_again = publisher_.has_value();
+  publisher_.emplace(viewer_, input.num_frames, info_);
+  if (is_again) publisher_->reset();
+}
 
 void LiveControl::show(const FrameImages& input, const TrackingResult& result) {
-  publisher_.tell(system_, input, result);
+  publisher_->tell(parts_->system, input, result);
 }
 
 void LiveControl::show(const FrameRecord& record) {
   const bool was_fed =
       record.state != FrameState::kUnreadable && record.state != FrameState::kDropped;
-  if (!was_fed) publisher_.skip(record);
+  if (!was_fed) publisher_->skip(record);
 }
 
 bool LiveControl::should_stop(const std::function<bool()>& is_interrupted) {
   take_requests();
-  while (parts_.is_paused && !is_stopped_ && !is_interrupted()) {
+  while (parts_->is_paused && !is_stopped_ && !is_interrupted()) {
     std::this_thread::sleep_for(kPollInterval);
-    parts_.autosave.update(system_.map());
+    parts_->autosave.update(parts_->system.map());
     take_requests();
   }
   return is_stopped_ || is_interrupted();
@@ -57,26 +76,30 @@ void LiveControl::tell_problem() {
 }
 
 void LiveControl::answer(const ViewRequest& request) {
+  if (!parts_) {  // All else is refused by the viewer.
+    is_stopped_ |= request.kind == ViewRequest::Kind::kStop;
+    return;
+  }
   switch (request.kind) {
     case ViewRequest::Kind::kPause:
-      parts_.is_paused = true;
-      publisher_.set_phase(SessionPhase::kPaused);
+      parts_->is_paused = true;
+      publisher_->set_phase(SessionPhase::kPaused);
       break;
     case ViewRequest::Kind::kResume:
-      parts_.is_paused = false;
-      publisher_.set_phase(SessionPhase::kRunning);
+      parts_->is_paused = false;
+      publisher_->set_phase(SessionPhase::kRunning);
       break;
     case ViewRequest::Kind::kReset:
-      system_.reset();
-      parts_.images.begin_anew();
-      publisher_.reset();
-      if (parts_.is_paused) publisher_.set_phase(SessionPhase::kPaused);
+      parts_->system.reset();
+      parts_->images.begin_anew();
+      publisher_->reset();
+      if (parts_->is_paused) publisher_->set_phase(SessionPhase::kPaused);
       break;
     case ViewRequest::Kind::kMappingOn:
     case ViewRequest::Kind::kMappingOff: {
       const bool is_on = request.kind == ViewRequest::Kind::kMappingOn;
-      system_.set_mapping(is_on);
-      publisher_.set_mapping(is_on);
+      parts_->system.set_mapping(is_on);
+      publisher_->set_mapping(is_on);
       break;
     }
     case ViewRequest::Kind::kSave:
@@ -94,18 +117,18 @@ void LiveControl::answer(const ViewRequest& request) {
 }
 
 void LiveControl::send_image(const ViewRequest& request) {
-  const Keyframe* keyframe = system_.map()->keyframes().find(request.keyframe);
+  const Keyframe* keyframe = parts_->system.map()->keyframes().find(request.keyframe);
   viewer_.reply(
-      {request, "", "", keyframe ? parts_.images.image_of(request.keyframe, *keyframe) : nullptr});
+      {request, "", "", keyframe ? parts_->images.image_of(request.keyframe, *keyframe) : nullptr});
 }
 
 void LiveControl::save(const ViewRequest& request) {
-  if (system_.map()->keyframes().is_empty()) {
+  if (parts_->system.map()->keyframes().is_empty()) {
     viewer_.reply({request, "", "there is no map yet"});
     return;
   }
-  parts_.autosave.save_soon([this, request](const std::string& error) {
-    viewer_.reply({request, error.empty() ? parts_.autosave.path().string() : "", error});
+  parts_->autosave.save_soon([this, request](const std::string& error) {
+    viewer_.reply({request, error.empty() ? parts_->autosave.path().string() : "", error});
   });
 }
 

@@ -6,6 +6,7 @@
 #include <string>
 
 #include "reporter.h"
+#include "waymark/calibrate/calibrate.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/session/image_keeper.h"
@@ -15,27 +16,28 @@
 
 namespace waymark {
 
-/// What of a session, besides the system, follows what people ask for.
+/// What of a session follows what people ask for.
 struct ControlledParts {
+  System& system;
   Autosave& autosave;
   ImageKeeper& images;
   std::atomic<bool>& is_paused;  ///< Read by the thread that reads the input, too.
 };
 
-/// Shows a running session in the browser and does what people ask for there.
+/// Shows a running session in the browser and does what people ask for there. The page is there
+/// before the session is: opening the input and finding its calibration may take long.
 class LiveControl {
  public:
-  LiveControl(const ViewerOptions& options,
-              SessionInfo info,
-              System& system,
-              const ControlledParts& parts,
-              std::optional<std::size_t> num_frames,
-              Reporter& reporter);
+  LiveControl(const ViewerOptions& options, SessionInfo info, Reporter& reporter);
   ~LiveControl() { tell_problem(); }
   LiveControl(const LiveControl&) = delete;
   LiveControl& operator=(const LiveControl&) = delete;
 
   std::string url() const { return viewer_.url(); }
+  /// Lets the page tell what a calibration does, and end it.
+  CalibrateOptions shown(CalibrateOptions options);
+  /// The session begins, in place of the one before; it is used until its input ends or finish().
+  void begin(const ControlledParts& parts, const InputInfo& input);
   /// A frame was fed.
   void show(const FrameImages& input, const TrackingResult& result);
   /// A frame is done; for those that were not fed.
@@ -43,10 +45,12 @@ class LiveControl {
   /// Does what was asked for since; while paused it only returns to say that all is over.
   bool should_stop(const std::function<bool()>& is_interrupted);
   bool is_stopped() const { return is_stopped_; }
-  void finishing() { publisher_.set_phase(SessionPhase::kFinishing); }
-  void finish() { publisher_.finish(system_); }
+  void finishing() { publisher_->set_phase(SessionPhase::kFinishing); }
+  void finish() { publisher_->finish(parts_->system); }
 
  private:
+  /// Tells what is done before there is a session.
+  void prepare(const std::string& doing);
   void take_requests();
   /// Warns of what went wrong in the viewer, if anything did.
   void tell_problem();
@@ -54,10 +58,10 @@ class LiveControl {
   void save(const ViewRequest& request);
   void send_image(const ViewRequest& request);
 
-  System& system_;
-  const ControlledParts parts_;
+  SessionInfo info_;
   Viewer viewer_;
-  ViewPublisher publisher_;
+  std::optional<ControlledParts> parts_;  ///< Nothing: there is no session yet.
+  std::optional<ViewPublisher> publisher_;
   Reporter& reporter_;
   bool is_stopped_ = false;
 };

@@ -15,9 +15,12 @@
 #include <vector>
 
 #include "commands.h"
+#include "paths.h"
+#include "python_tool.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
+#include "waymark/exchange/config_file.h"
 
 namespace waymark {
 namespace {
@@ -39,6 +42,16 @@ void check_command_name(const CLI::App& program, const std::vector<std::string>&
     known += (known.empty() ? "" : ", ") + command->get_name();
   }
   throw InputError("command line", fmt::format("unknown command '{}', expected {}", name, known));
+}
+
+/// "waymark map merge": as far as the command line was understood.
+std::string name_of(const CLI::App& program) {
+  std::string name = program.get_name();
+  for (const CLI::App* below = &program; !below->get_subcommands().empty();) {
+    below = below->get_subcommands().front();
+    name += " " + below->get_name();
+  }
+  return name;
 }
 
 int run_program(const std::vector<std::string>& arguments) {
@@ -67,14 +80,24 @@ int run_program(const std::vector<std::string>& arguments) {
   add_config_command(program, command);
   add_markers_command(program, command);
 
+  std::vector<std::string> words;
+  CLI::App& help = *program.add_subcommand("help", "Say what a command does, and its options");
+  help.add_option("COMMAND", words, "As it is given, with its task if it has some");
+  help.callback([&] {
+    words.push_back("--help");
+    command = [&] { return run_program(words); };
+  });
+
   check_command_name(program, arguments);
   try {
     program.parse(std::vector<std::string>(arguments.rbegin(), arguments.rend()));
   } catch (const CLI::Success& help_or_version) {
     return program.exit(help_or_version);
   } catch (const CLI::ParseError& error) {
-    return fail(kBadInput, fmt::format("command line: {}, see waymark --help", error.what()));
+    return fail(kBadInput,
+                fmt::format("command line: {}, see {} --help", error.what(), name_of(program)));
   }
+  protect_inputs(program);
   return command();
 }
 
@@ -88,6 +111,7 @@ int main(int argc, char** argv) {
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);
   waymark::silence_libraries();
+  waymark::set_slam_settings_reader(waymark::read_settings_by_tool);
   try {
     const int status = waymark::run_program({argv + 1, argv + argc});
     if (status == waymark::kDone || status == waymark::kNoPose) waymark::check_standard_output();

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "paths.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/exchange/align_map.h"
@@ -79,16 +80,16 @@ void add_align_task(CLI::App& maps, Command& command) {
   const auto options = std::make_shared<AlignOptions>();
   CLI::App& added =
       *maps.add_subcommand("align", "Scale a map, level it, or put it where a trajectory is");
-  added.add_option("MAP", options->map, "Map file (.wmap)")->required();
-  added.add_option("-o,--out", options->out, "Map file to write")->required();
+  reads(added.add_option("MAP", options->map, "Map file (.wmap)"))->required();
+  writes(added.add_option("-o,--out", options->out, "Map file to write"))->required();
   added
       .add_option("--distance",
                   options->distances,
                   "ID_A ID_B METRES: how far apart two keyframes are, or landmarks (L and the id); "
                   "may be repeated")
       ->type_size(3);
-  added.add_option(
-      "--trajectory", options->trajectory, "Poses of camera 0 (TUM, EuRoC csv, KITTI)");
+  reads(added.add_option(
+      "--trajectory", options->trajectory, "Poses of camera 0 (TUM, EuRoC csv, KITTI)"));
   added.add_option("--up", options->up, "X,Y,Z: what is up in the largest sub-map; becomes +z")
       ->delimiter(',')
       ->expected(3);

@@ -8,6 +8,7 @@
 #include <string>
 
 #include "input_command.h"
+#include "waymark/base/text.h"
 #include "waymark/report/advice.h"
 #include "waymark/session/quality.h"
 
@@ -17,7 +18,8 @@ namespace {
 /// A line for all, and one for each that was left out.
 void report_markers(Reporter& reporter, const MarkerSummary& markers) {
   const auto used = std::ranges::count(markers.markers, "used", &MarkerSummary::Entry::verdict);
-  std::string line = fmt::format("{} markers found, {} used", markers.markers.size(), used);
+  std::string line =
+      fmt::format("{} found, {} used", count_of(markers.markers.size(), "marker"), used);
   if (markers.frame == "none") line += "; they do not tell the scale of the map";
   if (markers.frame == "scale") line += "; the map is in metres by them";
   if (markers.frame == "marker 0") line += "; the map is in metres, in the frame of marker 0";
@@ -39,16 +41,15 @@ void report_results(Reporter& reporter,
   const RunSummary& summary = results.summary;
   const FrameCounts& counts = summary.counts;
   reporter.info(
-      fmt::format("{} of {} frames have a pose ({} unreadable, {} dropped), lost {} times; {} "
-                  "keyframes, {} landmarks, {} sub-maps",
+      fmt::format("{} of {} frames have a pose ({} unreadable, {} dropped), lost {}; {}, {}, {}",
                   counts.tracked,
                   counts.frames,
                   counts.unreadable,
                   counts.dropped,
-                  counts.lost_count,
-                  summary.keyframes,
-                  summary.landmarks,
-                  summary.submaps));
+                  count_of(counts.lost_count, "time"),
+                  count_of(summary.keyframes, "keyframe"),
+                  count_of(summary.landmarks, "landmark"),
+                  count_of(summary.submaps, "sub-map")));
   report_reasons(reporter, results.table, summary);
   if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
   if (summary.markers) report_markers(reporter, *summary.markers);
@@ -59,7 +60,8 @@ void report_results(Reporter& reporter,
                     (out / "view_mask.png").string()));
   }
   const double num_frames = static_cast<double>(std::max<std::size_t>(counts.frames, 1));
-  reporter.info(fmt::format("{}: {:.1f} ms per frame, of which tracking {:.1f} ms; results in {}",
+  // Frames overlap: each may take longer than there is from one to the next.
+  reporter.info(fmt::format("{}: {:.1f} ms per frame, tracking one takes {:.1f} ms; results in {}",
                             format_duration(summary.wall_s),
                             1e3 * summary.wall_s / num_frames,
                             summary.tracking_ms.mean,

@@ -17,7 +17,7 @@ int main(int argc, char** argv) {
   }
   try {
     waymark::StoredMap stored = waymark::load_map(argv[1]);
-    stored.map = waymark::repeat_map(*stored.map, std::strtoul(argv[2], nullptr, 10), false);
+    stored.map = waymark::repeat_map(*stored.map, std::strtoul(argv[2], nullptr, 10));
     stored.images.clear();
     waymark::save_map(argv[3], stored);
   } catch (const std::exception& error) {

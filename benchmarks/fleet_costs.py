@@ -38,7 +38,7 @@ def costs_of_linking(url, contents, shared, costs):
     """Looks for shared places and links the tiles in `contents` and `shared`."""
     tiles = contents["tiles"]
     num_keyframes = sum(tile["num_keyframes"] for tile in tiles)
-    places, seconds = timed(_waymark._Places, url, contents)
+    places, seconds = timed(_waymark._Places, url, contents, 0, len(tiles))
     costs["open_places_s_per_keyframe"] = seconds / num_keyframes
     alike = [timed(places.alike, i) for i in range(len(tiles))]
     costs["seek_s_per_keyframe"] = sum(seconds for _, seconds in alike) / num_keyframes

@@ -32,18 +32,13 @@ inline void copy_features(MapParts& parts, std::size_t num_recognised, Rng& rng)
 }
 
 /// A large map from a small one: it again and again, as further sub-maps, until there are so many
-/// keyframes.
-/// \param looks_alike  whether the copies have its descriptors; else they have random ones, so that
-///                     nothing is recognised there.
-inline std::shared_ptr<const Map> repeat_map(const Map& map,
-                                             std::size_t num_keyframes,
-                                             bool looks_alike) {
+/// keyframes. The copies have random descriptors, so that nothing is recognised there.
+inline std::shared_ptr<const Map> repeat_map(const Map& map, std::size_t num_keyframes) {
   Rng rng(0, 0);
   MapParts parts;
   while (parts.keyframes.size() < num_keyframes) append_parts(map, parts);
-  copy_features(parts, looks_alike ? parts.keyframes.size() : map.keyframes().size(), rng);
-  const std::size_t num_landmarks = looks_alike ? parts.landmarks.size() : map.landmarks().size();
-  for (std::size_t i = num_landmarks; i < parts.landmarks.size(); ++i) {
+  copy_features(parts, map.keyframes().size(), rng);
+  for (std::size_t i = map.landmarks().size(); i < parts.landmarks.size(); ++i) {
     parts.landmarks[i].landmark.appearance.descriptor = random_descriptor(rng);
   }
   return Map::restore(std::move(parts)).freeze();

@@ -20,11 +20,11 @@
 #include "town_saving.h"
 #include "town_scene.h"
 #include "waymark/base/rng.h"
-#include "waymark/loop/beside.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/find.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/loop/spread_drift.h"
+#include "waymark/loop/loop_pose_graph.h"
+#include "waymark/loop/spatial_neighbours.h"
 #include "waymark/map/parts.h"
 #include "waymark/simulate/testing/town_map.h"
 #include "waymark/simulate/testing/town_session.h"
@@ -97,18 +97,19 @@ void find_alike_keyframes(benchmark::State& state) {
 
 void find_beside_keyframe(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
-  constexpr BesideOptions kOptions = {.num_known_steps = 1, .distance = 0.6, .angle_rad = 0.5};
+  constexpr SpatialNeighbourOptions kOptions = {
+      .num_known_steps = 1, .distance = 0.6, .angle_rad = 0.5};
   SomeKeyframes some(scene);
   for (auto _ : state) {
-    benchmark::DoNotOptimize(find_beside(*scene.town.map, some.next(), kOptions));
+    benchmark::DoNotOptimize(find_spatial_neighbours(*scene.town.map, some.next(), kOptions));
   }
 }
 
 void find_way(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
-  const LoopEdge& revisit = scene.town.revisits.back();
+  const LoopEdge& candidate = scene.town.revisits.back();
   for (auto _ : state) {
-    benchmark::DoNotOptimize(shortest_way(*scene.town.map, revisit.from, revisit.to));
+    benchmark::DoNotOptimize(shortest_way(*scene.town.map, candidate.from, candidate.to));
   }
 }
 
@@ -164,17 +165,18 @@ void go_on(benchmark::State& state) {
                                     static_cast<double>(scene.settings.num_keyframes);
 }
 
-/// A revisit that is no loop edge yet, half a metre off.
+/// A candidate that is no loop edge yet, half a metre off.
 LoopEdge drifted_loop(const TownScene& scene) {
   LoopEdge loop = scene.town.revisits.back();
   loop.to_from_from.translation.x() += 0.5;
   return loop;
 }
 
-void spread_drift_of_loop(benchmark::State& state) {
+void optimize_loop_of_town(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
   const PeakCounter peak(state);
-  for (auto _ : state) benchmark::DoNotOptimize(spread_drift(*scene.town.map, drifted_loop(scene)));
+  for (auto _ : state)
+    benchmark::DoNotOptimize(optimize_loop(*scene.town.map, drifted_loop(scene)));
 }
 
 void apply_correction_to_all(benchmark::State& state) {
@@ -196,7 +198,7 @@ void fuse_all_overlaps(benchmark::State& state) {
   const TownScene& scene = closed_scene(state);
   for (auto _ : state) {
     Map map = Map::thaw(*scene.town.map);
-    ProjectionMatcher matcher(scene.town.rig);
+    ProjectionMatcher matcher;
     DirtyLandmarks dirty;
     fuse_overlaps(map, matcher, dirty);
   }
@@ -218,8 +220,8 @@ void check_map(benchmark::State& state) {
   for (auto _ : state) benchmark::DoNotOptimize(scene.town.map->broken_invariants());
 }
 
-/// The revisit that ends the way of a map whose loops are open, found by looks: all that the mapper
-/// does before it takes the next keyframe.
+/// The candidate that ends the way of a map whose loops are open, found by looks: all that the
+/// mapper does before it takes the next keyframe.
 void close_first_loop(benchmark::State& state) {
   const TownScene& scene = scene_of(static_cast<std::size_t>(state.range(0)), false);
   const PeakCounter peak(state);
@@ -229,10 +231,10 @@ void close_first_loop(benchmark::State& state) {
     GlobalMapper mapper(scene.town.rig, {}, {}, {.refine = "off"}, 1);
     mapper.take_over(scene.snapshot);
     state.ResumeTiming();
-    for (auto revisit = scene.town.revisits.rbegin();
-         num_loops == 0 && revisit != scene.town.revisits.rend();
-         ++revisit) {
-      num_loops += mapper.close_alike(revisit->to);
+    for (auto candidate = scene.town.revisits.rbegin();
+         num_loops == 0 && candidate != scene.town.revisits.rend();
+         ++candidate) {
+      num_loops += mapper.close_alike(candidate->to);
     }
   }
   state.counters["loops"] = num_loops;
@@ -247,7 +249,7 @@ void register_all(std::int64_t num_keyframes) {
   add("all/index_places", index_places, 1);
   add("one/find_place", find_place, 0);
   add("one/find_alike", find_alike_keyframes, 0);
-  add("one/find_beside", find_beside_keyframe, 0);
+  add("one/find_spatial_neighbours", find_beside_keyframe, 0);
   add("one/find_way", find_way, 0);
   add("one/erase_keyframe", erase_one_keyframe, 50);
   add("one/freeze", freeze_map, 0);
@@ -257,7 +259,7 @@ void register_all(std::int64_t num_keyframes) {
   add("all/check", check_map, 1);
   register_saving_steps(num_keyframes);
   add("all/fuse_overlaps", fuse_all_overlaps, 1);
-  add("all/spread_drift", spread_drift_of_loop, 1);
+  add("all/optimize_loop", optimize_loop_of_town, 1);
   add("all/adjust", adjust_all, 1);
   add("all/close_loop", close_first_loop, 1);
   register_loop_steps(num_keyframes);

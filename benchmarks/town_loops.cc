@@ -102,21 +102,21 @@ ClosedLoops close_in_turn(const TownMap& town,
   GlobalMapper mapper(town.rig, {}, {}, {.refine = "off"}, 1);
   mapper.take_over(snapshot);
   for (const LoopEdge& loop : loops) {
-    Revisit revisit;
-    revisit.query = loop.to;
-    revisit.match = loop.from;
-    revisit.query_from_match = loop.to_from_from;
-    mapper.close(revisit);
+    LoopCandidate candidate;
+    candidate.query = loop.to;
+    candidate.match = loop.from;
+    candidate.query_from_match = loop.to_from_from;
+    mapper.close(candidate);
   }
   return {error_after(town, as_mapped(mapper.map())), mapper.map().measured_loop_edges().size()};
 }
 
 bool is_plausible(const Map& map, const LoopEdge& loop) {
-  Revisit revisit;
-  revisit.query = loop.to;
-  revisit.match = loop.from;
-  revisit.query_from_match = loop.to_from_from;
-  return is_plausible_loop(map, revisit);
+  LoopCandidate candidate;
+  candidate.query = loop.to;
+  candidate.match = loop.from;
+  candidate.query_from_match = loop.to_from_from;
+  return is_plausible_loop(map, candidate);
 }
 
 /// 200 false loops among 500 true ones, where odometry drifts ten times as much as in the other

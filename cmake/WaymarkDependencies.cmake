@@ -12,15 +12,16 @@ if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_FUZZERS)
 endif()
 find_package(PkgConfig REQUIRED)
 pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
+if(WAYMARK_VIDEO)
+  pkg_check_modules(libav REQUIRED IMPORTED_TARGET libavformat libavcodec libavutil libswscale)
+endif()
 # Of bags of ROS.
 pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)
 pkg_check_modules(sqlite3 REQUIRED IMPORTED_TARGET sqlite3)
 find_package(BZip2 REQUIRED) # Debian 12 has no pkg-config file of it.
-if(WAYMARK_BUILD_TESTS OR WAYMARK_BUILD_BENCHMARKS)
-  find_package(Ceres 2.1 REQUIRED) # To compare with.
-endif()
 if(WAYMARK_BUILD_TESTS)
+  find_package(Ceres 2.1 REQUIRED) # To compare with.
   find_package(GTest REQUIRED)
   include(GoogleTest)
 endif()

@@ -33,5 +33,9 @@ install(EXPORT waymark-targets NAMESPACE waymark:: DESTINATION "${package_folder
 install(FILES packaging/waymark.1 DESTINATION "${CMAKE_INSTALL_MANDIR}/man1" COMPONENT program)
 install(FILES packaging/waymark.bash DESTINATION "${CMAKE_INSTALL_DATADIR}/bash-completion/completions"
         RENAME waymark COMPONENT program)
-install(FILES LICENSE README.md CHANGELOG.md docs/licenses.md viewer/dist/licenses.txt
+install(FILES LICENSE CHANGELOG.md docs/licenses.md viewer/dist/licenses.txt
         DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT documents)
+# The pages that messages of the program name (report/documentation.h).
+install(FILES README.md DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT program)
+install(DIRECTORY docs examples DESTINATION "${CMAKE_INSTALL_DOCDIR}" COMPONENT program
+        PATTERN "Doxyfile" EXCLUDE PATTERN "*.dox" EXCLUDE PATTERN "*.css" EXCLUDE PATTERN "__pycache__" EXCLUDE)

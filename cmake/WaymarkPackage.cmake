@@ -30,6 +30,7 @@ set(CPACK_DEBIAN_PACKAGE_CONTROL_STRICT_PERMISSION ON)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_NAME waymark)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SECTION science)
 set(CPACK_DEBIAN_PROGRAM_PACKAGE_SHLIBDEPS ON)
+set(CPACK_DEBIAN_PROGRAM_PACKAGE_RECOMMENDS "python3-waymark (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})") # For fleet and import.
 set(CPACK_COMPONENT_PROGRAM_DESCRIPTION "visual SLAM for any camera
 Waymark finds out from images where a camera was and what the place looks like.
 The camera may be perspective, fisheye or 360 degrees, alone, one of a stereo
@@ -39,7 +40,7 @@ grow, saved, joined, extended, and exported to COLMAP, nerfstudio and PLY.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libeigen3-dev, libopencv-dev, libyaml-cpp-dev, libfmt-dev, libhwy-dev, libbz2-dev, liblz4-dev, libzstd-dev, libsqlite3-dev, pkg-config")
+    "libeigen3-dev, libopencv-dev, libavformat-dev, libavcodec-dev, libswscale-dev, libyaml-cpp-dev, libfmt-dev, libhwy-dev, libbz2-dev, liblz4-dev, libzstd-dev, libsqlite3-dev, pkg-config")
 set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS "waymark (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "visual SLAM for any camera, libraries to build with
 Waymark finds out from images where a camera was and what the place looks like.
@@ -56,6 +57,7 @@ if("python" IN_LIST CPACK_COMPONENTS_ALL) # An extension fits one version of Pyt
   math(EXPR next_minor "${Python3_VERSION_MINOR} + 1")
   set(CPACK_DEBIAN_PYTHON_PACKAGE_DEPENDS
       "python3 (>= 3.${Python3_VERSION_MINOR}~), python3 (<< 3.${next_minor}), python3-numpy")
+  set(CPACK_DEBIAN_PYTHON_PACKAGE_RECOMMENDS "python3-msgpack") # Of waymark.importing.
   set(CPACK_DEBIAN_PYTHON_PACKAGE_SUGGESTS "python3-distributed, python3-fsspec") # Of waymark.fleet.
 endif()
 set(CPACK_COMPONENT_PYTHON_DESCRIPTION "visual SLAM for any camera, Python module

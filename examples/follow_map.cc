@@ -83,7 +83,7 @@ int follow(const char* path, const char* camchain) {
       print_changes(*map, *system.map());
       map = system.map();
     }
-    if (result.world_from_rig) print_pose(*map, result, system.details().pose);
+    if (result.world_from_rig) print_pose(*map, result, result.pose);
   }
   system.finish();
   print_changes(*map, *system.map());

@@ -13,7 +13,6 @@
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/exchange/config_file.h"
-#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/image/frame_builder.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/input/image_times.h"
@@ -44,8 +43,6 @@ constexpr std::array kReaders = {read_own,
                                  waymark::read_opencv_calibration,
                                  waymark::read_ros_calibration,
                                  waymark::read_colmap_calibration,
-                                 waymark::read_openvslam_settings,
-                                 waymark::read_orbslam_settings,
                                  waymark::read_nerfstudio_calibration,
                                  read_any,
                                  read_list};

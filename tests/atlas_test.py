@@ -2,10 +2,15 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """Maps cut into tiles, put together again, and images found in them."""
+import pathlib
 import sqlite3
+import subprocess
+import sys
 import unittest
 
-from cli_support import NUM_FRAMES, CliTest, waymark
+from cli_support import NUM_FRAMES, PROGRAM, CliTest, waymark
+
+WRITERS = pathlib.Path(__file__).resolve().parents[1] / "benchmarks/atlas_writers.py"
 
 
 class Atlas(CliTest):
@@ -55,7 +60,7 @@ class Atlas(CliTest):
         self.make_map("a", self.sequence("mono"))
         atlas = self.folder / "atlas"
         said = self.task("map", "tile", self.path("a"), "-o", atlas, "--keyframes", 8)
-        self.assertIn("tiles", said)
+        self.assertRegex(said, r": \d+ tiles?\n")
         state = (atlas / "atlas.db").read_bytes()
         self.assertEqual(self.task("map", "tile", self.path("a"), "-o", atlas, "--keyframes", 8), said)
         self.assertEqual((atlas / "atlas.db").read_bytes(), state)
@@ -67,6 +72,37 @@ class Atlas(CliTest):
         self.assertIn("1 connected part\n", self.task("atlas", "info", atlas))
         self.task("atlas", "export", atlas, "-o", self.path("both"))
         self.assertIn("in metres", self.task("map", "info", self.path("both")))
+
+    def test_many_writers(self):
+        """Some are killed; all of one new atlas are heard."""
+        source = self.sequence("stereo")
+        for name, first in (("a", 0), ("b", 12), ("c", 24)):
+            self.make_map(name, source, "--first", first, "--frames", 14)
+        maps = [self.path(name) for name in "abc"]
+        done = subprocess.run([sys.executable, "-B", WRITERS, *maps, "--program", PROGRAM, "--rounds", "4"],
+                              capture_output=True, text=True, timeout=300)
+        self.assertEqual(done.returncode, 0, done.stdout + done.stderr)
+        atlas = self.folder / "new"
+        adding = [subprocess.Popen([PROGRAM, "atlas", "add", atlas, path], stderr=subprocess.PIPE, text=True) for path in maps]
+        for one in adding:
+            message = one.communicate()[1]
+            self.assertEqual(one.returncode, 0, message)
+        self.assertEqual(len(self.rows(atlas, "checksum", "recording")), 3)
+        self.assertIn("sound", self.task("atlas", "check", atlas))
+
+    def test_damaged_tiles_are_noticed(self):
+        self.make_map("a", self.sequence("mono"))
+        atlas = self.folder / "atlas"
+        arguments = ("map", "tile", self.path("a"), "-o", atlas)
+        self.task(*arguments)
+        state = self.rows(atlas, "*", "tile")
+        for damage in (lambda tile: tile.unlink(), lambda tile: tile.write_bytes(tile.read_bytes()[:-100])):
+            for command in (arguments, ("atlas", "add", atlas, self.path("a"))):
+                for pattern in ("*.wmap", "*.places"):
+                    damage(next((atlas / "tiles").glob(pattern)))
+                self.task(*command)
+                self.assertIn("sound", self.task("atlas", "check", atlas))
+        self.assertEqual(self.rows(atlas, "*", "tile"), state)
 
     def test_wrong_input(self):
         self.assert_fails(waymark("atlas", "info", self.folder), 2, "atlas.db")

@@ -61,7 +61,7 @@ class Calibrate(unittest.TestCase):
         self.assertIn("model: perspective\nwhy: the motion tells\nfocal length: ", done.stdout)
         self.assertEqual(out.read_text(), expected)
         done = waymark("config", out)
-        self.assertEqual(done.stdout, "valid: 1 cameras\n", done.stderr)
+        self.assertEqual(done.stdout, "valid: 1 camera\n", done.stderr)
 
     def test_a_map_tells_the_calibration_of_a_query(self):
         camera, told = self.folder / "camera.yaml", self.folder / "told.yaml"
@@ -85,6 +85,35 @@ class Calibrate(unittest.TestCase):
             done = waymark("localize", map_file, self.images, *options, "-o", out)
             self.assertEqual(done.returncode, 0, done.stderr)
             self.assertFalse((out / "calibration.yaml").exists())
+
+    def test_images_that_are_resized_or_turned(self):
+        """The calibration that is found is stated of the images as they are, and so is what the next run is given."""
+        map_file, told = self.folder / "small.wmap", self.folder / "wrong.yaml"
+        told.write_text(CAMERA.replace("[280, 280,", "[288.4, 288.4,"))
+        for options in (["--resize", 320], ["--resize", 240, "--rotate", 90]):
+            out = self.folder / "changed"
+            done = waymark("run", self.images, *options, "--map-out", map_file, "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("calibration estimated: ", done.stderr)
+            found = out / "calibration.yaml"
+            self.assertIn("resolution: [400, 300]", found.read_text())
+            self.check(found.read_text())
+            kept = self.folder / "kept.yaml"
+            shutil.copy(found, kept)
+            done = waymark("run", self.images, *options, "-c", kept, "-o", out)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            for calibration in ([], ["-c", told], ["--unordered"]):
+                done = waymark("localize", map_file, self.images, *options, *calibration, "-o", out)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                self.assertEqual("once more with what the images tell" in done.stderr, "-c" in calibration, done.stderr)
+                if "-c" in calibration:
+                    self.assertIn("resolution: [400, 300]", found.read_text())
+                    self.check(found.read_text())
+                self.assertEqual(json.loads((out / "summary.json").read_text())["localized"], 60)
+            done = waymark("calibrate", self.images, *options, "-o", kept)
+            self.assertEqual(done.returncode, 0, done.stderr)
+            self.assertIn("images: as turned or resized, ", done.stdout)
+            self.check(kept.read_text())
 
     def test_what_cannot_tell(self):
         done = waymark("calibrate", self.images, "--frames", 1)

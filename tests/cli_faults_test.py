@@ -71,7 +71,7 @@ class BadInput(CliTest):
         done = self.run_on(source, "-c", source / "camchain.yaml")
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn(f"frame 9: used without depth ({depth}: unreadable", done.stderr)
-        self.assertIn("used with camera 0 alone, as other files could not be read: 1 frames", done.stderr)
+        self.assertIn("used with camera 0 alone, as other files could not be read: 1 frame", done.stderr)
         self.assertEqual(self.frames()[9]["state"], "tracked")
 
     def test_first_image_contradicts_the_calibration(self):
@@ -195,6 +195,8 @@ class BadInput(CliTest):
             write_png(image, width, height)
         done = self.run_on(source, "-c", self.folder / "camchain.yaml")
         self.assertEqual(done.returncode, 3, done.stderr)
+        self.assertNotIn("reprojection error", done.stderr)
+        self.assertNotIn("quality", self.summary())
         self.assertEqual(self.summary()["tracked"], 0)
         self.assertIsNone(self.summary()["initialized_at"])
         self.assertEqual({f["reason"] for f in self.frames()}, {"no_features"})

@@ -94,6 +94,16 @@ def shared_sequence(setup):
                      "--frames", NUM_FRAMES, files=(("camera.yaml", CAMERA),))
 
 
+def users_case(name):
+    """A folder with a small input as users have it, not to be changed; skips the test where it is not there."""
+    if "WAYMARK_CASES" not in os.environ:
+        raise unittest.SkipTest("needs WAYMARK_CASES, the folder of small inputs of users")
+    folder = pathlib.Path(os.environ["WAYMARK_CASES"]) / name
+    if not folder.is_dir():
+        raise unittest.SkipTest(f"WAYMARK_CASES lacks {name}")
+    return folder
+
+
 class CliTest(unittest.TestCase):
     """A folder per test, and simulated sequences made once for all programs of tests."""
 

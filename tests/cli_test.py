@@ -62,6 +62,20 @@ class Usage(CliTest):
         for option in ("MAP", "INPUT", "--config", "--unordered", "--out", "--first", "--verbose"):
             self.assertIn(option, text)
 
+    def test_help_of_commands(self):
+        self.assertEqual(waymark("help").stdout, waymark("--help").stdout)
+        self.assertEqual(waymark("help", "map", "merge").stdout, waymark("map", "merge", "--help").stdout)
+        self.assert_fails(waymark("help", "fly"), 2, "'fly'", "run, info")
+        text = waymark("help", "run").stdout
+        for part in ("Input:", "Cameras and settings:", "Part of the input:", "How it runs:", "Map:",
+                     "Results and messages:", "Examples:\n  waymark run MH_01_easy\n"):
+            self.assertIn(part, text)
+
+    def test_mistakes_name_the_help_of_their_command(self):
+        for mistake, command in ((("run",), "run"), (("run", "x", "--wings"), "run"), (("map", "fly"), "map"),
+                                 (("map", "merge", "a"), "map merge"), (("export", "m", "--split-views", 2), "export")):
+            self.assert_fails(waymark(*mistake), 2, f", see waymark {command} --help")
+
     def test_config_makes_a_camchain_of_other_calibrations(self):
         cameras = self.folder / "cameras.txt"
         cameras.write_text("1 OPENCV 640 480 500 501 320 240 -0.1 0.01 0 0\n")
@@ -70,7 +84,7 @@ class Usage(CliTest):
         self.assertIn("intrinsics: [500, 501, 319.5, 239.5]", result.stdout)
         camchain = self.folder / "camchain.yaml"
         camchain.write_text(result.stdout)
-        self.assertIn("valid: 1 cameras", waymark("config", camchain).stdout)
+        self.assertIn("valid: 1 camera", waymark("config", camchain).stdout)
         self.assert_fails(waymark("config", "--from", "ros", cameras), 2, "cameras.txt")
         self.assert_fails(waymark("config", "--from", "kalibr", cameras), 2, "--from")
         self.assert_fails(waymark("config", "--from", "ros"), 2, "expected one calibration")
@@ -198,7 +212,9 @@ class Inputs(CliTest):
         self.assertIn("gaps: none", waymark("info", source).stdout)
 
     def test_image_folder(self):
-        self.assert_maps(self.image_folder(), "-c", self.folder / "camchain.yaml")
+        source = self.image_folder()
+        self.assertIn("or found from the images of one camera", waymark("info", source).stdout)
+        self.assert_maps(source, "-c", self.folder / "camchain.yaml")
 
     def test_a_third_camera_is_said_to_be_ignored(self):
         source = self.sequence("stereo")

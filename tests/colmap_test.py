@@ -121,6 +121,11 @@ class Colmap(CliTest):
                 shutil.rmtree(self.folder)
                 self.folder.mkdir()
 
+    def test_undistorted(self):
+        folder, model = self.export("one", "--undistort")
+        self.assertEqual({name for name, _ in model.cameras.values()}, {"PINHOLE"})
+        self.check(folder, model, 0.02)
+
     def test_own_features(self):
         """Features that COLMAP finds itself are others: --clear_points takes ours away."""
         folder, model = self.export("one")

@@ -15,6 +15,8 @@ from cli_support import CliTest
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 sys.path.insert(0, str(ROOT / "script"))
 from documentation.blocks import Failure, Runner  # noqa: E402
+from documentation.chapters import check_chapters  # noqa: E402
+from documentation.glossary import check_glossary  # noqa: E402
 from documentation.links import broken  # noqa: E402
 from documentation.pages import Page, anchor_of  # noqa: E402
 
@@ -84,6 +86,89 @@ class Docs(unittest.TestCase):
         self.assertEqual(len(self.page("```sh\ntrue\n").faults), 1)
 
 
+class Chapters(unittest.TestCase):
+    """A small tree of two modules that share a chapter."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.write("CMakeLists.txt", "foreach(module simulate evaluate)")
+        for name in ("simulate/world.h", "simulate/world.cc", "simulate/world_test.cc", "simulate/test_world.h",
+                     "simulate/testing/town.h", "evaluate/chart-inl.h"):
+            self.write(f"src/waymark/{name}", "")
+        self.write("docs/conventions.md", "## Modules\n\n`simulate` `evaluate`\n")
+        self.write("docs/how-it-works/simulate.md", "`world`, `chart`, `testing/town`, `inline`, `a.b`, `f()`\n")
+        self.write("docs/decisions/simulate.md", "* `simulate/world`, `word`\n\n## 2026-11-21 · Then\n\n`simulate/gone`\n")
+
+    def write(self, name, text):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def test_what_is_named_is_there(self):
+        self.assertEqual(check_chapters(self.root), [])
+        self.write("docs/how-it-works/simulate.md", "`world.h`, `chart`\n\n`word`, `simulate/gone`\n```text\n`gone`\n```\n")
+        self.write("docs/decisions/simulate.md", "* `evaluate/gone`\n")
+        self.assertEqual(check_chapters(self.root),
+                         ["docs/how-it-works/simulate.md:3: there is no file word",
+                          "docs/how-it-works/simulate.md:3: there is no file simulate/gone",
+                          "docs/decisions/simulate.md:1: there is no file evaluate/gone"])
+
+    def test_what_is_there_is_named(self):
+        self.write("src/waymark/evaluate/plot.cc", "")
+        self.assertEqual(check_chapters(self.root), ["docs/how-it-works/simulate.md:1: does not name the file plot"])
+
+    def test_modules_are_those_of_cmake(self):
+        self.write("CMakeLists.txt", "foreach(module simulate evaluate view)")
+        (self.root / "src/waymark/view").mkdir()
+        self.assertEqual(check_chapters(self.root), ["docs/how-it-works/view.md:1: is missing",
+                                                     "docs/conventions.md:1: the modules are not those of CMakeLists.txt in their order"])
+
+
+class Glossary(unittest.TestCase):
+    """A small tree of one module, one header of which is public."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.write("docs/concepts.md", "A **widget**.\n\n## Glossary\n\n* **sub-map**, **Sim(3)**: a gadget.\n\n## More\n\n**gizmo**\n")
+        self.write("script/documentation/terms.txt",
+                   "# Words.\n\nclass\nreader\n\n# Words to be replaced, but not yet.\nkeeper  # store\n")
+        self.write("cmake/WaymarkPublicHeaders.cmake",
+                   "execute_process(COMMAND ${CMAKE_COMMAND} -E echo waymark/map/submap_reader.h)")
+        self.write("src/waymark/map/submap_reader.h",
+                   "class Widget;\nclass SubmapReader final : public Reader {\n public:\n  enum class Class { kA };\n"
+                   " private:\n  struct Shelf {};\n};\n\ntemplate <typename T>\nstruct Sim3Keeper {\n")
+        for name in ("readers-inl.h", "readers_test.cc", "testing/gizmo.h"):
+            self.write(f"src/waymark/map/{name}", "struct Gizmo {\n")
+
+    def write(self, name, text):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def test_words_of_glossary_and_list_pass(self):
+        self.assertEqual(check_glossary(self.root), [])
+
+    def test_other_words_are_named(self):
+        self.write("src/waymark/map/gizmo_keeper.cc", "")
+        self.write("src/waymark/map/submap_reader.h", "\nenum class RGBDWidget : int { kA };\n")
+        where = "is neither in the glossary of docs/concepts.md nor in script/documentation/terms.txt"
+        self.assertEqual(check_glossary(self.root),
+                         [f"src/waymark/map/gizmo_keeper.cc:1: gizmo of gizmo_keeper {where}",
+                          f"src/waymark/map/submap_reader.h:2: rgbd of RGBDWidget {where}",
+                          f"src/waymark/map/submap_reader.h:2: widget of RGBDWidget {where}"])
+
+    def test_list_is_sorted_and_says_what_replaces_words_in_use(self):
+        self.write("script/documentation/terms.txt", "reader\nclass\n# Words to be replaced\nkeeper\nshelf  # page\n")
+        self.assertEqual(check_glossary(self.root),
+                         ["script/documentation/terms.txt:2: class is not in its place, expected sorted words",
+                          "script/documentation/terms.txt:4: keeper has no comment that says what replaces it",
+                          "script/documentation/terms.txt:5: no name has shelf any more"])
+
+
 class Results(CliTest):
     """docs/results.md has every column, key, state and reason, and no others."""
 
@@ -106,7 +191,8 @@ class Results(CliTest):
     def test_page_and_program_agree(self):
         self.assertEqual(self.run_on(self.sequence("stereo")).returncode, 0)
         tables = self.tables()
-        self.assertEqual(tables["| column | meaning |"], set((self.out / "frames.csv").read_text().split("\n")[0].split(",")))
+        columns = set((self.out / "frames.csv").read_text().split("\n")[0].split(","))
+        self.assertEqual(tables["| column | meaning |"], columns | {"name"})
         keys = set(json.loads((self.out / "summary.json").read_text()))
         self.assertEqual(tables["| key | meaning |"], keys | {"calibration", "refined_calibration", "localized", "markers", "scales"})
         self.assertEqual(tables["| state | meaning |"], self.names_of("FrameState"))

@@ -12,6 +12,7 @@ import subprocess
 import unittest
 
 from cli_support import NUM_FRAMES, CliTest, write_png
+from viewer_client import ViewerClient
 
 FOLDER = pathlib.Path(os.environ["WAYMARK_EXAMPLES"])
 
@@ -88,6 +89,19 @@ class Examples(CliTest):
             self.assertEqual(int(change[1]), count)
         self.assertGreater(count, 1)
 
+    def test_shows_a_session(self):
+        with subprocess.Popen([FOLDER / "waymark_example_live_view", self.sequence("stereo"), "0"], stdin=subprocess.PIPE,
+                              stdout=subprocess.PIPE, text=True) as program:
+            url = re.fullmatch(r"open (http://\S+) in a browser\n", program.stdout.readline())[1]
+            client = ViewerClient(url)
+            client.wait_for(lambda c: c.status and c.status["phase"] == "done" and c.holds_what_status_says())
+            self.assertRegex(program.stdout.readline(), rf"^{client.status['keyframes']} keyframes\n$")
+            self.assertEqual((client.hello["setup"], client.status["tracked"]), ("stereo", NUM_FRAMES))
+            client.close()
+            program.stdin.close()
+            self.assertEqual(program.wait(60), 0)
+        self.assertEqual(run("live_view").returncode, 2)
+
     def test_reads_a_map(self):
         saved, points = self.mapped("stereo")[1], self.folder / "points.ply"
         done = run("read_map", saved, points)
@@ -100,7 +114,7 @@ class Examples(CliTest):
     def test_errors_are_one_line(self):
         for example, arguments in (("localize_images", ("none.wmap", "none.yaml", "a.png")),
                                    ("read_map", ("none.wmap", "a.ply")), ("follow_map", ("nowhere",)),
-                                   ("images_from_memory", ("none.yaml", 20)), ("map_images", ("no", "no.yaml"))):
+                                   ("images_from_memory", ("none.yaml", 20)), ("live_view", ("nowhere", 0)), ("map_images", ("no", "no.yaml"))):
             done = run(example, *arguments, cwd=self.folder)
             self.assertEqual(done.returncode, 1, done.stderr)
             self.assertRegex(done.stderr, r"^error: [^\n]+\n$")

@@ -3,6 +3,7 @@
 """Small readers and writers of other programs' formats, written after their documentation alone."""
 import math
 import random
+import sqlite3
 import struct
 
 
@@ -63,6 +64,59 @@ def small_msg(num_points=40):
             "landmarks": landmarks, "keyframe_next_id": 3, "landmark_next_id": num_points}
 
 
+def old_keys(document):
+    """The same map as OpenVSLAM of 2019 wrote it."""
+    del document["orb_params"]
+    document["frame_next_id"] = 9
+    for keyframe in document["keyframes"].values():
+        del keyframe["orb_params"]
+        keyframe.update(n_scale_levels=8, scale_factor=1.2, keypts=keyframe["undist_keypts"])
+    return document
+
+
+def other_camera(model, setup, **numbers):
+    document = small_msg(4)
+    document["cameras"]["cam"].update(model_type=model, setup_type=setup, **numbers)
+    if setup != "Monocular":
+        for keyframe in document["keyframes"].values():
+            keyframe["x_rights"] = [p["pt"][0] - 8.0 for p in keyframe["undist_keypts"]]
+            keyframe["depths"] = [5.0, 5.0, -1.0, 5.0]
+    return document
+
+
+def make_database(path, document):
+    """The same map in SQLite, as stella_vslam writes it."""
+    path.unlink(missing_ok=True)
+    base = sqlite3.connect(path)
+    numbers = ("cols", "rows", "fx", "fy", "cx", "cy", "k1", "k2", "p1", "p2", "k3", "k4", "focal_x_baseline", "distortion")
+    base.execute(f"CREATE TABLE cameras(id INTEGER PRIMARY KEY, name, setup_type, model_type, {', '.join(numbers)})")
+    for name, camera in document["cameras"].items():
+        base.execute(f"INSERT INTO cameras VALUES(1, ?, ?, ?{', ?' * len(numbers)})",
+                     (name, camera["setup_type"], camera["model_type"], *(camera.get(key) for key in numbers)))
+    base.execute("CREATE TABLE keyframes(id INTEGER PRIMARY KEY, ts, cam, pose_cw, n_keypts, undist_keypts, x_rights, "
+                 "depths, descs)")
+    base.execute("CREATE TABLE associations(id INTEGER PRIMARY KEY, lm_ids, span_parent, loop_edges)")
+    for number, keyframe in document["keyframes"].items():
+        points = keyframe["undist_keypts"]
+        blob = b"".join(struct.pack("<5f2i", *p["pt"], 31, p["ang"], 20, p["oct"], -1) for p in points)
+        x, y, z, w = keyframe["rot_cw"]
+        columns = [(*rotate((w, x, y, z), axis), 0) for axis in ((1, 0, 0), (0, 1, 0), (0, 0, 1))]
+        pose = struct.pack("<16d", *sum(columns, ()), *keyframe["trans_cw"], 1)
+        base.execute("INSERT INTO keyframes VALUES(?, ?, ?, ?, ?, ?, ?, ?, ?)", (
+            int(number), keyframe["ts"], "cam", pose, len(points), blob, b"", b"",
+            b"".join(struct.pack("<8I", *words) for words in keyframe["descs"])))
+        parent = keyframe["span_parent"]
+        base.execute("INSERT INTO associations VALUES(?, ?, ?, ?)", (
+            int(number), b"".join(struct.pack("<i", i) for i in keyframe["lm_ids"]), -1 if parent > 2**31 else parent,
+            b"".join(struct.pack("<i", i) for i in keyframe.get("loop_edges", []))))
+    base.execute("CREATE TABLE landmarks(id INTEGER PRIMARY KEY, pos_w, ref_keyfrm, n_vis, n_fnd)")
+    for number, landmark in document["landmarks"].items():
+        base.execute("INSERT INTO landmarks VALUES(?, ?, ?, ?, ?)", (
+            int(number), struct.pack("<3d", *landmark["pos_w"]), landmark["ref_keyfrm"], landmark["n_vis"], landmark["n_fnd"]))
+    base.commit()
+    base.close()
+
+
 def distort(k1, k2, p1, p2, k3, x, y):
     """Brown's lens."""
     r = x * x + y * y
@@ -75,7 +129,7 @@ class ColmapModel:
     """A model of perspective cameras in its text or binary form."""
 
     def __init__(self, folder, suffix):
-        self.cameras, self.images, self.points = {}, {}, {}
+        self.cameras, self.sizes, self.images, self.points = {}, {}, {}, {}
         if suffix == ".txt":
             self._read_text(folder)
         else:
@@ -89,6 +143,7 @@ class ColmapModel:
     def _read_text(self, folder):
         for row in self._rows(folder / "cameras.txt"):
             self.cameras[int(row[0])] = (row[1], list(map(float, row[4:])))
+            self.sizes[int(row[0])] = (int(row[2]), int(row[3]))
         rows = self._rows(folder / "images.txt")
         for head, body in zip(rows[::2], rows[1::2]):
             self.images[int(head[0])] = {
@@ -106,7 +161,7 @@ class ColmapModel:
         take = Taker((folder / "cameras.bin").read_bytes())
         for _ in range(take("<Q")):
             number, model = take("<I"), take("<i")
-            take("<QQ")
+            self.sizes[number] = tuple(take("<QQ"))
             self.cameras[number] = (models[model][0], list(take("<%dd" % models[model][1])))
         take.expect_end()
         take = Taker((folder / "images.bin").read_bytes())

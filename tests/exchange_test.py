@@ -12,6 +12,8 @@ import pathlib
 import struct
 import unittest
 
+import cv2
+
 from cli_support import CliTest, waymark, write_png
 from exchange_formats import ColmapModel, pack, read_ply, rotate, small_msg
 
@@ -188,6 +190,22 @@ class Recorded(ExchangeTest):
         rig, = json.loads((self.folder / "export/rig.json").read_text())
         self.assertEqual(rig["cameras"][1]["rel_tvec"], [-0.2, 0.003, 0.0])
 
+    def test_undistorted(self):
+        self.assertEqual(self.export("colmap", "--input", self.recording, "--undistort").returncode, 0)
+        model = ColmapModel(self.folder / "export/sparse/0", ".bin")
+        self.assertEqual({name for name, _ in model.cameras.values()}, {"PINHOLE"})
+        self.assertEqual(len(model.cameras), 2)
+        self.assertLess(rms(model.errors()), 1.0)
+        for image in model.images.values():
+            height, width, _ = cv2.imread(str(self.folder / "export/images" / image["name"])).shape
+            self.assertEqual((width, height), model.sizes[image["camera"]])
+        self.assertEqual(self.export("nerfstudio", "--input", self.recording, "--undistort").returncode, 0)
+        transforms = json.loads((self.folder / "export/transforms.json").read_text())
+        self.assertEqual(transforms["camera_model"], "PINHOLE")
+        self.assertNotIn("k1", transforms["frames"][0])
+        self.assert_refused(self.export("colmap", "--undistort", "--split-views", 6), "--undistort")
+        self.assert_refused(self.export("ply", "--undistort"), "--undistort")
+
     def test_frames_lie_on_the_trajectory(self):
         self.frames("colmap", "all")
         poses = [list(map(float, row.split())) for row in self.trajectory.read_text().split("\n")[:-1]]
@@ -233,7 +251,7 @@ class Import(Exchange):
         self.assertEqual(done.returncode, 0, done.stderr)
         self.assertIn("Mapping", done.stderr)
         camchain = self.config(done.stdout, "camchain.yaml")
-        self.assertIn("1 cameras", waymark("config", camchain).stdout)
+        self.assertIn("1 camera", waymark("config", camchain).stdout)
         waymark("import", "--settings", settings, "-o", self.folder / "again.yaml")
         self.assertEqual((self.folder / "again.yaml").read_text(), done.stdout)
         self.assertNotIn("its camera", self.import_map(small_msg(), "--settings", settings).stderr)

@@ -2,7 +2,8 @@
 # Copyright the Waymark authors.
 # SPDX-License-Identifier: Apache-2.0
 """A recorded stereo sequence of which images are missing or damaged and stamps are double is mapped almost as if it
-were whole, and what was made the best of is counted. Needs WAYMARK_DATA."""
+were whole, and what was made the best of is counted; with few images per second no pose is plainly wrong. Needs
+WAYMARK_DATA."""
 import json
 import os
 import pathlib
@@ -12,7 +13,8 @@ import unittest
 
 from cli_support import CliTest, truncate, waymark
 
-SEQUENCE = pathlib.Path(os.environ.get("WAYMARK_DATA", "")) / "kitti_00_stereo"
+DATA = pathlib.Path(os.environ.get("WAYMARK_DATA", ""))
+SEQUENCE, HOUSE = DATA / "kitti_00_stereo", DATA / "sim_house_rgbd"
 NUM_MISSING, NUM_DOUBLE = 20, 10
 
 
@@ -73,6 +75,18 @@ class Imperfect(CliTest):
         _, summary, messages = self.mapped(source)
         self.assertEqual((summary["unreadable"], summary["tracked"]), (1, summary["frames"] - 1))
         self.assertIn(f"{bad} (camera 0): unreadable", messages)
+
+
+@unittest.skipUnless(os.environ.get("WAYMARK_DATA") and HOUSE.is_dir(), "needs sim_house_rgbd in WAYMARK_DATA")
+class FewImages(CliTest):
+    def test_no_pose_is_plainly_wrong(self):
+        """At 1.5 images per second a narrow search finds the wrong ones of things that repeat."""
+        done = self.run_on(HOUSE, "-c", HOUSE / "camchain.yaml", "--every", "10")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertGreaterEqual(self.summary()["coverage"], 0.6)
+        judged = waymark("eval", self.out / "trajectory.txt", HOUSE / "groundtruth.txt", "--json")
+        self.assertEqual(judged.returncode, 0, judged.stderr)
+        self.assertLess(json.loads(judged.stdout)["ate_rmse_m"], 0.05)
 
 
 if __name__ == "__main__":

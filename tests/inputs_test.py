@@ -83,7 +83,7 @@ class Inputs(CliTest):
                 config = self.config(text, name)
                 self.assertEqual(self.trajectory(self.source, "-c", config, "--set", "calibration.refine=off"),
                                  self.trajectory(self.source, "-c", self.camchain, "--set", "calibration.refine=off"))
-                self.assertIn("valid: 1 cameras", waymark("config", config).stdout)
+                self.assertIn("valid: 1 camera", waymark("config", config).stdout)
         done = self.run_on(self.source, "-c", self.folder / "orbslam.yaml", "--frames", 3)
         self.assertIn("algorithms are ignored: ORBextractor", done.stderr)
 
@@ -119,12 +119,20 @@ class Inputs(CliTest):
         plain, tagged = self.folder / "plain.mp4", self.folder / "tagged.mp4"
         subprocess.run(["ffmpeg", "-v", "error", "-framerate", "20", "-i", self.source / "%06d.png", "-vf", "transpose=cclock",
                         "-c:v", "mpeg4", "-q:v", "2", plain], check=True)
-        subprocess.run(["ffmpeg", "-v", "error", "-i", plain, "-metadata:s:v", "rotate=90", "-c", "copy", tagged], check=True)
+        subprocess.run(["ffmpeg", "-v", "error", "-i", plain, "-metadata:s:v", "rotate=270", "-c", "copy", tagged], check=True)
+        shown = subprocess.run(["ffprobe", "-v", "error", "-show_streams", tagged], capture_output=True, text=True)
+        self.assertIn("rotation=-90\n", shown.stdout)  # To be turned clockwise, as phones have it.
         self.assertIn("240x376 px", waymark("info", plain).stdout)
         self.assertIn("376x240 px", waymark("info", tagged).stdout)
         upright = self.trajectory(tagged, "-c", self.camchain)
         self.assertEqual(upright, self.trajectory(plain, "-c", self.camchain_on_its_side(), "--rotate", 90))
         self.assertGreater(upright.count("\n"), 30)
+        sensor = self.camchain_on_its_side()
+        self.assertEqual(upright, self.trajectory(tagged, "-c", sensor))
+        lines = json.loads((self.out / "summary.json").read_text())["input"]
+        self.assertIn("note: the calibration is that of the sensor: turned clockwise by 90 degrees, as the video says of its "
+                      "pictures", lines)
+        self.assert_refused(waymark("run", plain, "-c", self.camchain, "-o", self.out), "is 240x376 px, expected 376x240 px")
 
     def test_360_degree_images_with_pixels_that_are_not_square(self):
         camera = self.config("cam0:\n  camera_model: equirectangular\n  intrinsics: []\n  distortion_model: none\n"

@@ -8,13 +8,19 @@ WAYMARK_BUILD is the folder of the build, WAYMARK_LAUNCHER the compiler cache or
 import os
 import pathlib
 import platform
+import re
 import shutil
 import subprocess
 import sys
 import unittest
 
+from cli_support import CAMERA, write_png
+
 BUILD = pathlib.Path(os.environ["WAYMARK_BUILD"])
 ROOT = pathlib.Path(__file__).resolve().parent.parent
+sys.path.insert(0, str(ROOT / "script"))
+from documentation.pages import Page  # noqa: E402
+
 WORK = BUILD / "install_test"  # Always the same, for the compiler cache.
 PREFIX = WORK / "prefix"
 
@@ -67,7 +73,7 @@ class Install(unittest.TestCase):
         self.succeed("ctest", "--test-dir", folder, "--output-on-failure")
 
     def test_every_header_is_complete(self):
-        headers = sorted(str(p.relative_to(PREFIX / "include")) for p in PREFIX.rglob("*.h"))
+        headers = sorted(str(p.relative_to(PREFIX / "include")) for p in (PREFIX / "include").rglob("*.h"))
         self.assertIn("waymark/system/system.h", headers)
         source = self.project("headers", "find_package(waymark REQUIRED)\nadd_library(headers STATIC all.cc)\n"
                                          "target_link_libraries(headers PRIVATE waymark::waymark)")
@@ -96,6 +102,36 @@ class Install(unittest.TestCase):
         done = run("cmake", "--build", WORK / "wider_build")
         self.assertNotEqual(done.returncode, 0)
         self.assertIn("Eigen's alignment depends on the instruction set", done.stdout)
+
+    def test_python_finds_its_module(self):
+        """Below /usr, /usr/local and in an environment, without PYTHONPATH."""
+        if not list(BUILD.glob("python/waymark/_waymark*.so")):
+            self.skipTest("the Python module is not built")
+        root, python, environment = WORK / "root", "/usr/bin/python3", WORK / "environment"
+        self.succeed(python, "-m", "venv", "--without-pip", environment)
+        cases = [(python, "/usr", root), (python, "/usr/local", root), (environment / "bin/python", environment, "")]
+        for interpreter, prefix, below in cases:
+            self.succeed("cmake", "--install", BUILD, "--prefix", prefix, "--component", "python",
+                         env={**os.environ, "DESTDIR": str(below)})
+            looked = self.succeed(interpreter, "-I", "-c", "import sys; print(*sys.path, sep='\\n')").split("\n")
+            found = [folder for folder in looked if folder and pathlib.Path(f"{below}{folder}/waymark/__init__.py").exists()]
+            self.assertTrue(found and found[0].startswith(f"{prefix}/lib"), (prefix, looked))
+            shutil.rmtree(f"{below}{found[0]}/waymark")
+        said = self.succeed("cmake", "--install", BUILD, "--prefix", WORK / "elsewhere", "--component", "python")
+        folder, = (word.removeprefix("PYTHONPATH=") for word in said.split() if word.startswith("PYTHONPATH="))
+        self.assertTrue((pathlib.Path(folder) / "waymark/__init__.py").exists())
+
+    def test_messages_name_pages_that_are_there(self):
+        blank = WORK / "blank"
+        blank.mkdir()
+        for i in range(10):
+            write_png(blank / f"{i}.png", 376, 240)
+        (WORK / "camera.yaml").write_text(CAMERA.split("cam1")[0])
+        done = run(PREFIX / "bin/waymark", "run", blank, "-c", WORK / "camera.yaml", "-o", WORK / "blank-out")
+        page, _, anchor = re.search(r"\((\S+\.md)#?(\S*)\)", done.stdout).group(0)[1:-1].partition("#")
+        self.assertTrue(pathlib.Path(page).is_file(), page)
+        self.assertTrue(page.startswith(str(PREFIX)), page)
+        self.assertIn(anchor, Page(pathlib.Path(page)).anchors())
 
     def test_nothing_knows_where_it_was_built(self):
         places = [str(place).encode() for place in (ROOT, BUILD, WORK)]

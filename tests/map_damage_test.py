@@ -154,7 +154,7 @@ class MapDamage(CliTest):
         records = map_records.split(self.map.read_bytes())
         first(records, "map").update(end_landmark=2**28)
         self.map.write_bytes(map_records.join(records))
-        for command in (["info"], ["check"], ["align", "--up", "0,0,1", "-o", self.map]):
+        for command in (["info"], ["check"], ["align", "--up", "0,0,1", "-o", self.folder / "up.wmap"]):
             done = waymark("map", command[0], self.map, *command[1:], preexec_fn=limit_memory)
             self.assertEqual(done.returncode, 0, done.stderr)
 

@@ -104,9 +104,10 @@ class Merge(MapTask):
         far = map_records.join(records)
         self.path("a").write_bytes(far)
         self.check("a")
-        done = waymark("map", "merge", self.path("a"), self.path("a"), "-o", self.path("a"))
+        self.path("c").write_bytes(b"as it was")
+        done = waymark("map", "merge", self.path("a"), self.path("a"), "-o", self.path("c"))
         self.assert_fails(done, 1, "would have ids of landmarks up to")
-        self.assertEqual(self.path("a").read_bytes(), far)
+        self.assertEqual(self.path("c").read_bytes(), b"as it was")
 
 
 class Align(MapTask):
@@ -169,20 +170,21 @@ class Align(MapTask):
 
     def test_leaves_the_file_where_no_map_would_be_left(self):
         self.make_map("map", self.sequence("mono"))
-        before = self.path("map").read_bytes()
+        aligned, before = self.path("aligned"), b"as it was"
+        aligned.write_bytes(before)
         far = self.folder / "far.txt"
         for unit, expected in ((1e200, "at most 1e+09"), (1e-9, "would scale the map by"),
                                (1e8, "would scale the map by")):
             far.write_text("".join(f"{time_s:.9f} {unit * (i % 3)} {unit * (i % 2)} 0 0 0 0 1\n"
                                    for i, (time_s, *_) in enumerate(self.poses("map"))))
-            done = waymark("map", "align", self.path("map"), "--trajectory", far, "-o", self.path("map"))
+            done = waymark("map", "align", self.path("map"), "--trajectory", far, "-o", aligned)
             self.assert_fails(done, 2, far, expected)
         for arguments in (("--distance", 0, 1, 1e308), ("--distance", 0, 1, 1e-300),
                           ("--distance", 0, 1, 9e5), ("--up", "1e308,1e308,0"), ("--up", "inf,0,1"),
                           ("--up", "nan,0,1")):
-            done = waymark("map", "align", self.path("map"), *arguments, "-o", self.path("map"))
+            done = waymark("map", "align", self.path("map"), *arguments, "-o", aligned)
             self.assert_fails(done, 2, arguments[0])
-        self.assertEqual(self.path("map").read_bytes(), before)
+        self.assertEqual(aligned.read_bytes(), before)
 
 
 @unittest.skipUnless(HOUSE.is_dir(), f"needs {HOUSE}; set WAYMARK_DATA")

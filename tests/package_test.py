@@ -12,7 +12,7 @@ import shutil
 import subprocess
 import unittest
 
-from cli_support import CAMERA
+from cli_support import CAMERA, write_png
 
 ROOT = pathlib.Path(__file__).resolve().parent.parent
 PACKAGES = ROOT / "build" / "package"
@@ -109,6 +109,19 @@ class Package(unittest.TestCase):
         self.assertIn("libopencv-core", field(self.packages["waymark"], "Depends"))
         self.assertNotIn("-dev", field(self.packages["waymark"], "Depends"))
         self.assertEqual(dpkg("--verify"), "")
+
+    def test_documentation(self):
+        docs = CLEAN / "usr/share/doc/waymark"
+        self.assertTrue((docs / "examples/live_view.cc").is_file())
+        blank = self.work / "blank"
+        blank.mkdir()
+        for i in range(10):
+            write_png(blank / f"{i}.png", 376, 240)
+        (self.work / "camera.yaml").write_text(CAMERA.split("cam1")[0])
+        done = subprocess.run([self.program, "run", blank, "-c", self.work / "camera.yaml", "-o", self.work / "out"],
+                              capture_output=True, text=True, timeout=60)
+        self.assertIn(f"({docs}/docs/troubleshooting.md#", done.stderr)
+        self.assertTrue((docs / "docs/troubleshooting.md").is_file())
 
     def test_nothing_of_ceres(self):
         """Debian's Ceres brings parts of SuiteSparse that are under the GPL (docs/licenses.md)."""

@@ -85,6 +85,11 @@ class Refine(unittest.TestCase):
         self.assertLess(abs(focal["given"] + focal["change"] - 290), 0.003 * 290)
         self.assertLess(summary["keyframes"], 30, "is not calibrated before the end")
         self.assertLess(self.error_m(out), 1.5 * self.error_m(out, name="keyframes.txt"))
+        out, summary, said = self.run_with("short_small", "--frames", 40, "-c", longer, "--resize", 300)
+        self.assertIn("the calibration is another than stated: once more", said)
+        mended = (out / "calibration.yaml").read_text()
+        self.assertEqual(mended.count("resolution: [376, 240]"), 2)
+        self.assertLess(abs(float(mended.split("intrinsics: [")[1].split(",")[0]) - 290), 0.01 * 290)
 
     def test_the_first_time_stays_where_the_second_is_interrupted(self):
         longer = self.folder / "longer_still.yaml"

@@ -61,6 +61,16 @@ class SavedMap(CliTest):
         for frame in self.frames():
             self.assertIn(frame["reason"], ("too_few_matches", "too_few_inliers", "not_verified"))
 
+    def test_a_map_in_metres_contradicts_depth_in_other_units(self):
+        source = self.save_map("rgbd", "-c", self.folder / "input_rgbd/camchain.yaml")
+        for command in ("localize", self.map, source), ("run", source, "--map-in", self.map):
+            for factor, is_wrong in (5000, False), (1000, True):
+                done = waymark(*command, "-c", source / "camchain.yaml", "--set", f"depth.factor={factor}", "-o", self.out)
+                self.assertEqual(done.returncode, 0, done.stderr)
+                warned = "warning: calibration: depth is 5 times what the map says: is depth.factor right?"
+                self.assertEqual(warned in done.stderr, is_wrong, done.stderr)
+                self.assertEqual(bool(self.summary().get("mistakes")), is_wrong)
+
     def test_a_map_is_extended(self):
         source = self.save_map("stereo", "--frames", NUM_FRAMES // 2)
         done = self.run_on(source, "--first", NUM_FRAMES // 2, "--map-in", self.map, "--map-out",

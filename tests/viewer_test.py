@@ -59,9 +59,8 @@ class ViewerTest(CliTest):
 class Session(ViewerTest):
     def test_clients_see_what_the_engine_has(self):
         client = self.connect(self.run_with_viewer())
-        client.wait_for(lambda c: c.is_complete)
+        client.wait_for(lambda c: c.is_complete and c.hello["setup"] == "stereo")
         self.assertEqual(client.hello["mode"], "live")
-        self.assertEqual(client.hello["setup"], "stereo")
         client.wait_for(lambda c: c.holds_what_status_says() and c.status["keyframes"] > 0)
         self.assertGreater(client.status["landmarks"], 0)
         client.wait_for(lambda c: c.status["frame"] >= 25 and c.holds_what_status_says())
@@ -112,6 +111,23 @@ class Session(ViewerTest):
         self.assertTrue(client.ask("stop")["ok"])
         self.end()
         self.assertEqual(waymark("map", "check", self.map).returncode, 0)
+
+    def test_the_page_is_there_while_the_calibration_is_found(self):
+        client = self.connect(self.start("run", self.image_folder(), "-o", self.out, "--viewer", "0", "--pace", "0.1"))
+        client.wait_for(lambda c: c.status and c.status["doing"].startswith("calibration"))
+        self.assertEqual((client.status["phase"], client.status["frames"]), ("starting", 0))
+        self.assertIn("no session yet", client.ask("pause")["error"])
+        client.wait_for(lambda c: c.status["doing"] == "" and c.status["frames"] > 0)
+        self.assertEqual(client.hello["setup"], "mono")
+        self.assertTrue(client.ask("stop")["ok"])
+        self.process.communicate(timeout=120)
+
+    def test_a_calibration_ends_when_it_is_told_to(self):
+        client = self.connect(self.start("run", self.image_folder(), "-o", self.out, "--viewer", "0"))
+        client.wait_for(lambda c: c.status and c.status["doing"].startswith("calibration"))
+        self.assertTrue(client.ask("stop")["ok"])
+        self.end(expected=3)
+        self.assertEqual(self.summary()["frames"], 0)
 
     def test_ctrl_c_ends_a_paused_session(self):
         client = self.connect(self.run_with_viewer())

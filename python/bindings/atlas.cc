@@ -4,6 +4,7 @@
 
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <array>
 #include <memory>
@@ -147,6 +148,7 @@ Cuts map files (a list of paths) into tiles of at most so many keyframes, finds 
 the tiles there and with each other, and puts them in place. Gives a dict of num_added, num_tiles,
 num_pairs (tiles that were compared) and num_links (places of one map that another shows).)");
   bind_atlas_outputs(atlas);
+  atlas.def_property_readonly("folder", &Atlas::folder, "pathlib.Path: where it is.");
   const auto part = [&](const char* name, const char* about) {
     atlas.def_property_readonly(
         name,
@@ -159,7 +161,7 @@ num_pairs (tiles that were compared) and num_links (places of one map that anoth
   part("links", "list of dict: a, b (indices of tiles), is_border, num_shared, b_from_a.");
 }
 
-void bind_finding(Class<PythonAtlasLocalizer>& localizer) {
+void bind_finding(ThreadedClass<PythonAtlasLocalizer>& localizer) {
   localizer.def(
       "locate",
       [](PythonAtlasLocalizer& self,
@@ -199,7 +201,7 @@ Finds the next image of a stream and returns a TrackingResult.)");
 }
 
 void bind_atlas_localizer(py::module_& module) {
-  Class<PythonAtlasLocalizer> localizer(
+  ThreadedClass<PythonAtlasLocalizer> localizer(
       module, "AtlasLocalizer", R"(Finds images in an Atlas, of which it opens the tiles it needs.
 
 Poses are in the frame of the part of the atlas that the result's submap names.)");
@@ -212,7 +214,7 @@ Poses are in the frame of the part of the atlas that the result's submap names.)
                   std::size_t max_open_tiles) {
         SessionConfig config = read_session_config({cameras, setup, settings, seed});
         const ReleasedGil released;
-        return std::make_unique<PythonAtlasLocalizer>(atlas, std::move(config), max_open_tiles);
+        return make_of_one_process<PythonAtlasLocalizer>(atlas, std::move(config), max_open_tiles);
       }),
       py::arg("atlas"),
       py::arg("cameras"),

@@ -5,10 +5,12 @@
 // done by many processes.
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
+#include <pybind11/stl/filesystem.h>
 
 #include <array>
 #include <map>
 #include <memory>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -17,10 +19,13 @@
 #include "atlas.h"
 #include "bindings.h"
 #include "texts.h"
+#include "waymark/atlas/add.h"
 #include "waymark/atlas/adjust_tiles.h"
 #include "waymark/atlas/anchors.h"
 #include "waymark/atlas/atlas_places.h"
 #include "waymark/atlas/steps.h"
+#include "waymark/base/scratch_folder.h"
+#include "waymark/base/text.h"
 
 namespace waymark::python {
 namespace {
@@ -147,7 +152,7 @@ py::tuple cut(const py::object& folder,
               const std::string& checksum,
               const std::string& name,
               std::size_t keyframes) {
-  const Atlas atlas = atlas_in(folder);
+  Atlas atlas = atlas_in(folder);
   const std::filesystem::path path = path_argument("map", map);
   CutRecording cut;
   {
@@ -263,7 +268,7 @@ std::string adjust(const py::object& folder,
                    const py::dict& described,
                    std::uint32_t tile,
                    const py::list& shared) {
-  const Atlas atlas = atlas_in(folder);
+  Atlas atlas = atlas_in(folder);
   const AtlasContents contents = read_contents(described);
   const ReadShared reader = reader_of(contents, read_shared(shared));
   const ReleasedGil released;
@@ -282,11 +287,38 @@ std::array<double, 8> refit(const py::object& folder,
   return numbers_of(refit_link(atlas, contents, one, reader(one)));
 }
 
-void commit(const py::object& folder, const py::dict& described, const py::list& shared) {
-  Atlas atlas = Atlas::open_or_create(path_argument("folder", folder));
-  AtlasContents contents = read_contents(described);
-  sort_contents(contents);
-  atlas.commit(contents, read_shared(shared));
+/// Takes over files of tiles that the atlas lacks, and makes contents its state unless another
+/// program has changed it, which is what it gives.
+bool commit(Atlas& self, const py::dict& described, const py::list& shared, const py::list& files) {
+  AtlasChange change{read_contents(described), read_shared(shared)};
+  sort_contents(change.contents);
+  std::vector<std::filesystem::path> paths;
+  for (const py::handle file : files) {
+    paths.push_back(path_argument("files", py::reinterpret_borrow<py::object>(file)));
+  }
+  const ReleasedGil released;
+  for (const std::filesystem::path& path : paths) self.store_file(path);
+  return self.commit(change);
+}
+
+/// A folder for what one process writes, with its lock, in a block of Python.
+struct PythonScratchFolder {
+  std::filesystem::path prefix;
+  std::optional<ScratchFolder> folder;
+
+  std::filesystem::path enter() { return folder.emplace(prefix).path(); }
+};
+
+void bind_scratch_folders(py::module_& module) {
+  py::class_<PythonScratchFolder>(module, "_ScratchFolder")
+      .def(py::init([](const py::object& prefix) {
+        return std::make_unique<PythonScratchFolder>(path_argument("prefix", prefix));
+      }))
+      .def("__enter__", &PythonScratchFolder::enter)
+      .def("__exit__", [](PythonScratchFolder& self, const py::args&) { self.folder.reset(); });
+  module.def("_remove_abandoned_scratch", [](const py::object& prefix) {
+    remove_abandoned_scratch(path_argument("prefix", prefix));
+  });
 }
 
 }  // namespace
@@ -313,7 +345,7 @@ AtlasContents read_contents(const py::dict& described) {
   AtlasContents contents;
   for (const py::handle one : described["recordings"]) {
     contents.recordings.push_back({one["checksum"].cast<std::string>(),
-                                   one["name"].cast<std::string>(),
+                                   text_argument("name", one["name"]),
                                    one["since"].cast<std::uint32_t>()});
   }
   for (const py::handle one : described["tiles"]) contents.tiles.push_back(read_tile(one));
@@ -342,6 +374,16 @@ void bind_atlas_tasks(py::module_& module) {
   module.def("_adjust", &adjust);
   module.def("_refit", &refit);
   module.def("_commit", &commit);
+  module.def("_reload", &Atlas::reload);
+  module.def("_shared", [](const Atlas& atlas, std::size_t link) {
+    return describe(atlas.read_shared(atlas.contents().links.at(link)));
+  });
+  module.def("_checksum_of_map",
+             [](const py::object& path) { return checksum_of_map(path_argument("path", path)); });
+  module.def("_printable", [](const py::bytes& text) {
+    return text_of(printable(text.cast<std::string_view>()));
+  });
+  bind_scratch_folders(module);
 }
 
 }  // namespace waymark::python

@@ -15,6 +15,7 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/exchange/trajectory.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/system/system.h"
 
@@ -35,12 +36,25 @@ struct PythonFeatures {
   const std::vector<LandmarkId>* landmarks = nullptr;
 };
 
+/// More of the newest frame, for those who show it: what a TrackingResult of Python leaves out,
+/// since whoever keeps all results would keep all features.
+struct FrameDetails {
+  FrameId frame;
+  std::shared_ptr<const Features> features;
+  std::vector<LandmarkId> landmarks;
+};
+
 /// The turn of one thread at an object that lets other Python threads run while it works: a second
 /// thread gets a RuntimeError rather than a race. Made and destroyed with the GIL held, which is
 /// what guards the flag.
 class Turn {
  public:
-  Turn(bool& is_taken, const char* object) : is_taken_(is_taken) {
+  /// process: that has its threads.
+  Turn(bool& is_taken, const char* object, pid_t process = ::getpid()) : is_taken_(is_taken) {
+    if (process != ::getpid()) {
+      throw std::runtime_error(std::string(object) +
+                               ": was made by another process, expected to be used there");
+    }
     if (is_taken_) {
       throw std::runtime_error(std::string(object) +
                                ": is in use by another thread, expected one thread at a time");
@@ -75,6 +89,22 @@ class ReleasedGil {
   PyThreadState* const state_;
 };
 
+/// Ends an object in the process that made it alone: one that is forked from it has none of its
+/// threads, and would wait for them.
+template <class T>
+struct EndInItsProcess {
+  void operator()(T* object) const {
+    if (::getpid() == process) delete object;
+  }
+  pid_t process = ::getpid();
+};
+template <class T>
+using OfOneProcess = std::unique_ptr<T, EndInItsProcess<T>>;
+template <class T, class... Arguments>
+OfOneProcess<T> make_of_one_process(Arguments&&... arguments) {
+  return OfOneProcess<T>(new T(std::forward<Arguments>(arguments)...));
+}
+
 /// A class of Python whose properties are listed as name, docstring and getter.
 template <class T, class... Options>
 class Class : public py::class_<T, Options...> {
@@ -102,9 +132,21 @@ class Class : public py::class_<T, Options...> {
   }
 };
 
+/// Of objects that have threads.
+template <class T>
+using ThreadedClass = Class<T, OfOneProcess<T>>;
+
 /// The frames that have a pose, in order.
 struct Trajectory {
   std::vector<TrajectoryFrame> frames;
+
+  std::vector<StampedPose> poses() const {
+    std::vector<StampedPose> poses;
+    for (const TrajectoryFrame& frame : frames) {
+      poses.push_back({frame.timestamp_ns, frame.world_from_rig});
+    }
+    return poses;
+  }
 
   Trajectory of_submap(std::uint32_t submap) const {
     Trajectory part;
@@ -135,6 +177,7 @@ void bind_report(py::module_& module);
 void bind_camera(py::module_& module);
 void bind_images(py::module_& module);
 void bind_features(py::module_& module);
+void bind_importing(py::module_& module);
 void bind_map(py::module_& module);
 void bind_map_tasks(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module);
 void bind_map_tables(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::module_& module);

@@ -18,6 +18,7 @@ namespace {
 EstimatedCalibration calibrate_input(const py::object& path, std::optional<double> fov_deg) {
   InputOptions reading;
   reading.setup = Setup::kMono;
+  reading.enlarges_small = true;
   CalibrateOptions options;
   options.fov_deg = fov_deg;
   if (fov_deg && !(*fov_deg >= 5.0 && *fov_deg <= 240.0)) {

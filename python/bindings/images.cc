@@ -40,6 +40,8 @@ py::array read_image(const py::object& path) {
   return image_array(*std::move(image));
 }
 
+std::optional<Image> read_grey(const std::filesystem::path& path) { return read_grey_image(path); }
+
 /// A frame of an input with arrays; image0 is None where there is a fault.
 struct PythonFrame {
   std::size_t index;
@@ -80,13 +82,14 @@ class PythonInput {
   bool is_taken_ = false;
 };
 
-std::unique_ptr<PythonInput> open(const py::object& path,
-                                  const py::object& cameras,
-                                  const py::object& setup) {
+OfOneProcess<PythonInput> open(const py::object& path,
+                               const py::object& cameras,
+                               const py::object& setup) {
   InputOptions options;
   options.setup = setup_argument(setup);
+  options.enlarges_small = true;
   if (!cameras.is_none()) options.calibration = read_cameras(cameras);
-  return std::make_unique<PythonInput>(open_input(path_argument("path", path), options));
+  return make_of_one_process<PythonInput>(open_input(path_argument("path", path), options));
 }
 
 void bind_frame(py::module_& module) {
@@ -103,7 +106,7 @@ void bind_frame(py::module_& module) {
 }
 
 void bind_input(py::module_& module) {
-  Class<PythonInput>(
+  ThreadedClass<PythonInput>(
       module, "Input", R"(A recorded sequence, read frame by frame: iterate over it.)")
       .def("__iter__", [](const py::object& self) { return self; })
       .def("__next__", &PythonInput::next)
@@ -140,9 +143,11 @@ odometry or TUM RGB-D, a folder of images, a video file, or a bag of ROS.
 cameras: path of a camchain, dict or Calibration; takes the place of what the data set carries.
 setup: 'mono', 'stereo' or 'rgbd'. None: all that the input offers.
 
+Images of less than 320x240 px come enlarged, and calibration is theirs then.
+
 InputError, which names the file (and line), for what is missing or malformed.)");
   module.def("read_grey_image",
-             &read_image<&read_grey_image>,
+             &read_image<&read_grey>,
              py::arg("path"),
              R"(read_grey_image(path)
 --

@@ -68,7 +68,7 @@ std::optional<PoseHint> hint_argument(const PythonMap& map,
   return hint;
 }
 
-using LocalizerClass = Class<PythonLocalizer>;
+using LocalizerClass = ThreadedClass<PythonLocalizer>;
 
 void bind_locate(LocalizerClass& localizer) {
   localizer.def(
@@ -138,7 +138,7 @@ map's frame. One thread at a time; a second one gets a RuntimeError.)");
                             const py::object& seed) {
                   SessionConfig config = read_session_config({cameras, setup, settings, seed});
                   const ReleasedGil released;
-                  return std::make_unique<PythonLocalizer>(std::move(config), std::move(map));
+                  return make_of_one_process<PythonLocalizer>(std::move(config), std::move(map));
                 }),
                 py::arg("map").none(false),
                 py::arg("cameras"),

@@ -12,6 +12,7 @@
 #include "arrays.h"
 #include "bindings.h"
 #include "texts.h"
+#include "waymark/base/text.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapfile/map_file.h"
 
@@ -114,8 +115,8 @@ void save(const PythonMap& self, const py::object& path) {
 }
 
 std::string describe_map(const PythonMap& self) {
-  return "<Map of " + std::to_string(self.map().keyframes().size()) + " keyframes, " +
-         std::to_string(self.map().landmarks().size()) + " landmarks, " +
+  return "<Map of " + count_of(self.map().keyframes().size(), "keyframe") + ", " +
+         count_of(self.map().landmarks().size(), "landmark") + ", " +
          (is_metric(self.map()) ? "in metres>" : "scale free>");
 }
 
@@ -144,10 +145,10 @@ void bind_keyframe(py::module_& module) {
            })
       .get("cameras",
            "list of Camera: those that took it.",
-           [](auto& self) { return self.get().rig->cameras; })
+           [](auto& self) { return self.get().rig().cameras; })
       .def("__repr__", [](const PythonKeyframe& self) {
         return "<Keyframe " + std::to_string(self.id.value) + " of " +
-               std::to_string(self.get().features->size()) + " features>";
+               count_of(self.get().features->size(), "feature") + ">";
       });
 }
 
@@ -175,7 +176,7 @@ void bind_landmark(py::module_& module) {
            [](auto& self) { return self.get().num_found; })
       .def("__repr__", [](const PythonLandmark& self) {
         return "<Landmark " + std::to_string(self.id.value) + " of " +
-               std::to_string(self.get().observations.size()) + " observations>";
+               count_of(self.get().observations.size(), "observation") + ">";
       });
 }
 

@@ -1,7 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// What the program does with saved maps: join, scale and level, write for others, take over, show.
+// What the program does with saved maps: join, scale and level, write for others, show.
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -15,14 +15,11 @@
 #include "pictures.h"
 #include "texts.h"
 #include "viewer.h"
-#include "waymark/base/config.h"
 #include "waymark/base/text.h"
 #include "waymark/exchange/align_map.h"
 #include "waymark/exchange/export_map.h"
 #include "waymark/exchange/export_split.h"
 #include "waymark/exchange/input_report.h"
-#include "waymark/exchange/openvslam_camera.h"
-#include "waymark/exchange/openvslam_map.h"
 #include "waymark/session/merging.h"
 
 namespace waymark::python {
@@ -157,6 +154,7 @@ void export_to(const PythonMap& self,
                const std::string& format,
                bool text,
                const py::object& split_views,
+               bool undistort,
                const py::object& frames,
                const py::object& input,
                const py::object& trajectory) {
@@ -164,6 +162,7 @@ void export_to(const PythonMap& self,
   what.out = path_argument("path", path);
   what.format = format_argument(format);
   what.is_text = text;
+  what.is_undistorted = undistort;
   if (!split_views.is_none()) {
     const std::int64_t number = integer_argument("split_views", split_views);
     if (number < kMinSplitViews || number > kMaxSplitViews) {
@@ -180,22 +179,6 @@ void export_to(const PythonMap& self,
   }
   const ReleasedGil released;
   export_map(self.stored, "the map", what);
-}
-
-py::tuple import_map(const py::object& path) {
-  const std::filesystem::path file = path_argument("path", path);
-  std::shared_ptr<PythonMap> map;
-  std::vector<std::string> notes;
-  {
-    const ReleasedGil released;
-    ImportedMap imported = import_openvslam_file(file);
-    map = std::make_shared<PythonMap>();
-    map->stored.map = imported.map.freeze();
-    notes = std::move(imported.notes);
-  }
-  py::list texts;
-  for (const std::string& note : notes) texts.append(text_of(note));
-  return py::make_tuple(std::move(map), texts);
 }
 
 py::object input_info(const py::object& path, const py::object& cameras, const py::object& setup) {
@@ -226,10 +209,9 @@ std::string picture_of(const PythonMap& self) {
     }
   }
   return draw_html(picture,
-                   std::to_string(map.keyframes().size()) + " keyframes, " +
-                       std::to_string(map.landmarks().size()) + " landmarks, " +
-                       std::to_string(submaps.size()) +
-                       (submaps.size() == 1 ? " sub-map, " : " sub-maps, ") +
+                   count_of(map.keyframes().size(), "keyframe") + ", " +
+                       count_of(map.landmarks().size(), "landmark") + ", " +
+                       count_of(submaps.size(), "sub-map") + ", " +
                        (is_metric(map) ? "in metres" : "scale free"));
 }
 
@@ -245,9 +227,8 @@ void bind_merged_map(py::module_& module) {
            "compared; align() makes it metres.",
            &PythonMergedMap::is_incomparable)
       .def("__repr__", [](const PythonMergedMap& self) {
-        return "<MergedMap of " + std::to_string(self.map->map().keyframes().size()) +
-               " keyframes, " + std::to_string(self.num_joins) + " joins, " +
-               std::to_string(self.num_loops) + " loops>";
+        return "<MergedMap of " + count_of(self.map->map().keyframes().size(), "keyframe") + ", " +
+               count_of(self.num_joins, "join") + ", " + count_of(self.num_loops, "loop") + ">";
       });
 }
 
@@ -290,10 +271,11 @@ void bind_outputs(MapClass& map) {
          py::kw_only(),
          py::arg("text") = false,
          py::arg("split_views") = py::none(),
+         py::arg("undistort") = false,
          py::arg("frames") = "keyframes",
          py::arg("input") = py::none(),
          py::arg("trajectory") = py::none(),
-         R"(export(self, path, format='ply', *, text=False, split_views=None, frames='keyframes', input=None, trajectory=None)
+         R"(export(self, path, format='ply', *, text=False, split_views=None, undistort=False, frames='keyframes', input=None, trajectory=None)
 --
 
 Writes the map for other tools, as `waymark export` does.
@@ -302,6 +284,7 @@ path: a file for 'ply', 'tum' and 'kitti', a folder for 'colmap' and 'nerfstudio
     there is replaced as a whole.
 text: COLMAP's text form.
 split_views: 360 degree and fisheye views become so many of 90 degrees each, 4 to 32.
+undistort: images and cameras without distortion, for programs that know none.
 frames: which become views: 'keyframes', 'all', ('every', N) or ('sharpest', N).
 input: path of the recording that the map was made of; has the images of other frames, and of
     camera 1.
@@ -311,7 +294,8 @@ InputError for what does not go together; OutputError.)")
       .def(
           "view",
           [](const PythonMap& self, const py::object& address) {
-            return std::make_shared<PythonViewer>(address_argument(address), self.stored);
+            return std::shared_ptr<PythonViewer>(
+                make_of_one_process<PythonViewer>(address_argument(address), self.stored));
           },
           py::arg("address") = "8080",
           R"(view(self, address='8080')
@@ -328,21 +312,6 @@ void bind_map_tasks(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::modul
   bind_merged_map(module);
   bind_changes(map);
   bind_outputs(map);
-  module.def("import_map", &import_map, py::arg("path"), R"(import_map(path)
---
-
-Takes over a map (.msg, .db) of OpenVSLAM or stella_vslam: the Map, and a list of str that says what was
-left out. InputError for one that is damaged.)");
-  module.def(
-      "import_settings",
-      [](const py::object& path) {
-        return read_openvslam_settings(ConfigSource::from_file(path_argument("path", path)));
-      },
-      py::arg("path"),
-      R"(import_settings(path)
---
-
-The Calibration in the settings (YAML) of these programs. InputError for what is malformed.)");
   module.def("info",
              &input_info,
              py::arg("path"),

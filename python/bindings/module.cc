@@ -77,5 +77,6 @@ PYBIND11_MODULE(_waymark, module) {
   python::bind_viewer(module);
   python::bind_atlas(module);
   python::bind_atlas_tasks(module);
+  python::bind_importing(module);
   python::rename_module(module);
 }

@@ -16,7 +16,10 @@ constexpr double kHeightPx = 280.0;
 constexpr double kMarginPx = 10.0;
 constexpr std::size_t kMaxDrawnPoints = 1500;
 constexpr std::size_t kMaxDrawnPoses = 2000;
-constexpr double kOuterShare = 0.03;  // Of the points, on each side, that may lie outside.
+// Of the points, on each side, that do not say how large the picture is; and how far, by what the
+// others span, it goes beyond them.
+constexpr double kOuterShare = 0.1;
+constexpr double kBeyond = 0.3;
 constexpr const char* kColors[] = {"#1f6feb", "#d1242f", "#1a7f37", "#9a6700"};
 
 /// Axes of the picture in the world: to the right, and down.
@@ -41,11 +44,14 @@ Axes look_from_above(const MapPicture& picture) {
   return {right, -right.cross(down)};
 }
 
-/// Smallest and largest of numbers without some share of them on either side.
-std::pair<double, double> range_of(std::vector<double> numbers, double outer_share) {
+/// What numbers span, where a tenth on either side may be however far out: evenly spread ones from
+/// the smallest to the largest.
+std::pair<double, double> robust_range(std::vector<double> numbers) {
   std::ranges::sort(numbers);
-  const auto left_out = static_cast<std::size_t>(outer_share * static_cast<double>(numbers.size()));
-  return {numbers[left_out], numbers[numbers.size() - 1 - left_out]};
+  const auto left_out = static_cast<std::size_t>(kOuterShare * static_cast<double>(numbers.size()));
+  const double low = numbers[left_out], high = numbers[numbers.size() - 1 - left_out];
+  const double beyond = kBeyond * (high - low);
+  return {std::max(numbers.front(), low - beyond), std::min(numbers.back(), high + beyond)};
 }
 
 /// From the plane of the picture to its pixels.
@@ -67,8 +73,8 @@ PictureFrame fit_frame(const std::vector<Eigen::Vector2d>& points,
     for (const Eigen::Vector2d& point : way) of_way.push_back(point[axis]);
     if (of_points.empty()) of_points = of_way;
     if (of_way.empty()) of_way = of_points;
-    const auto [points_low, points_high] = range_of(std::move(of_points), kOuterShare);
-    const auto [way_low, way_high] = range_of(std::move(of_way), 0.0);
+    const auto [way_low, way_high] = std::ranges::minmax(of_way);  // The way is seen as a whole.
+    const auto [points_low, points_high] = robust_range(std::move(of_points));
     low[axis] = std::min(points_low, way_low);
     high[axis] = std::max(points_high, way_high);
   }

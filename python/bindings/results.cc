@@ -17,7 +17,6 @@
 #include "texts.h"
 #include "waymark/base/text.h"
 #include "waymark/exchange/trajectory.h"
-#include "waymark/mapping/focal_check.h"
 #include "waymark/system/system.h"
 
 namespace waymark::python {
@@ -38,7 +37,7 @@ std::string describe_result(const TrackingResult& result) {
   std::string text = "<TrackingResult frame " + std::to_string(result.frame.value) + ": " +
                      std::string(to_string(result.state));
   if (result.reason != FrameReason::kNone) text += ", " + std::string(to_string(result.reason));
-  return text + ", " + std::to_string(result.num_inliers) + " inliers>";
+  return text + ", " + count_of(result.num_inliers, "inlier") + ">";
 }
 
 void bind_tracking_result(py::module_& module) {
@@ -105,14 +104,10 @@ auto column_of(Field field) {
 }
 
 void write(const Trajectory& trajectory, const py::object& path, const std::string& format) {
-  std::vector<StampedPose> poses;
-  for (const TrajectoryFrame& frame : trajectory.frames) {
-    poses.push_back({frame.timestamp_ns, frame.world_from_rig});
-  }
   for (const auto known :
        {TrajectoryFormat::kTum, TrajectoryFormat::kKitti, TrajectoryFormat::kEuroc}) {
     if (format == to_string(known))
-      return write_trajectory(path_argument("path", path), poses, known);
+      return write_trajectory(path_argument("path", path), trajectory.poses(), known);
   }
   throw py::value_error("format: is " + quote_for_message(format) +
                         ", expected tum, kitti or euroc");
@@ -130,16 +125,14 @@ std::string extent_of(const Trajectory& trajectory) {
         (frame.world_from_rig.translation - trajectory.frames[i - 1].world_from_rig.translation)
             .norm();
   }
-  return fmt::format("{} frame{} in {} sub-map{}, {:.3g} long",
-                     trajectory.frames.size(),
-                     trajectory.frames.size() == 1 ? "" : "s",
-                     submaps.size(),
-                     submaps.size() == 1 ? "" : "s",
+  return fmt::format("{} in {}, {:.3g} long",
+                     count_of(trajectory.frames.size(), "frame"),
+                     count_of(submaps.size(), "sub-map"),
                      length);
 }
 
 /// Of the largest sub-map: each has a world of its own.
-std::string picture_of(const Trajectory& trajectory) {
+std::string picture_of_trajectory(const Trajectory& trajectory) {
   MapPicture picture;
   const Trajectory largest = trajectory.largest();
   if (!largest.frames.empty()) picture.ways.emplace_back();
@@ -184,7 +177,7 @@ Writes a file: 'tum' (t tx ty tz qx qy qz qw), 'kitti' or 'euroc'. OutputError w
       .def("__len__", [](const Trajectory& self) { return self.frames.size(); })
       .def("__repr__",
            [](const Trajectory& self) { return "<Trajectory of " + extent_of(self) + ">"; })
-      .def("_repr_html_", &picture_of);
+      .def("_repr_html_", &picture_of_trajectory);
 }
 
 void bind_statistics(py::module_& module) {
@@ -200,22 +193,12 @@ void bind_statistics(py::module_& module) {
            "float64 array: milliseconds of the mapper per keyframe.",
            [](auto& self) { return array_of(self.mapping_ms); })
       .def("__repr__", [](const SystemStatistics& self) {
-        return fmt::format(
-            "<Statistics: {} keyframes, {} landmarks, {} sub-maps, {} loops, {} relocalizations>",
-            self.num_keyframes,
-            self.num_landmarks,
-            self.num_submaps,
-            self.num_loops,
-            self.num_relocalizations);
-      });
-  Class<FocalCheck>(
-      module, "FocalCheck", "What the residuals say of the calibration's focal length.")
-      .get(
-          "factor", "float: the true focal length by that of the calibration.", &FocalCheck::factor)
-      .get("sigma", "float: standard deviation of the factor.", &FocalCheck::sigma)
-      .get("is_off", "bool: off by more than 2 %, beyond doubt.", &FocalCheck::is_off)
-      .def("__repr__", [](const FocalCheck& self) {
-        return fmt::format("<FocalCheck: factor {:.4f} +- {:.4f}>", self.factor, self.sigma);
+        return fmt::format("<Statistics: {}, {}, {}, {}, {}>",
+                           count_of(self.num_keyframes, "keyframe"),
+                           count_of(self.num_landmarks, "landmark"),
+                           count_of(self.num_submaps, "sub-map"),
+                           count_of(self.num_loops, "loop"),
+                           count_of(self.num_relocalizations, "relocalization"));
       });
   Class<CalibrationEstimate>(module,
                              "CalibrationEstimate",

@@ -1,5 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <algorithm>
+#include <filesystem>
+#include <iterator>
 #include <vector>
 
 #include "arguments.h"
@@ -36,6 +39,16 @@ std::string yaml_of(const char* name, py::handle value) {
   }
 }
 
+bool is_path(py::handle value) {
+  return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
+}
+
+void add_files(const std::vector<std::filesystem::path>& paths,
+               std::vector<ConfigSource>& sources) {
+  std::vector<std::string> notes;
+  std::ranges::move(read_config_files(paths, notes), std::back_inserter(sources));
+}
+
 void add_sources(py::handle cameras, std::vector<ConfigSource>& sources, int nesting = 0) {
   if (nesting > kMaxNesting) {
     throw InputError("cameras",
@@ -45,10 +58,15 @@ void add_sources(py::handle cameras, std::vector<ConfigSource>& sources, int nes
   if (py::isinstance<py::dict>(cameras)) {
     sources.push_back({"cameras", yaml_of("cameras", cameras)});
   } else if (py::isinstance<py::list>(cameras) || py::isinstance<py::tuple>(cameras)) {
+    // Files beside each other may be of a pair.
+    std::vector<std::filesystem::path> paths;
+    for (const py::handle part : cameras) {
+      if (is_path(part)) paths.push_back(path_argument("cameras", part));
+    }
+    if (paths.size() == py::len(cameras)) return add_files(paths, sources);
     for (const py::handle part : cameras) add_sources(part, sources, nesting + 1);
-  } else if (py::isinstance<py::str>(cameras) || py::hasattr(cameras, "__fspath__")) {
-    std::vector<std::string> notes;
-    sources.push_back(read_config_file(path_argument("cameras", cameras), notes));
+  } else if (is_path(cameras)) {
+    add_files({path_argument("cameras", cameras)}, sources);
   } else {
     fail_type("cameras", cameras, kExpectedCameras);
   }
@@ -78,10 +96,7 @@ void add_settings(py::handle settings, std::vector<ConfigSource>& sources) {
 /// The cameras of a document or, where the calibration is given, that with what the document adds.
 CameraChain complete(std::optional<CameraChain> chain, const ConfigNode& config) {
   if (!chain) return chain_of(config);
-  const ConfigNode* depth = config.find("depth");
-  const ConfigNode* factor = depth ? depth->find("factor") : nullptr;
-  if (factor)
-    chain->depth_factor = config_double(*factor, "depth.factor", {.low = 1e-3, .high = 1e9});
+  if (const auto factor = read_depth_factor(config)) chain->depth_factor = factor;
   return *std::move(chain);
 }
 

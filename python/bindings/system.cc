@@ -44,6 +44,7 @@ class PythonSystem {
       result = system_.feed(input);
     }
     if (viewer_) viewer_->tell(system_, input, result);
+    result.features.reset();  // See FrameDetails.
     // The first frame decides.
     if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
     return result;
@@ -73,18 +74,6 @@ class PythonSystem {
         std::make_shared<DiskMemory>(folder, static_cast<std::size_t>(max_memory_gb * 1e9)));
   }
 
-  void drop_seen_through() {
-    const Turn turn = take();
-    if (!is_finished_) {
-      throw std::runtime_error("System: drop_seen_through() before finish(), expected after");
-    }
-    {
-      const ReleasedGil released;
-      system_.drop_seen_through();
-    }
-    if (viewer_) viewer_->finish(system_);
-  }
-
   void reset() {
     const Turn turn = take();
     expect_unfinished("reset");
@@ -107,7 +96,7 @@ class PythonSystem {
     const Turn turn = take();
     expect_unfinished("view");
     const std::string setup = config_.setup ? std::string(to_string(*config_.setup)) : "mono";
-    viewer_ = std::make_shared<PythonViewer>(address, setup, std::string(to_string(timing_)));
+    viewer_ = make_of_one_process<PythonViewer>(address, setup, std::string(to_string(timing_)));
     return viewer_;
   }
 
@@ -138,12 +127,6 @@ class PythonSystem {
     return system_.statistics();
   }
 
-  std::optional<FocalCheck> focal_check() {
-    const Turn turn = take();
-    const FocalCheck* check = system_.focal_check();
-    return check ? std::optional(*check) : std::nullopt;
-  }
-
   std::optional<py::array_t<std::uint8_t>> ego_mask() {
     const Turn turn = take();
     const Image mask = system_.ego_mask();
@@ -158,7 +141,8 @@ class PythonSystem {
 
   FrameDetails details() {
     const Turn turn = take();
-    return system_.details();
+    const TrackingResult& result = system_.result();
+    return {result.frame_in_map, result.features, result.landmarks};
   }
 
   void save(const std::filesystem::path& path) {
@@ -177,7 +161,7 @@ class PythonSystem {
     }
   }
 
-  Turn take() { return Turn(is_taken_, "System"); }
+  Turn take() { return Turn(is_taken_, "System", process_); }
 
   SessionConfig config_;
   const Timing timing_;
@@ -188,6 +172,7 @@ class PythonSystem {
   std::shared_ptr<PythonViewer> viewer_;
   bool is_finished_ = false;
   bool is_taken_ = false;
+  const pid_t process_ = ::getpid();
 };
 
 PythonSystem::PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map)
@@ -198,19 +183,19 @@ PythonSystem::PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<
   if (map) images_ = map->stored.images;
 }
 
-std::unique_ptr<PythonSystem> make_system(const py::object& cameras,
-                                          const py::object& setup,
-                                          const std::string& timing,
-                                          const py::object& settings,
-                                          const py::object& seed,
-                                          std::shared_ptr<PythonMap> map) {
+OfOneProcess<PythonSystem> make_system(const py::object& cameras,
+                                       const py::object& setup,
+                                       const std::string& timing,
+                                       const py::object& settings,
+                                       const py::object& seed,
+                                       std::shared_ptr<PythonMap> map) {
   SessionConfig config = read_session_config({cameras, setup, settings, seed});
   const Timing mode = timing_argument(timing);
   const ReleasedGil released;
-  return std::make_unique<PythonSystem>(std::move(config), mode, std::move(map));
+  return make_of_one_process<PythonSystem>(std::move(config), mode, std::move(map));
 }
 
-using SystemClass = Class<PythonSystem>;
+using SystemClass = ThreadedClass<PythonSystem>;
 
 void bind_feed(SystemClass& system) {
   system.def(
@@ -292,24 +277,16 @@ Shows the frames fed from now on, and the map, in the browser: a Viewer at a por
 }
 
 void bind_memory(SystemClass& system) {
-  system
-      .def("drop_seen_through",
-           &PythonSystem::drop_seen_through,
-           R"(drop_seen_through(self)
---
-
-After finish(): drops landmarks on what is gone from the map, as later keyframes looked through
-them. `waymark run` does so before it saves. RuntimeError before finish().)")
-      .def(
-          "keep_map_in",
-          [](PythonSystem& self, const py::object& folder, const py::object& max_memory_gb) {
-            self.keep_map_in(path_argument("folder", folder),
-                             number_argument("max_memory_gb", max_memory_gb));
-          },
-          py::arg("folder"),
-          py::kw_only(),
-          py::arg("max_memory_gb"),
-          R"(keep_map_in(self, folder, *, max_memory_gb)
+  system.def(
+      "keep_map_in",
+      [](PythonSystem& self, const py::object& folder, const py::object& max_memory_gb) {
+        self.keep_map_in(path_argument("folder", folder),
+                         number_argument("max_memory_gb", max_memory_gb));
+      },
+      py::arg("folder"),
+      py::kw_only(),
+      py::arg("max_memory_gb"),
+      R"(keep_map_in(self, folder, *, max_memory_gb)
 --
 
 Limits the memory of a large map: whenever the process has more than max_memory_gb (0 to 1e6, of
@@ -337,11 +314,6 @@ State of every frame fed so far, including those filled in after the fact: a lis
 --
 
 Totals up to the map that map() gives: Statistics. Final after finish().)")
-      .def("focal_check", &PythonSystem::focal_check, R"(focal_check(self)
---
-
-What the residuals say of the calibration's focal length: a FocalCheck, once some 200 frames are
-mapped and where the motion tells; None before.)")
       .def("ego_mask", &PythonSystem::ego_mask, R"(ego_mask(self)
 --
 

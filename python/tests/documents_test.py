@@ -45,7 +45,7 @@ class Stubs(Test):
         in_stubs = {node.name for node in STUBS.body if isinstance(node, (ast.ClassDef, ast.FunctionDef))}
         in_stubs |= {node.target.id for node in STUBS.body if isinstance(node, ast.AnnAssign)}
         self.assertEqual(in_stubs, set(waymark.__all__))
-        in_module = {name for name in vars(_waymark) if not name.startswith("_")} | {"__version__"}
+        in_module = {name for name in vars(_waymark) if not name.startswith("_")} | {"__version__", "import_map", "import_settings"}
         self.assertEqual(in_stubs, in_module)
 
     def test_functions(self):

@@ -11,16 +11,9 @@ import subprocess
 import unittest
 
 import waymark
+from fleet_support import PROGRAM, WHY_NOT, fleet
 from support import DATA, Test
 
-try:
-    from waymark import fleet
-    WHY_NOT = ""
-except ImportError as missing:
-    WHY_NOT = str(missing)
-
-PROGRAM = pathlib.Path(os.environ["WAYMARK_BUILD"]) / "waymark"
-os.environ["WAYMARK_PROGRAM"] = str(PROGRAM)
 NUM_FRAMES = 40
 
 

@@ -16,10 +16,18 @@ import waymark
 from support import DATA, Test, camchain, frames, map_stereo
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[2] / "tests"))
+import map_records  # noqa: E402
 from exchange_formats import ColmapModel, pack, read_ply, small_msg  # noqa: E402
 
 STEREO = DATA / "stereo_out/map.wmap"
 MONO = DATA / "mono_out/map.wmap"
+
+
+def way_in(html):
+    """Pixels of the way of the camera in a picture."""
+    svg = xml.etree.ElementTree.fromstring(html[html.index("<svg"):html.index("</svg>") + 6])
+    way = next(element for element in svg if element.tag.endswith("polyline")).get("points").split()
+    return np.array([pair.split(",") for pair in way], float)
 
 
 class Merge(Test):
@@ -30,7 +38,7 @@ class Merge(Test):
         self.assertGreaterEqual(merged.num_joins, 1)
         self.assertFalse(merged.is_incomparable)
         self.assertEqual(len([s for s in merged.map.submaps() if s.joined_into is None]), 1)
-        self.assertRegex(repr(merged), r"^<MergedMap of \d+ keyframes, 1 joins, \d+ loops>$")
+        self.assertRegex(repr(merged), r"^<MergedMap of \d+ keyframes, 1 join, \d+ loops?>$")
         np.testing.assert_array_equal(first.merge(second, seed=0).map.landmarks().positions_in_world,
                                       merged.map.landmarks().positions_in_world)
 
@@ -164,6 +172,37 @@ class Reports(Test):
         self.assert_raises(TypeError, "folders", waymark.report, None)
 
 
+class Evaluations(Test):
+    def test_of_a_file(self):
+        found = waymark.evaluate(DATA / "stereo_out/trajectory.txt", DATA / "stereo/groundtruth.txt",
+                                 plot=self.folder / "plot.svg")
+        self.assertEqual(found["align"], "se3")
+        self.assertLess(found["ate_rmse_m"], 0.05)
+        self.assertEqual(found["pairs"], found["poses"])
+        self.assertIn("<svg", (self.folder / "plot.svg").read_text())
+        mono = waymark.evaluate(DATA / "mono_out/trajectory.txt", DATA / "stereo/groundtruth.txt")
+        self.assertEqual(mono["align"], "sim3")
+        self.assertIn("no scale of its own", mono["notes"][0])
+
+    def test_of_a_trajectory_in_memory(self):
+        with waymark.System(waymark.Calibration(camchain("stereo"))) as system:
+            for frame in list(waymark.open_input(DATA / "stereo")):
+                system.feed(frame.timestamp_ns + 10**9, frame.image0, frame.image1)
+        truth = DATA / "stereo/groundtruth.txt"
+        found = waymark.evaluate(system.trajectory(), truth, time_offset=-1)
+        self.assertLess(found["ate_rmse_m"], 0.05)
+        self.assertEqual(found["time_offset_s"], -1)
+
+    def test_what_cannot_be(self):
+        path = DATA / "stereo_out/trajectory.txt"
+        self.assert_raises(waymark.InputError, "gone", waymark.evaluate, path, self.folder / "gone")
+        self.assert_raises(ValueError, "align: is 'se2'", waymark.evaluate, path, path, align="se2")
+        self.assert_raises(ValueError, "time_offset: is 10000000000.0, expected seconds or auto", waymark.evaluate, path, path,
+                           time_offset=1e10)
+        self.assert_raises(TypeError, "time_offset", waymark.evaluate, path, path, time_offset=None)
+        self.assert_raises(TypeError, "estimate", waymark.evaluate, None, path)
+
+
 class Viewers(Test):
     def page_of(self, viewer):
         with urllib.request.urlopen(viewer.url, timeout=10) as answer:
@@ -212,7 +251,7 @@ class Words(Test):
     def test_objects_print_themselves(self):
         system = map_stereo()
         saved = waymark.Map.load(STEREO)
-        self.assertRegex(repr(system.statistics()), r"^<Statistics: \d+ keyframes, \d+ landmarks, 1 sub-maps, \d+ loops, ")
+        self.assertRegex(repr(system.statistics()), r"^<Statistics: \d+ keyframes, \d+ landmarks, 1 sub-map, \d+ loops?, ")
         self.assertRegex(repr(system.trajectory()), r"^<Trajectory of 40 frames in 1 sub-map, [\d.]+ long>$")
         self.assertEqual(repr(saved.submaps()[0]), "<Submap 0, in metres>")
         self.assertEqual(repr(waymark.Map.load(MONO).submaps()[0]), "<Submap 0, scale free>")
@@ -234,13 +273,24 @@ class Words(Test):
             self.assertEqual(Tags(html).open, [])
             self.assertIn(words, html)
             self.assertNotIn("nan", html)
-            svg = xml.etree.ElementTree.fromstring(html[html.index("<svg"):html.index("</svg>") + 6])
-            way = next(element for element in svg if element.tag.endswith("polyline")).get("points").split()
-            pixels = np.array([pair.split(",") for pair in way], float)
+            pixels = way_in(html)
             self.assertTrue(((pixels >= 0) & (pixels <= [420, 280])).all())
             self.assertGreater(np.ptp(pixels, axis=0).max(), 20)
         self.assertGreater(len(system.map()._repr_html_()), 2000)
         self.assertLess(len(system.map()._repr_html_()), 60000)
+
+    def test_points_far_out_do_not_shrink_the_picture(self):
+        size = np.ptp(way_in(waymark.Map.load(STEREO)._repr_html_()), axis=0).max()
+        records = map_records.split(STEREO.read_bytes())
+        for record in records:
+            if record.get("kind") == "landmarks":
+                array = record["position_in_world"]
+                places = np.frombuffer(array["data"], array["dtype"]).reshape(array["shape"]).copy()
+                places[::13] *= 1000
+                array["data"] = places.tobytes()
+        (self.folder / "far.wmap").write_bytes(map_records.join(records))
+        far = way_in(waymark.Map.load(self.folder / "far.wmap")._repr_html_())
+        self.assertGreater(np.ptp(far, axis=0).max(), 0.7 * size)
 
     def test_nothing_to_see(self):
         system = waymark.System(camchain())

@@ -18,18 +18,18 @@ times, nanoseconds; lengths of a map made by one camera without depth have no un
 out are read-only.
 """
 from ._waymark import (NO_ID, Atlas, AtlasLocalizer, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
-                       Features, FocalCheck, FrameDetails, Input, InputError, InputFrame, Keyframe,
+                       Features, FrameDetails, Input, InputError, InputFrame, Keyframe,
                        Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
                        MarkerSightings, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
-                       __version__, calibrate, import_map, import_settings, info, open_input,
-                       read_depth_image, read_grey_image, report)
+                       __version__, calibrate, evaluate, info, open_input, read_depth_image, read_grey_image, report)
+from .importing import import_map, import_settings
 
 __all__ = [
     "NO_ID", "Atlas", "AtlasLocalizer", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
-    "FocalCheck", "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
+    "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
     "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "Markers",
     "MarkerSightings", "MergedMap", "OutputError",
     "Statistics", "Submap", "System", "TrackingResult", "Trajectory", "Viewer", "__version__",
-    "calibrate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
+    "calibrate", "evaluate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
     "read_grey_image", "report",
 ]

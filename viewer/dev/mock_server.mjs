@@ -56,6 +56,7 @@ export class MockServer {
     this.kind = world;
     this.generation = 0;
     this.phase = world === "map" ? "map" : world === "empty" || world === "loading" ? "starting" : "running";
+    this.doing = "";
     this.requests = [];
     this.calibration = [];
     this.dots = random(11);
@@ -134,7 +135,7 @@ export class MockServer {
     const last = world.frames.at(-1) ?? { frame: 0, time_s: 0, state: 0, reason: 0, tracking_ms: 0 };
     const t = last.tracking_ms;
     return {
-      type: "status", phase: this.phase, is_mapping: world.isMapping, frame: last.frame, time_s: last.time_s,
+      type: "status", phase: this.phase, doing: this.doing, is_mapping: world.isMapping, frame: last.frame, time_s: last.time_s,
       state: STATES[this.kind === "lost" ? 3 : last.state], reason: REASONS[this.kind === "lost" ? 3 : last.reason], submap: 0, matches: 412, inliers: 377,
       stages_ms: [0.45 * t, 0.2 * t, 0, 0.08 * t, 0.25 * t, 0, 0, 0.02 * t], tracking_ms: t, tracking_ms_median: 12.4,
       frames: world.frames.length, frames_total: 3682, tracked: world.frames.filter((each) => each.state === 1).length, unreadable: 0, dropped: 0,

@@ -10,11 +10,13 @@ import type { Hello, Status } from "./text_messages";
 import { CalibrationPanel } from "./ui/calibration_panel";
 import { CameraPanel } from "./ui/camera_panel";
 import { Controls } from "./ui/controls";
+import { AxesFigure } from "./ui/axes_figure";
 import { byId, Choice, setIcon, setText } from "./ui/dom";
 import { Inspector } from "./ui/inspector";
 import { Legend } from "./ui/legend";
 import { Measure } from "./ui/measure";
 import { Notice } from "./ui/notice";
+import { Places } from "./ui/places";
 import { SessionPanel } from "./ui/session_panel";
 import { Timeline } from "./ui/timeline";
 
@@ -27,9 +29,9 @@ export class App implements Listener {
   readonly store = new Store();
   readonly connection = new Connection(this);
   readonly scene = new Scene(this.store, byId<HTMLCanvasElement>("scene"));
-  readonly inspector = new Inspector(this.scene, this.store, this.connection);
   readonly measure = new Measure(this.scene, this.store, this.connection);
-  readonly timeline = new Timeline(this.store, () => (this.panelsAt_ms = 0));
+  readonly inspector = new Inspector(this.scene, this.store, this.connection, this.measure);
+  readonly timeline = new Timeline(this.store, this.measure, () => (this.panelsAt_ms = 0));
   readonly report = publish(this);
   connectionState: ConnectionState = "connecting";
   hello: Hello | null = null;
@@ -38,7 +40,12 @@ export class App implements Listener {
   private readonly controls = new Controls(this.connection);
   private readonly camera = new CameraPanel();
   private readonly calibration = new CalibrationPanel();
-  private readonly legend = new Legend(this.scene);
+  private readonly legend = new Legend(this.scene, this.measure);
+  private readonly axes = new AxesFigure(this.scene);
+  private readonly places = new Places(this.store, {
+    goToPart: (part) => this.goToPart(part),
+    goToKeyframe: (id) => void this.inspector.select({ kind: "keyframe", id }, true),
+  });
   private readonly notice = new Notice();
   private readonly viewChoice: Choice<ViewName>;
   private retryAt_ms = 0;
@@ -142,7 +149,9 @@ export class App implements Listener {
     this.firstLook();
     const isLost = this.timeline.cursor < 0 && this.status?.state === "lost" && this.status.phase === "running";
     this.drawnAt_ms = now_ms;
-    return this.scene.update(now_ms, Math.min(0.25, dt_s), this.timeline.shown, isLost);
+    const drew = this.scene.update(now_ms, Math.min(0.25, dt_s), this.timeline.shown, isLost);
+    if (drew) this.axes.draw();
+    return drew;
   }
 
   /** Chooses the view once there is something to see: a live camera is followed, a map shown as a whole. */
@@ -164,6 +173,7 @@ export class App implements Listener {
     const retryIn_s = (this.retryAt_ms - now_ms) / 1000;
     this.notice.show({ connection: this.connectionState, retryIn_s, hello, status, canDraw: scene.canDraw }, this.store);
     this.legend.update();
+    this.places.update(now_ms);
     this.timeline.draw();
     this.measure.update();
     this.drawScale();
@@ -179,7 +189,8 @@ export class App implements Listener {
     byId("scale").style.setProperty("--length", `${Math.min(400, length / perPixel).toFixed(0)}px`);
     const shown = factor * length;
     const text = factor !== 1 ? shown.toPrecision(3) : String(shown >= 1 ? shown : shown.toPrecision(1));
-    setText(byId("scale"), `${text} ${this.measure.unitOf(this.store.rootOf(0))}`);
+    const unit = this.measure.unitOf(this.store.rootOf(0));
+    setText(byId("scale"), `${text} ${text === "1" ? unit.replace(/s$/, "") : unit}`);
   }
 
   private resize(): void {
@@ -195,6 +206,11 @@ export class App implements Listener {
     this.panelsAt_ms = 0;
   }
 
+  private goToPart(part: number): void {
+    this.isUserView = true;
+    this.scene.goToPart(part);
+  }
+
   private setTheme(theme: string): void {
     document.documentElement.dataset["theme"] = theme;
     this.scene.setPalette();
@@ -208,6 +224,10 @@ export class App implements Listener {
     byId("fit").addEventListener("click", () => this.setView(this.scene.view.name === "top" ? "top" : "orbit", true));
     byId("screenshot").addEventListener("click", () => void this.saveScreenshot());
     byId("theme").addEventListener("click", () => this.toggleTheme());
+    const help = byId<HTMLDialogElement>("help-panel");
+    const toggleHelp = () => (help.open ? help.close() : help.showModal());
+    byId("help").addEventListener("click", toggleHelp);
+    help.addEventListener("click", () => help.close());
     const sheet = byId("open-sheet");
     const setSheet = (isOpen: boolean) => {
       byId("app").toggleAttribute("data-sheet", isOpen);
@@ -219,12 +239,13 @@ export class App implements Listener {
     const keys: Record<string, () => void> = {
       f: () => byId("fit").click(), s: () => void this.saveScreenshot(), d: () => this.toggleTheme(),
       " ": () => this.timeline.togglePlay(), "1": () => this.setView("follow", true), "2": () => this.setView("orbit", true),
-      "3": () => this.setView("top", true), m: () => this.measure.toggle(), Escape: () => this.closePanels(),
+      "3": () => this.setView("top", true), "?": toggleHelp, m: () => this.measure.toggle(), Escape: () => this.closePanels(),
     };
     addEventListener("keydown", (event) => {
       const isPress = event.key === " " && event.target instanceof HTMLButtonElement;
       const isText = event.target instanceof HTMLInputElement && event.key !== "Escape";
-      if (isPress || isText || event.ctrlKey || event.metaKey || event.altKey) return;
+      const isForHelp = help.open && event.key !== "?";
+      if (isPress || isText || isForHelp || event.ctrlKey || event.metaKey || event.altKey) return;
       const act = keys[event.key];
       if (!act) return;
       event.preventDefault();

@@ -27,6 +27,8 @@ export interface Hello {
 export interface Status {
   type: "status";
   phase: Phase;
+  /** What is done before the first image, such as finding the calibration; or empty. */
+  doing: string;
   is_mapping: boolean;
   frame: number;
   time_s: number;

@@ -110,6 +110,62 @@ async function showsWhatIsClicked(context) {
   assert.deepEqual(page.problems, []);
 }
 
+/** Whether a colour is anywhere on the map, away from what lies above it. */
+async function hasColour(page, wanted) {
+  const png = await page.screenshot({ clip: { x: 480, y: 250, width: 190, height: 200 } });
+  return page.evaluate(async ([base64, rgb]) => {
+    const bytes = Uint8Array.from(atob(base64), (letter) => letter.charCodeAt(0));
+    const picture = await createImageBitmap(new Blob([bytes], { type: "image/png" }));
+    const context = new OffscreenCanvas(picture.width, picture.height).getContext("2d");
+    context.drawImage(picture, 0, 0);
+    const { data } = context.getImageData(0, 0, picture.width, picture.height);
+    for (let i = 0; i < data.length; i += 4) if (rgb.every((value, k) => data[i + k] === value)) return true;
+    return false;
+  }, [png.toString("base64"), wanted]);
+}
+
+/** Parts and keyframes are listed; what is chosen is shown, in the colour of the theme, with its place in the unit of the map. */
+async function goesToKeyframesAndParts(context) {
+  const { page } = await serve(context, { world: "map", skip: 700, isFree: true }, { isDark: true });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  const { keyframes } = await report(page);
+  await page.waitForFunction((n) => document.querySelector("#places-list").textContent.includes(`: ${n} keyframes`), keyframes);
+  await page.click("[data-layer=markers]"); // Whose squares are white and dark, too.
+  await page.click("#places summary");
+  await page.waitForFunction((n) => document.querySelectorAll("#places .link").length === n + 1, keyframes);
+  await page.click("#places .link:has-text('Whole part')");
+  await until(page, (w) => w.view === "orbit");
+  await page.locator("#places .link", { hasText: /^5$/ }).click();
+  await until(page, (w) => w.selected?.kind === "keyframe" && w.selected.id === 5);
+  await page.waitForFunction(() => document.querySelector("#inspector dl")?.textContent.includes(" map units"));
+  await page.waitForTimeout(1500);
+  assert.ok(await hasColour(page, [255, 255, 255]), "what is selected is white in the dark");
+  await picture(page, `${context.pictures}/desktop_places_dark.png`);
+  await page.click("#theme");
+  await page.waitForTimeout(500);
+  assert.ok(await hasColour(page, [0x12, 0x18, 0x1f]), "and nearly black in the light");
+  await picture(page, `${context.pictures}/desktop_places_light.png`);
+  assert.match(await page.innerText("#ramp-low"), / map units$/);
+  assert.deepEqual(page.problems, []);
+}
+
+/** Help comes and goes with its key and its button. */
+async function helps(context) {
+  const { page } = await serve(context, { world: "map", skip: 300 });
+  await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
+  await page.keyboard.press("?");
+  assert.match(await page.innerText("#help-panel"), /measure between two places/);
+  await picture(page, `${context.pictures}/desktop_help.png`);
+  await page.keyboard.press("Escape");
+  assert.ok(await page.isHidden("#help-panel"));
+  await page.click("#help");
+  await page.click("#help-panel form button");
+  assert.ok(await page.isHidden("#help-panel"));
+  const lengths = await page.$$eval("#axes line", (lines) => lines.map((line) => Math.hypot(line.x2.baseVal.value, line.y2.baseVal.value)));
+  assert.ok(lengths.length === 3 && Math.max(...lengths) > 10, "the axes are drawn");
+  assert.deepEqual(page.problems, []);
+}
+
 async function playsTheSession(context) {
   const { page } = await serve(context, { world: "map", skip: 700 });
   await until(page, (w) => w.connection === "open" && !w.isLoading && w.keyframes > 0);
@@ -163,9 +219,12 @@ async function remembersTheEnd(context) {
 }
 
 async function saysWhatIsMissing(context) {
-  const { page } = await serve(context, { world: "empty" }, { isPhone: true });
+  const { mock, page } = await serve(context, { world: "empty" }, { isPhone: true });
   await page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Waiting for the first image");
   await picture(page, `${context.pictures}/phone_empty.png`);
+  mock.doing = "calibration: round 2: focal length 512.0 px";
+  mock.broadcast(JSON.stringify(mock.status()));
+  await page.waitForFunction(() => document.querySelector("#notice-text").textContent === "Calibration: round 2: focal length 512.0 px.");
   const loading = await serve(context, { world: "loading" });
   await loading.page.waitForFunction(() => document.querySelector("#notice-title").textContent === "Loading the map");
   assert.equal(await loading.page.innerText("#state-detail"), "Loading the map");
@@ -269,7 +328,7 @@ async function measuresAndScales(context) {
     await page.click("#measure");
     assert.match(await page.innerText("#measure-panel"), /Click two places/);
     const { value, unit } = await measureSomething(page);
-    assert.ok(unit === "units" && value > 0);
+    assert.ok(unit === "map units" && value > 0);
     assert.equal(await page.evaluate(() => window.waymark.selected), null, "it is not selected, too");
     await page.fill("#measure-panel input", "none");
     await page.click("#measure-panel form button");
@@ -322,7 +381,7 @@ async function showsKeyframeImages(context) {
     await page.waitForSelector("#inspector .link");
     if ((await report(page)).selected.kind === "landmark") await page.click("#inspector .link");
     await page.waitForSelector("#inspector .keyframe-image[data-shown]");
-    assert.match(await page.innerText("#inspector figcaption"), /^150 features see a landmark, 150 are free; 150 of all lie on edges$/);
+    assert.match(await page.innerText("#inspector figcaption"), /^150 features with a landmark, 150 free; on edges: 150 of all$/);
     const colours = await page.$eval("#inspector canvas", (canvas) => {
       const { data } = canvas.getContext("2d").getImageData(0, 0, canvas.width, canvas.height);
       return new Set(Array.from({ length: data.length / 400 }, (_, i) => data[400 * i])).size;
@@ -382,7 +441,7 @@ async function drawsLargeMaps(context) {
 }
 
 export const mockCases = [
-  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, playsTheSession, connectsAgain, remembersTheEnd,
+  growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, goesToKeyframesAndParts, helps, playsTheSession, connectsAgain, remembersTheEnd,
   measuresAndScales, measuresOnly, showsKeyframeImages, showsMarkersAndEdges, saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, followsItsWindow, followsItsScreen,
   drawsLargeMaps,
 ];

@@ -189,7 +189,7 @@ async function scalesASavedMap(context) {
   for (let i = 0; i < 120 && !(await page.evaluate(() => window.waymark.measured)); ++i) {
     await page.mouse.click(box.x + (0.35 + 0.3 * ((7 * i) % 11) / 11) * box.width, box.y + (0.35 + 0.3 * ((5 * i) % 13) / 13) * box.height);
   }
-  assert.equal((await page.evaluate(() => window.waymark.measured)).unit, "units");
+  assert.equal((await page.evaluate(() => window.waymark.measured)).unit, "map units");
   await page.fill("#measure-panel input", "3.5");
   await page.keyboard.press("Enter");
   await press(page, "[data-control=scale]");
@@ -207,7 +207,7 @@ async function showsAnImage(page) {
   await page.waitForSelector("#inspector .link");
   if ((await report(page)).selected.kind === "landmark") await page.click("#inspector .link");
   await page.waitForSelector("#inspector .keyframe-image[data-shown]");
-  assert.match(await page.innerText("#inspector figcaption"), /^[1-9]\d* features see a landmark/);
+  assert.match(await page.innerText("#inspector figcaption"), /^[1-9]\d* features? with a landmark/);
 }
 
 /** Need the program (`context.waymark`) and a sequence for it (`context.input`). */

@@ -23,15 +23,18 @@ std::string checksum_of_map(const std::filesystem::path& path);
 
 /// What adding maps did.
 struct AddedMaps {
-  std::size_t num_added = 0;  ///< Others were there already.
-  std::size_t num_tiles = 0;  ///< Of those that were added.
-  std::size_t num_pairs = 0;  ///< Of tiles that were compared.
-  std::size_t num_links = 0;  ///< Places of one map that another shows.
+  std::size_t num_added = 0;     ///< Others were there already.
+  std::size_t num_tiles = 0;     ///< Of those that were added.
+  std::size_t num_pairs = 0;     ///< Of tiles that were compared.
+  std::size_t num_links = 0;     ///< Places of one map that another shows.
+  std::size_t num_restored = 0;  ///< Damaged tiles of maps that were there.
 };
 
 /// Cuts map files into tiles, finds what they show of the tiles there and of each other, and puts
 /// them where that says. The tiles that are there stay where they are among each other as far as
-/// solve_anchors() keeps them. The same maps in any order give the same. say: hears of each step.
+/// solve_anchors() keeps them. The same maps in any order give the same. Of a map that is there
+/// already, tiles whose files are missing or damaged come back as they were cut. say: hears of each
+/// step.
 AddedMaps add_maps(Atlas& atlas,
                    std::span<const std::filesystem::path> maps,
                    std::size_t max_keyframes,

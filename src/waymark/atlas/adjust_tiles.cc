@@ -62,7 +62,7 @@ TileNeighbourhood neighbourhood_of(const AtlasContents& contents,
 
 }  // namespace
 
-std::string adjust_stored_tile(const Atlas& atlas,
+std::string adjust_stored_tile(Atlas& atlas,
                                const AtlasContents& contents,
                                std::uint32_t index,
                                const ReadShared& read_shared) {

@@ -32,7 +32,7 @@ using ReadShared = std::function<SharedLandmarks(const AtlasLink&)>;
 
 /// Adjusts a tile of this index, see adjust_tile(), among its neighbours, and stores it; gives the
 /// checksum of the new file.
-std::string adjust_stored_tile(const Atlas& atlas,
+std::string adjust_stored_tile(Atlas& atlas,
                                const AtlasContents& contents,
                                std::uint32_t tile,
                                const ReadShared& read_shared);

@@ -3,9 +3,6 @@
 #include "waymark/atlas/atlas.h"
 
 #include <fmt/format.h>
-#include <stdlib.h>
-#include <sys/stat.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <numeric>
@@ -16,6 +13,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/sha256.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
@@ -24,6 +22,8 @@ namespace fs = std::filesystem;
 
 constexpr const char* kDatabaseName = "atlas.db";
 constexpr const char* kTileFolder = "tiles";
+constexpr const char* kNewFiles = "new-";  // Folders of those who write, below that of the tiles.
+constexpr std::size_t kMaxFileBytes = std::size_t{4} << 30;
 constexpr std::size_t kMaxAtlasFaults = 1000;
 
 fs::path database_path(const fs::path& folder) { return folder / kDatabaseName; }
@@ -46,23 +46,29 @@ std::vector<std::uint32_t> sort_by(std::vector<Item>& items, const Key& key) {
   return targets;
 }
 
-/// A new file gets the name of what it holds.
-std::string name_by_checksum(const fs::path& temporary, const char* ending) {
-  const std::string checksum = sha256_of_file(temporary);
-  std::error_code error;
-  fs::rename(temporary, temporary.parent_path() / (checksum + ending), error);
-  if (error) throw OutputError(temporary.string(), "cannot be renamed: " + error.message());
-  return checksum;
+std::string tile_name(const std::string& checksum) { return checksum + ".wmap"; }
+std::string places_name(const std::string& checksum) { return checksum + ".places"; }
+
+/// Of the files of the tiles.
+std::set<std::string> names_of(const AtlasContents& contents) {
+  std::set<std::string> names;
+  for (const AtlasTile& tile : contents.tiles) {
+    names.insert(tile_name(tile.checksum));
+    names.insert(places_name(tile.places));
+  }
+  return names;
 }
 
-/// In the folder of the tiles, so that it can be renamed; nobody else has it.
-fs::path new_tile_file(const fs::path& folder) {
-  std::string name = (folder / kTileFolder / "new-XXXXXX").string();
-  const int descriptor = ::mkstemp(name.data());
-  if (descriptor < 0) throw OutputError(folder.string(), "cannot be written, expected a folder");
-  ::fchmod(descriptor, S_IRUSR | S_IWUSR | S_IRGRP | S_IROTH);
-  ::close(descriptor);
-  return name;
+void move_file(const fs::path& from, const fs::path& to) {
+  std::error_code error;
+  fs::rename(from, to, error);
+  if (error) throw OutputError(to.string(), "cannot be written: " + error.message());
+}
+
+/// What is wrong with a file as such.
+std::optional<std::string> fault_of(const fs::path& path) {
+  if (sha256_of_file(path) == path.stem()) return std::nullopt;
+  return path.string() + ": is another file than its name says";
 }
 
 void check_pairs(const Atlas& atlas, const AtlasLink& link, std::vector<std::string>& faults) {
@@ -79,12 +85,9 @@ void check_tile(const Atlas& atlas, std::uint32_t index, std::vector<std::string
   for (const std::string& fault : find_map_faults(path)) {
     faults.push_back(path.string() + ": " + fault);
   }
-  if (sha256_of_file(path) != tile.checksum) {
-    faults.push_back(path.string() + ": is another file than its name says");
-  }
   const fs::path places = atlas.places_path(tile.places);
-  if (sha256_of_file(places) != tile.places) {
-    faults.push_back(places.string() + ": is another file than its name says");
+  for (const fs::path& file : {path, places}) {
+    if (auto fault = fault_of(file)) faults.push_back(*std::move(fault));
   }
   load_places(places, tile.num_keyframes);
   atlas.load_tile(tile);
@@ -116,39 +119,50 @@ Atlas Atlas::open(const fs::path& folder) {
     throw InputError(folder.string(), "is no atlas, expected a folder with atlas.db");
   }
   Atlas atlas(folder);
-  const AtlasDatabase base(database_path(folder), /*is_writable=*/false);
-  atlas.generation_ = base.generation();
-  atlas.contents_ = base.read();
+  atlas.reload();
   return atlas;
 }
 
 Atlas Atlas::open_or_create(const fs::path& folder) {
-  if (is_atlas(folder)) return open(folder);
   std::error_code ignored;
+  // Looked for last: somebody may just have made it.
   if (fs::exists(folder, ignored) &&
-      !(fs::is_directory(folder, ignored) && fs::is_empty(folder, ignored))) {
+      !(fs::is_directory(folder, ignored) && fs::is_empty(folder, ignored)) && !is_atlas(folder)) {
     throw InputError(folder.string(), "is there and no atlas, expected one or a new folder");
   }
-  make_output_folder(folder / kTileFolder);
-  const fs::path temporary = folder / "atlas.db.new";
-  AtlasDatabase::create(temporary);
-  std::error_code error;
-  fs::rename(temporary, database_path(folder), error);
-  if (error) throw OutputError(folder.string(), "cannot be written: " + error.message());
+  make_output_folder(folder);
+  AtlasDatabase::create(database_path(folder));
+  remove_abandoned_scratch(folder / kTileFolder / kNewFiles);
   return open(folder);
 }
 
 Atlas Atlas::of_tiles(const fs::path& folder) {
-  make_output_folder(folder / kTileFolder);
-  return Atlas(folder);
+  Atlas atlas(folder);
+  atlas.has_state_ = false;
+  return atlas;
+}
+
+fs::path Atlas::path_of(const std::string& name) const {
+  std::error_code ignored;
+  if (new_files_ && fs::exists(new_files_->path() / name, ignored))
+    return new_files_->path() / name;
+  return folder_ / kTileFolder / name;
 }
 
 fs::path Atlas::tile_path(const std::string& checksum) const {
-  return folder_ / kTileFolder / (checksum + ".wmap");
+  return path_of(tile_name(checksum));
 }
 
 fs::path Atlas::places_path(const std::string& checksum) const {
-  return folder_ / kTileFolder / (checksum + ".places");
+  return path_of(places_name(checksum));
+}
+
+bool Atlas::is_whole(const AtlasTile& tile) const {
+  try {
+    return !fault_of(tile_path(tile.checksum)) && !fault_of(places_path(tile.places));
+  } catch (const InputError&) {
+    return false;
+  }
 }
 
 StoredMap Atlas::load_tile(const AtlasTile& tile) const {
@@ -176,31 +190,99 @@ SharedLandmarks Atlas::read_shared(const AtlasLink& link) const {
   return shared;
 }
 
-std::string Atlas::store_tile(const StoredMap& tile) const {
-  const fs::path temporary = new_tile_file(folder_);
-  save_map(temporary, tile);
-  return name_by_checksum(temporary, ".wmap");
-}
-
-std::string Atlas::store_places(const Map& tile) const {
-  const fs::path temporary = new_tile_file(folder_);
-  save_places(temporary, places_of_tile(tile));
-  return name_by_checksum(temporary, ".places");
-}
-
-void Atlas::commit(const AtlasContents& contents, const std::vector<NewShared>& shared) {
-  AtlasDatabase base(database_path(folder_), /*is_writable=*/true);
-  generation_ = base.write(contents, shared, generation_);
-  contents_ = base.read();
-  remove_unused();
-}
-
-void Atlas::remove_unused() const {
-  std::set<std::string> used;
-  for (const AtlasTile& tile : contents_.tiles) {
-    used.insert(tile.checksum + ".wmap");
-    used.insert(tile.places + ".places");
+const fs::path& Atlas::new_files() {
+  if (!new_files_) {
+    make_output_folder(folder_ / kTileFolder);
+    new_files_ = std::make_shared<ScratchFolder>(folder_ / kTileFolder / kNewFiles);
   }
+  return new_files_->path();
+}
+
+/// A new file gets the name of what it holds.
+std::string Atlas::keep(const fs::path& file, const char* ending) const {
+  std::string checksum = sha256_of_file(file);
+  const fs::path folder = has_state_ ? file.parent_path() : folder_ / kTileFolder;
+  move_file(file, folder / (checksum + ending));
+  return checksum;
+}
+
+std::string Atlas::store_tile(const StoredMap& tile) {
+  const fs::path file = new_files() / "tile";
+  save_map(file, tile);
+  return keep(file, ".wmap");
+}
+
+std::string Atlas::store_places(const Map& tile) {
+  const fs::path file = new_files() / "places";
+  save_places(file, places_of_tile(tile));
+  return keep(file, ".places");
+}
+
+void Atlas::store_file(const fs::path& path) {
+  const std::string content = read_text_file(path, "a file of a tile", kMaxFileBytes);
+  if (sha256(content) != path.stem()) {
+    throw InputError(path.string(), "is another file than its name says");
+  }
+  write_file_atomically(new_files() / path.filename(), content);
+}
+
+bool Atlas::reload() {
+  const AtlasDatabase base(database_path(folder_), /*is_writable=*/false);
+  if (base.generation() == generation_) return false;
+  contents_ = base.read();
+  generation_ = base.generation();
+  return true;
+}
+
+void Atlas::publish_files(const AtlasContents& contents) const {
+  if (!new_files_) return;
+  const fs::path folder = folder_ / kTileFolder;
+  for (const std::string& name : names_of(contents)) {
+    const fs::path file = path_of(name);
+    if (file.parent_path() != folder) move_file(file, folder / name);
+  }
+  flush_folder(folder);
+}
+
+bool Atlas::commit(const AtlasChange& change) {
+  {
+    AtlasDatabase base(database_path(folder_), /*is_writable=*/true);
+    const bool is_current = base.generation() == generation_;
+    if (is_current) {
+      publish_files(change.contents);
+      base.write(change.contents, change.shared);
+    }
+    AtlasContents contents = base.read();
+    const std::int64_t generation = base.generation();
+    base.finish();
+    contents_ = std::move(contents);
+    generation_ = generation;
+    if (!is_current) return false;
+  }
+  try {
+    remove_unused();
+  } catch (const std::runtime_error&) {
+    // The state is there; what it does not need goes the next time.
+  }
+  return true;
+}
+
+void Atlas::change(const std::function<std::optional<AtlasChange>()>& plan) {
+  while (true) {
+    try {
+      const std::optional<AtlasChange> planned = plan();
+      if (!planned || commit(*planned)) return;
+    } catch (const InputError&) {
+      if (!reload()) throw;  // Else a file may have gone with the state that referred to it.
+    }
+  }
+}
+
+/// Nobody else writes meanwhile. What no state refers to yet is in the folder of its writer: a
+/// file beside the others that none refers to is left over.
+void Atlas::remove_unused() const {
+  const AtlasDatabase base(database_path(folder_), /*is_writable=*/true);
+  const std::set<std::string> used = names_of(base.read());
   std::error_code ignored;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder_ / kTileFolder, ignored)) {
     const fs::path name = entry.path().filename();

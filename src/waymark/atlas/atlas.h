@@ -5,12 +5,16 @@
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>
+#include <functional>
+#include <memory>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "waymark/base/id.h"
+#include "waymark/base/scratch_folder.h"
 #include "waymark/geometry/sim3.h"
 #include "waymark/mapfile/map_file.h"
 
@@ -69,9 +73,16 @@ struct NewShared {
   SharedLandmarks landmarks;  ///< That both show.
 };
 
+/// What is to become the state of an atlas.
+struct AtlasChange {
+  AtlasContents contents;         ///< All of it, sorted.
+  std::vector<NewShared> shared;  ///< Of the links that are new.
+};
+
 /// A folder with a map of any size in tiles; docs/atlas-format.md describes its files. Tiles are
 /// written once and never changed; what counts is said by one data base, which changes in
-/// transactions: at any moment there is the old state or the new one.
+/// transactions: at any moment there is the old state or the new one. Any number of programs may
+/// read and write it at a time: a new state replaces the one that it was made from, or nothing.
 ///
 /// Every reading function throws InputError for what is damaged or made to do harm, every writing
 /// one OutputError.
@@ -87,37 +98,54 @@ class Atlas {
 
   /// Where it is.
   const std::filesystem::path& folder() const { return folder_; }
-  /// As of when it was opened or last written.
+  /// As of when it was opened, last written or last read.
   const AtlasContents& contents() const { return contents_; }
 
   /// Where the file of a tile in this state is.
   std::filesystem::path tile_path(const std::string& checksum) const;
   /// Where the file of its places is.
   std::filesystem::path places_path(const std::string& checksum) const;
+  /// Whether both files of a tile are there as their names say.
+  bool is_whole(const AtlasTile& tile) const;
 
   /// The map of a tile. Its size is what the data base says.
   StoredMap load_tile(const AtlasTile& tile) const;
   /// What the tiles of a link both show.
   SharedLandmarks read_shared(const AtlasLink& link) const;
 
-  /// Puts a map among the tiles; gives its checksum. No state of the atlas refers to it yet.
-  std::string store_tile(const StoredMap& tile) const;
+  /// Keeps a map for a state that refers to it, as one of its tiles; gives its checksum. Nobody
+  /// else sees or removes the file before there is such a state.
+  std::string store_tile(const StoredMap& tile);
   /// The same with its places.
-  std::string store_places(const Map& tile) const;
+  std::string store_places(const Map& tile);
+  /// The same with the file of a tile, or of places, of another folder. InputError where it is
+  /// not what its name says.
+  void store_file(const std::filesystem::path& path);
 
-  /// Makes this the state of the atlas. Links that are not there yet have their landmarks in
-  /// `shared`. Files that no tile refers to any more go. OutputError where another program has
-  /// changed the atlas since it was opened.
-  void commit(const AtlasContents& contents, const std::vector<NewShared>& shared);
+  /// Makes this the state of the atlas, and removes files that no tile refers to any more. False,
+  /// and nothing is written, where another program has changed the atlas since contents() was
+  /// read, which is then read anew.
+  [[nodiscard]] bool commit(const AtlasChange& change);
+  /// Makes the state what a plan makes of contents(), planning again as often as another program
+  /// changes the atlas meanwhile. The plan gives nothing where there is nothing to change.
+  void change(const std::function<std::optional<AtlasChange>()>& plan);
+  /// Reads the state that is there now; whether it is another one.
+  bool reload();
 
  private:
   explicit Atlas(std::filesystem::path folder) : folder_(std::move(folder)) {}
 
+  std::filesystem::path path_of(const std::string& name) const;
+  std::string keep(const std::filesystem::path& file, const char* ending) const;
+  const std::filesystem::path& new_files();
+  void publish_files(const AtlasContents& contents) const;
   void remove_unused() const;
 
   std::filesystem::path folder_;
   AtlasContents contents_;
-  std::int64_t generation_ = 0;
+  std::int64_t generation_ = -1;
+  bool has_state_ = true;
+  std::shared_ptr<const ScratchFolder> new_files_;  ///< Null until there is one.
 };
 
 /// Everything that is wrong with an atlas, its tiles and its data base, a line each, up to 1000.

@@ -6,15 +6,11 @@
 #include <sqlite3.h>
 
 #include <algorithm>
-#include <cmath>
-#include <cstring>
-#include <limits>
 #include <map>
-#include <optional>
+#include <utility>
 
+#include "waymark/atlas/atlas_rows.h"
 #include "waymark/base/check.h"
-#include "waymark/base/sha256.h"
-#include "waymark/base/text.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/place/place_segment.h"
 
@@ -44,142 +40,8 @@ PRAGMA user_version = 1;
 
 constexpr std::int64_t kApplicationId = 1464680788;  // "WMAT"; as in the schema.
 constexpr std::int64_t kVersion = 1;
+constexpr int kBusyTimeoutMs = 60'000;
 constexpr std::int64_t kMaxTiles = std::int64_t{1} << 24;
-
-struct FinalizeStatement {
-  void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
-};
-
-/// A statement with its parameters and the values of its current row, each asked for with what it
-/// may be.
-class AtlasRows {
- public:
-  AtlasRows(sqlite3* base, const std::filesystem::path& path, const char* sql)
-      : base_(base), path_(path), what_(sql) {
-    sqlite3_stmt* statement = nullptr;
-    if (sqlite3_prepare_v2(base, sql, -1, &statement, nullptr) != SQLITE_OK) {
-      throw InputError(path.string(), "cannot be read, expected the data base of an atlas");
-    }
-    statement_.reset(statement);
-  }
-
-  AtlasRows& add(const std::string& value) {
-    sqlite3_bind_text(statement_.get(),
-                      ++parameter_,
-                      value.data(),
-                      static_cast<int>(value.size()),
-                      SQLITE_TRANSIENT);
-    return *this;
-  }
-  AtlasRows& add(std::int64_t value) {
-    sqlite3_bind_int64(statement_.get(), ++parameter_, value);
-    return *this;
-  }
-  AtlasRows& add(double value) {
-    if (!std::isfinite(value)) throw OutputError(path_.string(), "would hold what is not finite");
-    sqlite3_bind_double(statement_.get(), ++parameter_, value);
-    return *this;
-  }
-  AtlasRows& add(const SharedLandmarks& landmarks) {
-    std::vector<std::uint32_t> ids;
-    for (const auto& [a, b] : landmarks) ids.insert(ids.end(), {a.value, b.value});
-    sqlite3_bind_blob64(
-        statement_.get(), ++parameter_, ids.data(), ids.size() * sizeof(ids[0]), SQLITE_TRANSIENT);
-    return *this;
-  }
-  AtlasRows& add(const Sim3& transform) {
-    for (const double value : transform.rotation.coeffs()) add(value);
-    for (const double value : transform.translation) add(value);
-    return add(transform.scale);
-  }
-  void run() {
-    if (sqlite3_step(statement_.get()) != SQLITE_DONE) {
-      throw OutputError(path_.string(), std::string("cannot be written: ") + sqlite3_errmsg(base_));
-    }
-    sqlite3_reset(statement_.get());
-    parameter_ = 0;
-  }
-
-  /// Steps to the next row.
-  bool next() {
-    column_ = -1;
-    const int status = sqlite3_step(statement_.get());
-    if (status != SQLITE_ROW && status != SQLITE_DONE) {
-      throw InputError(path_.string(),
-                       std::string("is damaged: ") + sqlite3_errmsg(base_) +
-                           ", expected the data base of an atlas");
-    }
-    return status == SQLITE_ROW;
-  }
-  std::int64_t whole(const char* name, std::int64_t max) {
-    const std::int64_t value = sqlite3_column_int64(statement_.get(), ++column_);
-    if (sqlite3_column_type(statement_.get(), column_) != SQLITE_INTEGER || value < 0 ||
-        value > max) {
-      fail(name, fmt::format("expected a whole number of at most {}", max));
-    }
-    return value;
-  }
-  double number(const char* name, const NumberRange& range) {
-    const double value = sqlite3_column_double(statement_.get(), ++column_);
-    if (sqlite3_column_type(statement_.get(), column_) != SQLITE_FLOAT || !range.contains(value)) {
-      fail(name, "expected a number that is possible");
-    }
-    return value;
-  }
-  std::string text(const char* name) {
-    const auto* value =
-        reinterpret_cast<const char*>(sqlite3_column_text(statement_.get(), ++column_));
-    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column_));
-    if (sqlite3_column_type(statement_.get(), column_) != SQLITE_TEXT || !value ||
-        size > kMaxTextBytes) {
-      fail(name, "expected a text");
-    }
-    return {value, size};
-  }
-  std::string checksum(const char* name) {
-    std::string value = text(name);
-    if (!is_sha256(value)) fail(name, "expected a SHA-256 checksum");
-    return value;
-  }
-  Sim3 transform() {
-    Sim3 transform;
-    for (double& value : transform.rotation.coeffs()) value = number("rotation", {-2.0, 2.0});
-    if (std::abs(transform.rotation.norm() - 1.0) > kMaxNormError) {
-      fail("rotation", "expected a unit quaternion");
-    }
-    for (double& value : transform.translation) value = number("translation", kLengthRange);
-    transform.scale = number("scale", kScaleRange);
-    return transform;
-  }
-  SharedLandmarks landmarks() {
-    const void* bytes = sqlite3_column_blob(statement_.get(), ++column_);
-    const auto size = static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column_));
-    constexpr std::size_t kPairBytes = 2 * sizeof(std::uint32_t);
-    if (sqlite3_column_type(statement_.get(), column_) != SQLITE_BLOB || size % kPairBytes != 0) {
-      fail("landmarks", "expected pairs of numbers");
-    }
-    std::vector<std::uint32_t> ids(size / sizeof(std::uint32_t));
-    if (size > 0) std::memcpy(ids.data(), bytes, size);
-    SharedLandmarks landmarks;
-    for (std::size_t i = 0; i < ids.size(); i += 2) {
-      if (ids[i] >= kMaxIds || ids[i + 1] >= kMaxIds) fail("landmarks", "expected ids");
-      landmarks.push_back({LandmarkId{ids[i]}, LandmarkId{ids[i + 1]}});
-    }
-    return landmarks;
-  }
-  /// The message names the statement, which says table and column.
-  [[noreturn]] void fail(const char* name, const std::string& expected) const {
-    throw InputError(path_.string(), fmt::format("{} of a row of '{}': {}", name, what_, expected));
-  }
-
- private:
-  sqlite3* base_;
-  const std::filesystem::path& path_;
-  const char* what_;
-  std::unique_ptr<sqlite3_stmt, FinalizeStatement> statement_;
-  int parameter_ = 0;
-  int column_ = -1;
-};
 
 void execute_atlas(sqlite3* base, const std::filesystem::path& path, const char* sql) {
   if (sqlite3_exec(base, sql, nullptr, nullptr, nullptr) == SQLITE_OK) return;
@@ -197,6 +59,46 @@ void expect_ascending(const AtlasRows& rows, const std::string& before, const st
   if (key <= before) rows.fail("key", "expected rows in order, each once");
 }
 
+/// Makes one where there is none; what is there stays.
+SqliteDatabase make_empty(const std::filesystem::path& path) {
+  sqlite3* opened = nullptr;
+  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
+  const int status = sqlite3_open_v2(path.c_str(), &opened, flags, nullptr);
+  SqliteDatabase base(opened);
+  if (status != SQLITE_OK) {
+    throw OutputError(path.string(), std::string("cannot be written: ") + sqlite3_errstr(status));
+  }
+  sqlite3_busy_timeout(opened, kBusyTimeoutMs);
+  execute_atlas(opened, path, "BEGIN IMMEDIATE");
+  // Of several that find none, the first one that is here makes it.
+  if (pragma_value(opened, path, "PRAGMA schema_version") == 0) {
+    execute_atlas(opened, path, kAtlasSchema);
+  }
+  execute_atlas(opened, path, "COMMIT");
+  return base;
+}
+
+/// Whether it defines what an atlas does, to the letter: constraints are run where rows are
+/// written.
+bool is_of_an_atlas(sqlite3* base, const std::filesystem::path& path) {
+  const SqliteDatabase own = make_empty(":memory:");
+  const char* query = "SELECT name, sql FROM sqlite_schema WHERE sql IS NOT NULL ORDER BY name";
+  AtlasRows there(base, path, query), expected(own.get(), path, query);
+  while (expected.next()) {
+    if (!there.next() || there.text("name") != expected.text("name") ||
+        there.text("sql") != expected.text("sql")) {
+      return false;
+    }
+  }
+  return !there.next();
+}
+
+/// Whether somebody writes it, or was killed while he did.
+bool has_journal(const std::filesystem::path& path) {
+  std::error_code ignored;
+  return std::filesystem::exists(path.string() + "-journal", ignored);
+}
+
 template <class Item>
 std::map<std::string, std::uint32_t> number_by(const std::vector<Item>& items,
                                                std::string Item::*key) {
@@ -207,41 +109,24 @@ std::map<std::string, std::uint32_t> number_by(const std::vector<Item>& items,
 
 }  // namespace
 
-void AtlasDatabase::Close::operator()(sqlite3* base) const { sqlite3_close_v2(base); }
-
 AtlasDatabase::~AtlasDatabase() = default;
 
 void AtlasDatabase::create(const std::filesystem::path& path) {
-  std::error_code ignored;
-  std::filesystem::remove(path, ignored);
-  sqlite3* opened = nullptr;
-  const int flags = SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE | SQLITE_OPEN_NOMUTEX;
-  const int status = sqlite3_open_v2(path.c_str(), &opened, flags, nullptr);
-  const std::unique_ptr<sqlite3, Close> base(opened);
-  if (status != SQLITE_OK) {
-    throw OutputError(path.string(), std::string("cannot be written: ") + sqlite3_errstr(status));
-  }
-  execute_atlas(base.get(), path, "BEGIN");
-  execute_atlas(base.get(), path, kAtlasSchema);
-  execute_atlas(base.get(), path, "COMMIT");
+  // Takes back what a killed program had begun, which may be all of it.
+  if (has_journal(path)) open_sqlite(path, "state", SqliteAccess::kWrite);
+  std::error_code error;
+  const bool has_pages = std::filesystem::file_size(path, error) > 0 && !error;
+  if (!has_pages) make_empty(path);
 }
 
-AtlasDatabase::AtlasDatabase(const std::filesystem::path& path, bool is_writable) : path_(path) {
-  sqlite3* opened = nullptr;
-  const int flags =
-      (is_writable ? SQLITE_OPEN_READWRITE : SQLITE_OPEN_READONLY) | SQLITE_OPEN_NOMUTEX;
-  const int status = sqlite3_open_v2(path.c_str(), &opened, flags, nullptr);
-  base_.reset(opened);
-  if (status != SQLITE_OK) {
-    throw InputError(path.string(), "cannot be read, expected the data base of an atlas");
-  }
-  for (const int option : {SQLITE_DBCONFIG_ENABLE_TRIGGER,
-                           SQLITE_DBCONFIG_ENABLE_VIEW,
-                           SQLITE_DBCONFIG_TRUSTED_SCHEMA}) {
-    sqlite3_db_config(base_.get(), option, 0, nullptr);
-  }
-  sqlite3_busy_timeout(base_.get(), 10'000);
-  sqlite3_exec(base_.get(), "PRAGMA cell_size_check=ON", nullptr, nullptr, nullptr);
+// Who only reads may have to take back what a killed writer had begun.
+AtlasDatabase::AtlasDatabase(const std::filesystem::path& path, bool is_writable)
+    : path_(path),
+      base_(open_sqlite(
+          path,
+          "state",
+          is_writable || has_journal(path) ? SqliteAccess::kWrite : SqliteAccess::kRead)) {
+  if (!base_) throw InputError(path.string(), "cannot be read, expected the data base of an atlas");
   if (pragma_value(base_.get(), path_, "PRAGMA application_id") != kApplicationId) {
     throw InputError(path.string(), "is no data base of an atlas");
   }
@@ -252,6 +137,11 @@ AtlasDatabase::AtlasDatabase(const std::filesystem::path& path, bool is_writable
         fmt::format(
             "has version {}, expected {}; a newer program may have written it", version, kVersion));
   }
+  if (!is_of_an_atlas(base_.get(), path)) {
+    throw InputError(path.string(), "has other tables than the data base of an atlas");
+  }
+  sqlite3_busy_timeout(base_.get(), kBusyTimeoutMs);
+  execute_atlas(base_.get(), path_, is_writable ? "BEGIN IMMEDIATE" : "BEGIN");
 }
 
 std::int64_t AtlasDatabase::generation() const {
@@ -298,6 +188,7 @@ void AtlasDatabase::read_tiles(AtlasContents& contents) const {
     tile.submap = static_cast<std::uint32_t>(rows.whole("submap", kMaxSubmaps));
     tile.num_keyframes =
         static_cast<std::uint32_t>(rows.whole("keyframes", PlaceSegment::kMaxRows));
+    if (tile.num_keyframes == 0) rows.fail("keyframes", "expected at least one");
     tile.num_landmarks = static_cast<std::uint32_t>(rows.whole("landmarks", kMaxIds));
     tile.is_metric = rows.whole("is_metric", 1) != 0;
     tile.pixel_angle_rad = rows.number("pixel_angle_rad", kFeatureSizeRange);
@@ -308,6 +199,11 @@ void AtlasDatabase::read_tiles(AtlasContents& contents) const {
     expect_ascending(rows, std::exchange(before, tile.origin), tile.origin);
     if (contents.tiles.size() == kMaxTiles) rows.fail("tile", "expected fewer");
     contents.tiles.push_back(std::move(tile));
+  }
+  const auto num_tiles = contents.tiles.size();
+  if (std::ranges::any_of(contents.tiles,
+                          [&](const auto& one) { return one.frame >= num_tiles; })) {
+    rows.fail("frame", fmt::format("expected one of at most {} parts", num_tiles));
   }
 }
 
@@ -327,6 +223,9 @@ void AtlasDatabase::read_links(AtlasContents& contents) const {
     }
     link.a = at_a->second;
     link.b = at_b->second;
+    if (contents.tiles[link.a].frame != contents.tiles[link.b].frame) {
+      rows.fail("a, b", "expected two tiles of the same frame");
+    }
     link.is_border = rows.whole("is_border", 1) != 0;
     link.num_shared = static_cast<std::uint32_t>(rows.whole("shared", kMaxIds));
     link.b_from_a = rows.transform();
@@ -345,14 +244,8 @@ SharedLandmarks AtlasDatabase::read_shared(const std::string& origin_a,
   return rows.landmarks();
 }
 
-std::int64_t AtlasDatabase::write(const AtlasContents& contents,
-                                  const std::vector<NewShared>& shared,
-                                  std::int64_t generation) {
+void AtlasDatabase::write(const AtlasContents& contents, const std::vector<NewShared>& shared) {
   sqlite3* const base = base_.get();
-  execute_atlas(base, path_, "BEGIN IMMEDIATE");  // Rolled back when it is closed before its end.
-  if (this->generation() != generation) {
-    throw OutputError(path_.string(), "was changed meanwhile by another program; run it again");
-  }
   execute_atlas(base, path_, "DELETE FROM recording; DELETE FROM tile; DELETE FROM link;");
   AtlasRows recordings(base, path_, "INSERT INTO recording VALUES (?, ?, ?)");
   for (const AtlasRecording& recording : contents.recordings) {
@@ -381,10 +274,9 @@ std::int64_t AtlasDatabase::write(const AtlasContents& contents,
   for (const NewShared& pairs : shared) {
     landmarks.add(pairs.origin_a).add(pairs.origin_b).add(pairs.landmarks).run();
   }
-  AtlasRows state(base, path_, "UPDATE state SET generation = ?");
-  state.add(generation + 1).run();
-  execute_atlas(base, path_, "COMMIT");
-  return generation + 1;
+  AtlasRows(base, path_, "UPDATE state SET generation = generation + 1").run();
 }
+
+void AtlasDatabase::finish() { execute_atlas(base_.get(), path_, "COMMIT"); }
 
 }  // namespace waymark

@@ -67,16 +67,16 @@ std::vector<TileCandidates> by_tile(const std::vector<AtlasCandidate>& candidate
   return tiles;
 }
 
-/// Puts a verdict in the frame of a tile into that of its part of the atlas.
-void put_into_atlas(const AtlasTile& tile, FrameVerdict& verdict) {
-  verdict.submap = {};
-  if (!verdict.world_from_rig) return;
-  verdict.submap = SubmapId{tile.frame};
-  const Sim3 pose = tile.atlas_from_tile * Sim3(*verdict.world_from_rig);
-  verdict.world_from_rig = Rigid3{pose.rotation, pose.translation};
+/// Puts a result in the frame of a tile into that of its part of the atlas.
+void put_into_atlas(const AtlasTile& tile, TrackingResult& result) {
+  result.submap = {};
+  if (!result.world_from_rig) return;
+  result.submap = SubmapId{tile.frame};
+  const Sim3 pose = tile.atlas_from_tile * Sim3(*result.world_from_rig);
+  result.world_from_rig = Rigid3{pose.rotation, pose.translation};
   Vector6d units;
   units << Eigen::Vector3d::Constant(tile.atlas_from_tile.scale), Eigen::Vector3d::Ones();
-  verdict.covariance = units.asDiagonal() * verdict.covariance * units.asDiagonal();
+  result.covariance = units.asDiagonal() * result.covariance * units.asDiagonal();
 }
 
 }  // namespace
@@ -90,7 +90,7 @@ class AtlasLocalizer::Impl {
         frames_(std::move(rig), settings, middling_pixel_angle(atlas_.contents()), uses_range_),
         places_(atlas_),
         tiles_(atlas_, std::max<std::size_t>(max_open_tiles, 1)),
-        relocalizer_(frames_.rig(), settings.tracking, seed()) {}
+        relocalizer_(settings.tracking, seed()) {}
 
   const Atlas& atlas() const { return atlas_; }
   std::size_t num_opened() const { return tiles_.num_opened(); }
@@ -147,12 +147,8 @@ double AtlasLocalizer::Impl::confidence_in(const Frame& frame,
                                            const LocatedFrame& located,
                                            KeyframeId candidate) {
   gather_local_map(tile, primary_landmarks(*frame.features, located.landmarks), candidate, local_);
-  return place_confidence(*frames_.rig(),
-                          *frame.features,
-                          located.landmarks,
-                          tile,
-                          local_.reference,
-                          located.rig_from_world);
+  return place_confidence(
+      *frame.features, located.landmarks, tile, local_.reference, located.rig_from_world);
 }
 
 std::optional<FoundInTile> AtlasLocalizer::Impl::search(const Frame& frame) {
@@ -236,7 +232,7 @@ TrackingResult AtlasLocalizer::Impl::locate(const FrameImages& images,
 void AtlasLocalizer::Impl::enter(std::uint32_t tile) {
   tile_ = tile;
   snapshot_ = index_map(tiles_.get(tile));
-  tracker_.emplace(frames_.rig(), uses_range_, settings_.tracking, seed());
+  tracker_.emplace(uses_range_, settings_.tracking, seed());
   tracker_->begin_in(*snapshot_->map, TrackingPurpose::kLocalizing);
 }
 
@@ -258,9 +254,13 @@ TrackingResult AtlasLocalizer::Impl::track(const FrameImages& images) {
   const bool needs_motion = tracker_ && frames_.needs_motion(images);
   const Frame frame =
       frames_.build(images, needs_motion ? tracker_->predict_motion() : RigMotion{}, result);
+  const TrackingResult untracked = result;
   const auto follow = [&] {
-    const TrackOutcome outcome = tracker_->track(frame, *snapshot_, result.stages);
-    static_cast<FrameVerdict&>(result) = outcome;
+    const StageTimes stages = result.stages;
+    result = untracked;
+    result.stages = stages;
+    tracker_->track(frame, *snapshot_, result);
+    result.is_relocalized = false;  // But by a search in the atlas.
     put_into_atlas(row(tile_), result);
   };
   if (tracker_) follow();

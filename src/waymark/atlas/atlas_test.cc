@@ -3,6 +3,10 @@
 #include "waymark/atlas/atlas.h"
 
 #include <gtest/gtest.h>
+#include <signal.h>
+#include <sqlite3.h>
+#include <sys/wait.h>
+#include <unistd.h>
 
 #include <array>
 #include <fstream>
@@ -13,7 +17,7 @@
 #include "waymark/atlas/add.h"
 #include "waymark/atlas/export_atlas.h"
 #include "waymark/atlas/optimize_atlas.h"
-#include "waymark/atlas/test_atlas.h"
+#include "waymark/atlas/testing/atlas.h"
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
 #include "waymark/geometry/alignment.h"
@@ -184,8 +188,103 @@ TEST(AtlasTest, TwoWritersDoNotUndoEachOther) {
   Atlas first = Atlas::open_or_create(folder / "atlas");
   Atlas second = Atlas::open(folder / "atlas");
   add_maps(first, std::array{maps[0]}, 12, 1);
-  EXPECT_THROW(add_maps(second, std::array{maps[1]}, 12, 1), OutputError);
+  // The second one finds the atlas changed, and plans once more.
+  EXPECT_EQ(add_maps(second, std::array{maps[1]}, 12, 1).num_added, 1u);
+  EXPECT_EQ(second.contents().recordings.size(), 2u);
+  // What is wanted of a state that is gone: its tiles have been adjusted, or are there already.
+  optimize_atlas(second);
+  EXPECT_EQ(add_maps(first, std::array{maps[1], maps[2]}, 12, 1).num_added, 1u);
+  EXPECT_EQ(optimize_atlas(second).num_adjusted, first.contents().tiles.size());
+  EXPECT_EQ(second.contents().recordings.size(), 3u);
+  for (const AtlasTile& tile : second.contents().tiles) EXPECT_EQ(tile.frame, 0u);
+  EXPECT_EQ(find_atlas_faults(folder / "atlas"), std::vector<std::string>());
+}
+
+TEST(AtlasTest, APlanFromAnOldStateIsNotCommitted) {
+  const fs::path folder = empty_folder("atlas_old_plan");
+  const std::vector<fs::path> maps = save_walks(folder, Units::kMetres);
+  Atlas first = Atlas::open_or_create(folder / "atlas");
+  Atlas second = Atlas::open(folder / "atlas");
+  const StoredMap map = load_map(maps[0]);
+  const std::string kept = second.store_tile(map);
+  const fs::path path = second.tile_path(kept);
+  add_maps(first, std::array{maps[0]}, 12, 1);
+  EXPECT_TRUE(fs::exists(path)) << "what another one writes is his";
+  EXPECT_FALSE(second.commit({}));
+  EXPECT_EQ(describe(second), describe(first));
   EXPECT_EQ(describe(Atlas::open(folder / "atlas")), describe(first));
+  EXPECT_TRUE(second.commit({second.contents(), {}}));
+  second = Atlas::open(folder / "atlas");
+  EXPECT_FALSE(fs::exists(path)) << "what no state refers to goes with its writer";
+  EXPECT_FALSE(first.commit({first.contents(), {}}));
+}
+
+TEST(AtlasTest, LeftoversOfTheKilledGo) {
+  const fs::path folder = empty_folder("atlas_leftovers");
+  const std::vector<fs::path> maps = {save_walk(folder, "walk", *walk_of_steps(0, 12, true))};
+  Atlas atlas = Atlas::open_or_create(folder / "atlas");
+  const fs::path tiles = folder / "atlas" / "tiles";
+  fs::create_directories(tiles / "new-abcdef");
+  std::ofstream(tiles / "new-abcdef" / "tile") << "half";
+  const fs::path unused = tiles / (std::string(64, 'a') + ".wmap");
+  std::ofstream(unused) << "was to be listed next";
+  Atlas::open_or_create(folder / "atlas");
+  EXPECT_FALSE(fs::exists(tiles / "new-abcdef"));
+  EXPECT_TRUE(fs::exists(unused)) << "it may be listed at any moment";
+  add_maps(atlas, maps, 12, 1);
+  EXPECT_FALSE(fs::exists(unused));
+  EXPECT_EQ(find_atlas_faults(folder / "atlas"), std::vector<std::string>());
+}
+
+TEST(AtlasTest, DamagedTilesAreMadeAgain) {
+  const fs::path folder = empty_folder("atlas_made_again");
+  const std::vector<fs::path> maps = save_walks(folder, Units::kMetres);
+  Atlas atlas = Atlas::open_or_create(folder / "atlas");
+  add_maps(atlas, maps, 12, 1);
+  const std::string before = describe(atlas);
+  const AtlasTile tile = atlas.contents().tiles[0];
+  fs::resize_file(atlas.tile_path(tile.checksum), 1000);
+  fs::remove(atlas.places_path(atlas.contents().tiles[1].places));
+  EXPECT_THROW(add_maps(atlas, maps, 24, 1), InputError) << "other tiles are of no use";
+  EXPECT_EQ(add_maps(atlas, maps, 12, 1).num_restored, 2u);
+  EXPECT_EQ(describe(atlas), before);
+  EXPECT_EQ(find_atlas_faults(folder / "atlas"), std::vector<std::string>());
+  // One that was adjusted comes back as it was cut.
+  optimize_atlas(atlas);
+  fs::remove(atlas.tile_path(atlas.contents().tiles[0].checksum));
+  EXPECT_EQ(add_maps(atlas, maps, 12, 1).num_restored, 1u);
+  EXPECT_EQ(atlas.contents().tiles[0].checksum, tile.origin);
+  EXPECT_EQ(find_atlas_faults(folder / "atlas"), std::vector<std::string>());
+}
+
+/// A program that is killed while it writes leaves a journal, from which the next one, whatever it
+/// wants, brings back the old state.
+TEST(AtlasTest, TakesBackWhatAKilledWriterBegan) {
+  const fs::path folder = empty_folder("atlas_killed");
+  const std::vector<fs::path> maps = {save_walk(folder, "walk", *walk_of_steps(0, 12, true))};
+  Atlas atlas = Atlas::open_or_create(folder / "atlas");
+  add_maps(atlas, maps, 12, 1);
+  const std::string before = describe(atlas);
+  const std::string path = (folder / "atlas" / "atlas.db").string();
+  const pid_t killed = fork();
+  if (killed == 0) {
+    sqlite3* base = nullptr;
+    sqlite3_open(path.c_str(), &base);
+    sqlite3_exec(base,
+                 "PRAGMA cache_size=1; BEGIN; DELETE FROM tile; DELETE FROM recording; INSERT INTO "
+                 "shared VALUES ('a', 'b', zeroblob(1000000)); SELECT count(*) FROM shared;",
+                 nullptr,
+                 nullptr,
+                 nullptr);
+    raise(SIGKILL);
+  }
+  waitpid(killed, nullptr, 0);
+  ASSERT_TRUE(fs::exists(path + "-journal"));
+  EXPECT_EQ(describe(Atlas::open(folder / "atlas")), before);
+  EXPECT_FALSE(fs::exists(path + "-journal"));
+  std::ofstream(path + "-journal", std::ios::binary)
+      << std::string(600, 'x') << "\xd9\xd5\x05\xf9\x20\xa1\x63\xd7";
+  EXPECT_THROW(Atlas::open(folder / "atlas"), InputError) << "it would remove another file";
 }
 
 TEST(AtlasTest, RefusesWhatIsNoAtlas) {
@@ -216,14 +315,46 @@ TEST(AtlasTest, NamesDamagedFiles) {
   }
 }
 
+/// Makes the atlas of one walk, for damage; the bytes of its data base.
+std::string make_atlas_of_a_walk(const fs::path& folder) {
+  Atlas atlas = Atlas::open_or_create(folder / "atlas");
+  add_maps(atlas, std::array{save_walk(folder, "walk", *walk_of_steps(0, 20, true))}, 8, 0);
+  return bytes_of(folder / "atlas" / "atlas.db");
+}
+
+/// Numbers that lead nowhere, and definitions that would be run.
+TEST(AtlasTest, ReadsNoDataBaseThatWasChanged) {
+  const fs::path folder = empty_folder("atlas_changes");
+  const std::string whole = make_atlas_of_a_walk(folder);
+  const fs::path path = folder / "atlas" / "atlas.db";
+  for (const char* change :
+       {"UPDATE tile SET frame = 16777216",
+        "UPDATE tile SET frame = (SELECT count(*) FROM tile)",
+        "UPDATE tile SET frame = 1 WHERE origin = (SELECT max(origin) FROM tile)",
+        "UPDATE tile SET keyframes = 0",
+        "UPDATE link SET b = a",
+        "UPDATE shared SET landmarks = x'0000000000000001'",
+        "ALTER TABLE state ADD COLUMN more AS (hex(zeroblob(9)))",
+        "ALTER TABLE state ADD COLUMN more CHECK (length(hex(zeroblob(9))) > 0)",
+        "CREATE INDEX more ON tile (length(hex(zeroblob(keyframes))))",
+        "CREATE TABLE more (a)"}) {
+    sqlite3* base = nullptr;
+    sqlite3_open(path.c_str(), &base);
+    ASSERT_EQ(sqlite3_exec(base, change, nullptr, nullptr, nullptr), SQLITE_OK)
+        << sqlite3_errmsg(base);
+    sqlite3_close(base);
+    EXPECT_FALSE(find_atlas_faults(folder / "atlas").empty()) << change;
+    EXPECT_THROW(export_atlas(Atlas::open(folder / "atlas")), InputError) << change;
+    std::ofstream(path, std::ios::binary) << whole;
+    EXPECT_TRUE(find_atlas_faults(folder / "atlas").empty());
+  }
+}
+
 /// Whatever the bytes of the data base, reading it ends, with contents that fit or one line.
 TEST(AtlasTest, ReadsNoDamagedDataBase) {
   const fs::path folder = empty_folder("atlas_mutations");
-  const std::vector<fs::path> maps = {save_walk(folder, "walk", *walk_of_steps(0, 20, true))};
-  Atlas atlas = Atlas::open_or_create(folder / "atlas");
-  add_maps(atlas, maps, 8, 0);
+  const std::string whole = make_atlas_of_a_walk(folder);
   const fs::path path = folder / "atlas" / "atlas.db";
-  const std::string whole = bytes_of(path);
   const auto size = static_cast<std::uint32_t>(whole.size());
   Rng rng(5, 0);
   int num_refused = 0;

@@ -7,7 +7,7 @@
 #include <map>
 #include <set>
 
-#include "waymark/atlas/test_atlas.h"
+#include "waymark/atlas/testing/atlas.h"
 #include "waymark/map/testing/random_map.h"
 
 namespace waymark {

@@ -34,4 +34,8 @@ StoredMap export_atlas(const Atlas& atlas) {
   return result;
 }
 
+StoredMap load_map_or_atlas(const std::filesystem::path& path) {
+  return is_atlas(path) ? export_atlas(Atlas::open(path)) : load_map(path);
+}
+
 }  // namespace waymark

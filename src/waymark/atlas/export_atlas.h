@@ -10,4 +10,7 @@ namespace waymark {
 /// and share what links tie. Its settings are those of the first tile.
 StoredMap export_atlas(const Atlas& atlas);
 
+/// The map in a file, or all of the atlas in a folder. Throws InputError.
+StoredMap load_map_or_atlas(const std::filesystem::path& path);
+
 }  // namespace waymark

@@ -162,7 +162,7 @@ std::optional<SharedLandmarks> match_tiles(const Map& a,
   const auto id_of = [&](KeyframeId query) {
     return KeyframeId{both.b.first_keyframe.value + query.value};
   };
-  const auto& rig = both.map.keyframes().at(id_of(queries[0])).rig;
+  const auto& rig = both.map.keyframes().at(id_of(queries[0])).features->rig;
   GlobalMapper mapper(rig, {}, {}, {.refine = "off"}, seed);
   mapper.take_over(index_map(both.map.freeze(), both.a.end_keyframe, both.a.first_keyframe));
   const auto tried = queries.first(std::min(queries.size(), kMaxQueries));

@@ -48,7 +48,7 @@ KeyframeImages images_of(const StoredMap& stored, const CutTile& tile) {
 /// The cameras of all keyframes must be known: places are compared through them.
 void check_models(const Map& map, const std::string& name) {
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    for (const RigCamera& camera : keyframe.rig->cameras) {
+    for (const RigCamera& camera : keyframe.rig().cameras) {
       if (camera.camera->can_project()) continue;
       throw InputError(name, "has a camera of an unknown model, expected one that is known");
     }
@@ -57,7 +57,7 @@ void check_models(const Map& map, const std::string& name) {
 
 }  // namespace
 
-CutRecording cut_recording(const Atlas& atlas,
+CutRecording cut_recording(Atlas& atlas,
                            const StoredMap& stored,
                            const std::string& checksum,
                            const std::string& name,

@@ -34,7 +34,7 @@ struct CutRecording {
 };
 
 /// Cuts a map into tiles and puts them into the folder. checksum: of the file of the map.
-CutRecording cut_recording(const Atlas& atlas,
+CutRecording cut_recording(Atlas& atlas,
                            const StoredMap& stored,
                            const std::string& checksum,
                            const std::string& name,

@@ -4,12 +4,12 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
 #include <string_view>
 
 #include "waymark/atlas/add.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/regular_file.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_record.h"
 #include "waymark/mapfile/map_record_stream.h"
@@ -53,8 +53,7 @@ void save_places(const std::filesystem::path& path, const TilePlaces& places) {
 }
 
 TilePlaces load_places(const std::filesystem::path& path, std::uint32_t num_keyframes) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path.string(), "cannot be read, expected the places of a tile");
+  std::ifstream stream = open_regular_file(path, "the places of a tile");
   MapRecordStream records(stream, path.string());
   MapRecord header = records.next();
   if (header.text("format", kMaxTextBytes) != "waymark-places") {

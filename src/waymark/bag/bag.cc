@@ -151,9 +151,11 @@ bool is_bag_file(const std::filesystem::path& path) {
 }
 
 bool is_bag_folder(const std::filesystem::path& folder) {
-  std::ifstream stream(folder / kMetadata);
   std::string line;
-  std::getline(stream, line);
+  if (std::error_code error; std::filesystem::is_regular_file(folder / kMetadata, error)) {
+    std::ifstream stream(folder / kMetadata);
+    std::getline(stream, line);
+  }
   return line.starts_with(kBagInformation) || !list_bag_files(folder).empty();
 }
 

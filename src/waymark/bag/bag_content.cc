@@ -2,17 +2,30 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/bag/bag_content.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
+#include <utility>
 
 #include "waymark/bag/byte_source.h"
+#include "waymark/bag/ros_messages.h"
+#include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
 
+/// Of 100 000 topics with long names, and of 40 hours of a camera: what is small when it is
+/// compressed must not fill the memory.
+constexpr std::size_t kMaxNameBytes = std::size_t{1} << 25;
+constexpr std::size_t kMaxBagMessages = std::size_t{1} << 22;
+
 /// The time in the std_msgs/Header with which a message begins; 0 where it has none.
-std::int64_t header_time_ns(RosEncoding encoding, std::string_view start) {
+std::int64_t header_time_ns(const BagTopic& topic, std::string_view start) {
+  const RosEncoding encoding = topic.encoding;
   FieldReader reader(start);
-  reader.take(4);  // ROS 1: the sequence number. CDR: how the rest is written.
+  // ROS 1: the sequence number, which those of Foxglove have not. CDR: how the rest is written.
+  if (encoding == RosEncoding::kCdr || topic.type != kRosCompressedVideo) reader.take(4);
   const auto seconds = reader.number<std::uint32_t>();
   const auto nanoseconds = reader.number<std::uint32_t>();
   const bool is_negative = encoding == RosEncoding::kCdr && seconds > INT32_MAX;
@@ -32,20 +45,24 @@ std::string ros1_type(std::string_view type) {
 
 bool BagTopic::is_listed() const {
   return encoding != RosEncoding::kUnknown &&
-         (type == "sensor_msgs/Image" || type == "sensor_msgs/CompressedImage" ||
-          type == "sensor_msgs/CameraInfo");
+         (type == "sensor_msgs/Image" || type == "sensor_msgs/CameraInfo" ||
+          type == kRosCompressedImage || type == kRosCompressedVideo || type == kRosFfmpegPacket);
 }
 
 std::uint32_t BagContent::topic_of(std::string_view name,
                                    std::string_view type,
                                    RosEncoding encoding) {
-  const std::string wanted = ros1_type(type);
-  const auto found = std::ranges::find_if(topics, [&](const BagTopic& topic) {
-    return topic.name == name && topic.type == wanted && topic.encoding == encoding;
-  });
-  const auto index = static_cast<std::uint32_t>(found - topics.begin());
-  if (found == topics.end()) topics.push_back({std::string(name), wanted, encoding, 0});
-  return index;
+  std::string name_in_ros1 = ros1_type(type);
+  const auto next = static_cast<std::uint32_t>(topics.size());
+  const auto [at, is_new] =
+      topic_by_name_.try_emplace({std::string(name), std::move(name_in_ros1), encoding}, next);
+  if (!is_new) return at->second;
+  num_name_bytes_ += name.size() + type.size();
+  if (num_name_bytes_ > kMaxNameBytes) {
+    throw InputError("topic " + quote_for_message(name), "is one of too many, expected a bag");
+  }
+  topics.push_back({std::string(name), std::get<1>(at->first), encoding, 0});
+  return next;
 }
 
 void BagContent::add(std::uint32_t topic,
@@ -55,12 +72,18 @@ void BagContent::add(std::uint32_t topic,
   BagTopic& of = topics.at(topic);
   ++of.num_messages;
   if (!of.is_listed()) return;
-  std::int64_t timestamp_ns = header_time_ns(of.encoding, start);
+  recorded_ns = std::max<std::int64_t>(recorded_ns, 0);
+  std::int64_t timestamp_ns = header_time_ns(of, start);
   if (timestamp_ns == 0) {
-    timestamp_ns = std::max<std::int64_t>(recorded_ns, 0);
+    timestamp_ns = recorded_ns;
     ++num_unstamped;
   }
-  messages.push_back({topic, timestamp_ns, place});
+  if (messages.size() == kMaxBagMessages) {
+    throw InputError(
+        "topic " + quote_for_message(of.name),
+        fmt::format("has too many messages, expected at most {} images in a bag", kMaxBagMessages));
+  }
+  messages.push_back({topic, timestamp_ns, recorded_ns, place});
 }
 
 }  // namespace waymark

@@ -4,9 +4,11 @@
 
 #include <cstddef>
 #include <cstdint>
+#include <map>
 #include <optional>
 #include <string>
 #include <string_view>
+#include <tuple>
 #include <vector>
 
 namespace waymark {
@@ -45,6 +47,7 @@ struct BagMessage {
   std::uint32_t topic = 0;  ///< Index into the topics.
   /// Of its header; when it was recorded where the header has none. Not negative.
   std::int64_t timestamp_ns = 0;
+  std::int64_t recorded_ns = 0;  ///< When it was recorded. Not negative.
   BagPlace place;
 };
 
@@ -58,7 +61,8 @@ struct BagContent {
   std::vector<std::string> faults;   ///< What is damaged or missing, for people.
   std::size_t num_unstamped = 0;     ///< Listed messages without a time in their header.
 
-  /// The topic of that name and type, new if need be. type: as in ROS 1 or ROS 2.
+  /// The topic of that name and type, new if need be. type: as in ROS 1 or ROS 2. InputError where
+  /// all names become longer than those of a bag can be.
   std::uint32_t topic_of(std::string_view name, std::string_view type, RosEncoding encoding);
 
   /// Counts a message and lists it if its topic is. start: its first kMessageStartBytes, or fewer.
@@ -66,6 +70,10 @@ struct BagContent {
            std::int64_t recorded_ns,
            const BagPlace& place,
            std::string_view start);
+
+ private:
+  std::map<std::tuple<std::string, std::string, RosEncoding>, std::uint32_t> topic_by_name_;
+  std::size_t num_name_bytes_ = 0;
 };
 
 }  // namespace waymark

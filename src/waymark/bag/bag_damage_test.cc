@@ -171,6 +171,39 @@ TEST(DamagedBag, LeavesOutAChunkWhoseChecksumIsWrong) {
   EXPECT_THAT(bag.content().faults, ElementsAre(HasSubstr("1 damaged chunk")));
 }
 
+/// Kilobytes of a bag can hold gigabytes.
+TEST(DamagedBag, DecompressesNoMoreThanItsSizeAccountsFor) {
+  const TemporaryFolder folder;
+  const std::string empty(kMaxChunkBytes / 8, '\0');
+  const std::string packed = testing::compress(Compression::kZstd, empty);
+  std::string bytes("\x89MCAP0\r\n", 8);
+  for (int i = 0; i < 5; ++i) {
+    bytes += testing::mcap_record(6,
+                                  std::string(16, '\0') + little(std::uint64_t{empty.size()}) +
+                                      little(std::uint32_t{0}) + testing::counted("zstd") +
+                                      little(std::uint64_t{packed.size()}) + packed);
+  }
+  bytes += testing::mcap_record(0x0F, little(std::uint32_t{0}));
+  write_bytes(folder / "a.mcap", bytes);
+  const Bag bag(folder / "a.mcap");
+  EXPECT_THAT(bag.content().faults, ElementsAre(HasSubstr("1 damaged chunks")));
+}
+
+TEST(DamagedBag, WithMoreTopicsThanMemoryIsRefused) {
+  BagContent content;
+  const std::string name(1000, 'n');
+  EXPECT_THAT(testing::input_error_of([&] {
+                for (int i = 0; i < 100'000; ++i) {
+                  const auto index = static_cast<std::uint32_t>(i);
+                  ASSERT_EQ(content.topic_of(name + std::to_string(i), "t", RosEncoding::kCdr),
+                            index);
+                }
+              }),
+              HasSubstr("is one of too many"));
+  EXPECT_EQ(content.topic_of(name + "0", "t", RosEncoding::kCdr), 0U) << "is known";
+  EXPECT_LT(content.topics.size(), 100'000U);
+}
+
 TEST(Decompression, ChecksWhatIsStated) {
   const std::string text(100'000, 'x');
   for (const Compression kind : {Compression::kLz4, Compression::kZstd, Compression::kBz2}) {

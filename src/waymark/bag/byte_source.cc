@@ -19,7 +19,8 @@ constexpr std::size_t kReadAhead = 16384;
 }  // namespace
 
 FileSource::FileSource(const std::filesystem::path& path)
-    : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC)) {
+    // A pipe is not waited for, but refused below.
+    : descriptor_(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK)) {
   struct stat status = {};
   if (descriptor_ < 0 || ::fstat(descriptor_, &status) != 0 || !S_ISREG(status.st_mode)) {
     if (descriptor_ >= 0) ::close(descriptor_);

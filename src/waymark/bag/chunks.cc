@@ -12,10 +12,11 @@
 namespace waymark {
 
 std::optional<std::string> ChunkedFile::decompress(const Chunk& chunk) {
-  if (chunk.stored_size > kMaxChunkBytes) return std::nullopt;
+  if (chunk.stored_size > kMaxChunkBytes || chunk.size > num_bytes_left_) return std::nullopt;
   const std::string_view stored =
       source_.peek(chunk.offset, static_cast<std::size_t>(chunk.stored_size));
   if (stored.size() != chunk.stored_size) return std::nullopt;
+  num_bytes_left_ -= chunk.size;
   return waymark::decompress(chunk.compression, stored, chunk.size);
 }
 

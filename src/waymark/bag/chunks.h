@@ -27,12 +27,14 @@ struct Chunk {
 /// A file with messages in compressed chunks, or in itself.
 class ChunkedFile : public BagFile {
  public:
-  explicit ChunkedFile(const std::filesystem::path& path) : path_(path), source_(path) {}
+  explicit ChunkedFile(const std::filesystem::path& path)
+      : path_(path), source_(path), num_bytes_left_(kBytesOfAny + kMaxRatio * source_.size()) {}
 
   FileSource& source() { return source_; }
   std::string name() const { return path_.string(); }
 
-  /// The content of a chunk, nothing if it is damaged.
+  /// The content of a chunk, nothing if it is damaged or if all that was decompressed were too much
+  /// for a file of this size.
   std::optional<std::string> decompress(const Chunk& chunk);
   /// Keeps a chunk whose messages are listed; its index in their places.
   std::uint32_t keep(const Chunk& chunk);
@@ -42,6 +44,9 @@ class ChunkedFile : public BagFile {
  private:
   const std::string& content_of(std::uint32_t chunk);
 
+  /// Images are compressed to a half; what is black, to a hundredth and less.
+  static constexpr std::uint64_t kMaxRatio = 200;
+  static constexpr std::uint64_t kBytesOfAny = std::uint64_t{256} << 20;
   /// The two images of a moment may be in neighbouring chunks.
   static constexpr std::size_t kNumOpen = 2;
   struct OpenChunk {
@@ -51,6 +56,7 @@ class ChunkedFile : public BagFile {
 
   std::filesystem::path path_;
   FileSource source_;
+  std::uint64_t num_bytes_left_;  ///< To decompress.
   std::vector<Chunk> chunks_;
   std::vector<OpenChunk> open_;  ///< At most kNumOpen, the one used last in front.
 };

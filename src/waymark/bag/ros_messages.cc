@@ -54,6 +54,10 @@ class MessageReader {
   /// std_msgs/Header; gives the name of its coordinate frame.
   std::string header() {
     if (!is_cdr_) number<std::uint32_t>();  // Sequence number.
+    return time_and_frame();
+  }
+
+  std::string time_and_frame() {
     number<std::uint32_t>();
     number<std::uint32_t>();
     return string();
@@ -91,12 +95,23 @@ std::optional<RosImage> parse_ros_image(std::string_view bytes, RosEncoding enco
 }
 
 std::optional<RosCompressedImage> parse_ros_compressed_image(std::string_view bytes,
-                                                             RosEncoding encoding) {
+                                                             RosEncoding encoding,
+                                                             std::string_view type) {
   MessageReader reader(bytes, encoding);
   RosCompressedImage image;
-  image.frame_id = reader.header();
-  image.format = reader.string();
-  image.data = reader.bytes();
+  if (type == kRosCompressedVideo) {
+    image.frame_id = reader.time_and_frame();
+    image.data = reader.bytes();
+    image.format = reader.string();
+  } else {
+    const bool is_packet = type == kRosFfmpegPacket;
+    image.frame_id = reader.header();
+    for (int i = 0; is_packet && i < 2; ++i) reader.number<std::uint32_t>();  // Width and height.
+    image.format = reader.string();
+    if (is_packet) reader.number<std::uint64_t>();                           // Time.
+    for (int i = 0; is_packet && i < 2; ++i) reader.number<std::uint8_t>();  // Flags.
+    image.data = reader.bytes();
+  }
   return reader.is_good() ? std::optional(image) : std::nullopt;
 }
 

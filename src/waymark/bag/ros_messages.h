@@ -27,10 +27,14 @@ struct RosImage {
   std::string_view data;
 };
 
-/// sensor_msgs/CompressedImage.
+inline constexpr std::string_view kRosCompressedImage = "sensor_msgs/CompressedImage";
+inline constexpr std::string_view kRosCompressedVideo = "foxglove_msgs/CompressedVideo";
+inline constexpr std::string_view kRosFfmpegPacket = "ffmpeg_image_transport_msgs/FFMPEGPacket";
+
+/// One of these three.
 struct RosCompressedImage {
   std::string frame_id;
-  std::string format;  ///< "jpeg", "16UC1; compressedDepth png", ...
+  std::string format;  ///< "jpeg", "16UC1; compressedDepth png", "h264", ...
   std::string_view data;
 };
 
@@ -54,8 +58,8 @@ struct RosCameraInfo {
 
 /// Each gives nothing for bytes that are no such message.
 std::optional<RosImage> parse_ros_image(std::string_view bytes, RosEncoding encoding);
-std::optional<RosCompressedImage> parse_ros_compressed_image(std::string_view bytes,
-                                                             RosEncoding encoding);
+std::optional<RosCompressedImage> parse_ros_compressed_image(
+    std::string_view bytes, RosEncoding encoding, std::string_view type = kRosCompressedImage);
 std::optional<RosCameraInfo> parse_ros_camera_info(std::string_view bytes, RosEncoding encoding);
 
 }  // namespace waymark

@@ -16,13 +16,21 @@ namespace waymark {
 struct CloseSqlite {
   void operator()(sqlite3* base) const { sqlite3_close_v2(base); }                 ///< A data base.
   void operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }  ///< A query.
+
+  std::shared_ptr<std::int64_t> num_steps_left = nullptr;  ///< Of a data base: what is left.
 };
 using SqliteDatabase = std::unique_ptr<sqlite3, CloseSqlite>;
 using SqliteStatement = std::unique_ptr<sqlite3_stmt, CloseSqlite>;
 
-/// Opens a data base of somebody else's for reading: nothing that it defines is run. Null unless it
-/// can be read and has the table.
-SqliteDatabase open_sqlite(const std::filesystem::path& path, const std::string& table);
+enum class SqliteAccess { kRead, kWrite };
+
+/// Opens a data base of somebody else's (sqlite.org/security.html): nothing that it defines is run,
+/// no value is longer than its file, and work ends after so many steps as its size accounts for.
+/// Null unless it is a regular file that can be read and has the table; InputError for one that
+/// defines more than tables of values and indices of columns.
+SqliteDatabase open_sqlite(const std::filesystem::path& path,
+                           const std::string& table,
+                           SqliteAccess access = SqliteAccess::kRead);
 
 /// Null where the query does not fit the data base.
 SqliteStatement prepare_sqlite(sqlite3* base, const char* query);

@@ -23,15 +23,6 @@ namespace {
 constexpr std::size_t kBufferBytes = std::size_t{1} << 16;
 constexpr int kMaxNames = 1000;
 
-/// After a rename the name itself is on the disk only when the folder is flushed too. File systems
-/// that cannot do that are no reason to fail: the content is safe by then.
-void flush_folder(const std::filesystem::path& folder) {
-  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
-  if (descriptor < 0) return;
-  ::fsync(descriptor);
-  ::close(descriptor);
-}
-
 std::filesystem::path folder_of(const std::filesystem::path& path) {
   return path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
 }
@@ -156,6 +147,15 @@ void remove_abandoned_parts(const std::filesystem::path& path) {
     if (maker && ::kill(*maker, 0) != 0 && errno == ESRCH) abandoned.push_back(entry->path());
   }
   for (const std::filesystem::path& part : abandoned) std::filesystem::remove(part, error);
+}
+
+/// After a rename the name itself is on the disk only when the folder is flushed too. File systems
+/// that cannot do that are no reason to fail: the content is safe by then.
+void flush_folder(const std::filesystem::path& folder) {
+  const int descriptor = ::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (descriptor < 0) return;
+  ::fsync(descriptor);
+  ::close(descriptor);
 }
 
 void make_output_folder(const std::filesystem::path& folder) {

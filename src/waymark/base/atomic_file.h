@@ -48,6 +48,9 @@ void save_each(std::initializer_list<std::function<void()>> saves);
 /// program writes stays.
 void remove_abandoned_parts(const std::filesystem::path& path);
 
+/// Puts the names in a folder on the disk, where its file system can.
+void flush_folder(const std::filesystem::path& folder);
+
 /// Makes the folder and those above it; throws OutputError when that fails or a file is in the way.
 void make_output_folder(const std::filesystem::path& folder);
 

@@ -54,12 +54,19 @@ ConfigSource ConfigSource::from_file(const std::filesystem::path& path) {
   if (std::filesystem::is_directory(path, error)) {
     throw InputError(path.string(), "is a folder, expected a YAML file");
   }
+  // A pipe that a shell has opened, -c <(command), ends; one with a name may have no writer.
+  const bool is_of_shell =
+      path.string().starts_with("/dev/") || path.string().starts_with("/proc/");
+  if (std::filesystem::is_fifo(path, error) && !is_of_shell) {
+    throw InputError(path.string(), "is a pipe, expected a YAML file");
+  }
   std::ifstream stream(path, std::ios::binary);
   if (!stream) throw InputError(path.string(), "cannot be opened, expected a YAML file");
   std::string text(kMaxSize + 1, '\0');
   stream.read(text.data(), static_cast<std::streamsize>(text.size()));
   if (stream.bad()) throw InputError(path.string(), "cannot be read");
   text.resize(static_cast<std::size_t>(stream.gcount()));
+  text.shrink_to_fit();
   if (text.size() > kMaxSize) {
     throw InputError(path.string(), "is larger than 1 MiB, expected settings as YAML");
   }

@@ -160,7 +160,9 @@ ConfigNode parse_text(const ConfigSource& source) {
     ConfigNode root = builder.take_root();
     if (parser) {
       TreeBuilder rest(file);
-      if (parser.HandleNextDocument(rest)) {
+      // A last line of --- begins nothing.
+      const bool has_more = parser.HandleNextDocument(rest);
+      if (has_more && (parser || rest.take_root().kind != ConfigNode::Kind::kNull)) {
         throw InputError(source.name, "holds several documents (---), expected one");
       }
     }

@@ -98,6 +98,7 @@ TEST(Config, ErrorsNameTheLine) {
               StartsWith("a.yaml:2: has a key that is a list"));
   EXPECT_THAT(parse_error(": 2\n"), HasSubstr("a value without a key"));
   EXPECT_THAT(parse_error("a: 1\n---\nb: 2\n"), HasSubstr("several documents"));
+  EXPECT_EQ(parse_config({"a.yaml", "a: 1\n---\n"}).keys.size(), 1u) << "which begins none";
 }
 
 TEST(Config, HostileTextsAreRefused) {

@@ -5,10 +5,10 @@
 #include <algorithm>
 #include <bit>
 #include <cstring>
-#include <fstream>
 #include <vector>
 
 #include "waymark/base/check.h"
+#include "waymark/base/regular_file.h"
 
 namespace waymark {
 namespace {
@@ -84,8 +84,7 @@ std::string sha256(std::string_view bytes) {
 }
 
 std::string sha256_of_file(const std::filesystem::path& path) {
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path.string(), "cannot be read, expected a file");
+  std::ifstream stream = open_regular_file(path, "a file");
   Sha256 sum;
   std::vector<char> buffer(std::size_t{1} << 20);
   while (stream) {

@@ -33,7 +33,7 @@ TEST(Sha256Test, DoesNotDependOnThePieces) {
 }
 
 TEST(Sha256Test, ReadsFiles) {
-  const std::string path = testing::TempDir() + "waymark_sha256";
+  const std::string path = ::testing::TempDir() + "waymark_sha256";
   const std::string text(3'000'001, 'x');
   write_file_atomically(path, text);
   EXPECT_EQ(sha256_of_file(path), sha256(text));

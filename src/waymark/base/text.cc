@@ -10,6 +10,8 @@
 #include <fstream>
 
 #include "waymark/base/check.h"
+#include "waymark/base/regular_file.h"
+#include "waymark/base/time_column.h"
 
 namespace waymark {
 namespace {
@@ -210,13 +212,6 @@ std::int64_t RowReader::nanoseconds(std::size_t index) const {
   return *value;
 }
 
-std::int64_t RowReader::seconds_as_ns(std::size_t index) const {
-  WAYMARK_CHECK(index < fields_.size());
-  const std::optional<std::int64_t> value = parse_seconds(fields_[index]);
-  if (!value || *value < 0) fail(index, "a time in seconds from 0 to 9.2e9");
-  return *value;
-}
-
 std::string RowReader::relative_path(std::size_t index) const {
   WAYMARK_CHECK(index < fields_.size());
   const std::string_view field = fields_[index];
@@ -232,10 +227,11 @@ std::string RowReader::relative_path(std::size_t index) const {
 
 std::vector<std::int64_t> parse_times(std::string_view text, const std::string& name) {
   std::vector<std::int64_t> times_ns;
+  const TimeColumn column(text, ' ');
   RowReader rows(text, name, ' ');
   while (rows.next()) {
     rows.expect_exactly(1, "1: a time in seconds");
-    const std::int64_t time_ns = rows.seconds_as_ns(0);
+    const std::int64_t time_ns = column.read(rows);
     if (!times_ns.empty() && time_ns <= times_ns.back()) {
       throw InputError(rows.where(), "not later than the time before, expected increasing times");
     }
@@ -245,23 +241,29 @@ std::vector<std::int64_t> parse_times(std::string_view text, const std::string& 
   return times_ns;
 }
 
+std::ifstream open_regular_file(const std::filesystem::path& path, std::string_view expected) {
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  const auto fail = [&](const char* what) {
+    throw InputError(path.string(), fmt::format("{}, expected {}", what, expected));
+  };
+  if (!std::filesystem::exists(status)) fail("missing");
+  if (!std::filesystem::is_regular_file(status)) fail("is no regular file");
+  std::ifstream stream(path, std::ios::binary);
+  if (!stream) fail("cannot be read");
+  return stream;
+}
+
 std::string read_text_file(const std::filesystem::path& path,
                            std::string_view expected,
                            std::size_t max_bytes) {
+  std::ifstream stream = open_regular_file(path, expected);
   std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    throw InputError(path.string(), fmt::format("missing, expected {}", expected));
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(path.string(), fmt::format("is no regular file, expected {}", expected));
-  }
   const std::uintmax_t size = std::filesystem::file_size(path, error);
   if (error || size > max_bytes) {
     throw InputError(path.string(),
                      fmt::format("larger than {} MB, expected {}", max_bytes >> 20, expected));
   }
-  std::ifstream stream(path, std::ios::binary);
   std::string content(static_cast<std::size_t>(size), '\0');
   stream.read(content.data(), static_cast<std::streamsize>(size));
   if (!stream)

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <concepts>
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>
@@ -34,6 +35,15 @@ inline double unsigned_zero(double value) { return value == 0.0 ? 0.0 : value; }
 /// A number with so many decimals; what rounds to zero has no sign.
 std::string format_decimals(double value, int num_decimals);
 
+/// How many of something there are: "1 loop", "2 loops". plural is given where it is not the noun
+/// with an s.
+template <std::integral T>
+std::string count_of(T count, std::string_view noun, std::string_view plural = {}) {
+  std::string text = std::to_string(count) + ' ';
+  if (count == 1) return text.append(noun);
+  return plural.empty() ? text.append(noun).append("s") : text.append(plural);
+}
+
 /// Reads rows of fields from text that came from outside. Blank lines and lines that start with '#'
 /// are passed over; every error is an InputError that names file, line and what was expected.
 class RowReader {
@@ -58,7 +68,6 @@ class RowReader {
   /// negative, so that differences of two cannot overflow.
   double number(std::size_t index) const;
   std::int64_t nanoseconds(std::size_t index) const;
-  std::int64_t seconds_as_ns(std::size_t index) const;
   /// A path below the folder of a data set: relative and without "..".
   std::string relative_path(std::size_t index) const;
 

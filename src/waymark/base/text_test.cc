@@ -82,6 +82,9 @@ TEST(FormatDecimals, GivesZeroNoSign) {
   EXPECT_EQ(format_decimals(-0.4, 0), "0");
   EXPECT_FALSE(std::signbit(unsigned_zero(-0.0)));
   EXPECT_EQ(unsigned_zero(-1e-300), -1e-300);
+  EXPECT_EQ(count_of(1, "loop"), "1 loop");
+  EXPECT_EQ(count_of(0, "loop"), "0 loops");
+  EXPECT_EQ(count_of(12, "match", "matches"), "12 matches");
 }
 
 TEST(ParseNumber, WantsTheWholeTextAndFiniteValues) {
@@ -123,10 +126,9 @@ TEST(RowReader, SaysWhereAndWhatWasExpected) {
 }
 
 TEST(RowReader, RefusesNegativeTimes) {
-  RowReader rows("-1 -0.5", "f.txt", ' ');
+  RowReader rows("-1", "f.txt", ' ');
   ASSERT_TRUE(rows.next());
   EXPECT_THROW(rows.nanoseconds(0), InputError);
-  EXPECT_THROW(rows.seconds_as_ns(1), InputError);
 }
 
 TEST(RowReader, AcceptsNoPathOutsideTheFolder) {

@@ -13,6 +13,7 @@
 #include "waymark/calibrate/compete.h"
 #include "waymark/calibrate/look.h"
 #include "waymark/calibrate/refine.h"
+#include "waymark/camera/registry.h"
 #include "waymark/image/convert.h"
 #include "waymark/system/system.h"
 
@@ -32,11 +33,9 @@ constexpr double kRepeatability = 0.004;
 /// Matches that are wrong together make the focal length less certain than the residuals tell.
 constexpr double kHonesty = 2.0;
 constexpr double kSure = 0.03;
-/// How far a focal length may be off, relatively: any, by a data sheet, as the camera noted it,
-/// that of most cameras.
+/// How far a focal length may be off, relatively: any, by a data sheet, that of most cameras.
 constexpr double kAnyFocalLength = 1.0;
 constexpr double kByDataSheet = 0.05;
-constexpr double kAsNoted = 0.1;
 constexpr double kOfMost = 0.3;
 
 /// Images of camera 0 in order, reduced.
@@ -52,6 +51,12 @@ bool is_stopped(const CalibrateOptions& options) {
   return options.should_stop && options.should_stop();
 }
 
+/// InputError for images of a size that no camera has.
+void check_size(int width_px, int height_px) {
+  CameraRegistry::with_builtin_models().make_camera(
+      make_lens(LensModel::kPerspective, width_px, width_px, height_px));
+}
+
 Stretch read_stretch(Input& input, const CalibrateOptions& options) {
   Stretch stretch;
   while (stretch.images.size() < kStretchFrames && !is_stopped(options)) {
@@ -61,6 +66,7 @@ Stretch read_stretch(Input& input, const CalibrateOptions& options) {
     Image& image = frame->images.front();
     stretch.width_px = image.width_px;
     stretch.height_px = image.height_px;
+    if (stretch.images.empty()) check_size(image.width_px, image.height_px);
     const double pixels = static_cast<double>(image.values.size());
     stretch.factor = std::min(1.0, std::sqrt(kMaxPixels / pixels));
     stretch.images.push_back(stretch.factor < 1.0 ? reduce(image.view(), stretch.factor)
@@ -106,28 +112,6 @@ AssumedLens look_at(const Stretch& stretch) {
     assumed.description.intrinsics[3] = circle->center_px.y();
   }
   return assumed;
-}
-
-/// What is known of the field of view before images tell, and how far the focal length that they
-/// tell may be from what is taken at first.
-struct KnownOfFov {
-  ExpectedFov expected;
-  double focal_sigma = kAnyFocalLength;
-  double untold_sigma = kOfMost;  ///< Of the focal length where images do not tell it.
-};
-
-KnownOfFov known_of_fov(const InputInfo& info, LensModel model, const CalibrateOptions& options) {
-  KnownOfFov known;
-  if (options.fov_deg) {
-    known.expected.rad = *options.fov_deg * kRadiansPerDegree;
-    known.expected.is_known = true;
-    known.focal_sigma = kByDataSheet;
-  } else if (info.focal_px) {
-    known.expected.rad = fov_of(model, *info.focal_px, info.width_px);
-    known.expected.spread = kAsNoted;
-    known.focal_sigma = known.untold_sigma = kAsNoted;
-  }
-  return known;
 }
 
 /// How far off the axis the corner of the image is seen.
@@ -193,9 +177,7 @@ EstimatedCalibration full_size(const Stretch& stretch, const CameraDescription& 
   return calibration;
 }
 
-EstimatedCalibration calibrate_stretch(const Stretch& stretch,
-                                       const InputInfo& info,
-                                       const CalibrateOptions& options) {
+EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOptions& options) {
   AssumedLens assumed = look_at(stretch);
   if (assumed.model == LensModel::kEquirectangular) {
     EstimatedCalibration calibration = full_size(stretch, assumed.description);
@@ -204,20 +186,22 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch,
     calibration.reason = "twice as wide as high, and the left border goes on at the right one";
     return calibration;
   }
-  const KnownOfFov known = known_of_fov(info, assumed.model, options);
+  std::optional<double> known_fov_rad;
+  if (options.fov_deg) known_fov_rad = *options.fov_deg * kRadiansPerDegree;
   const std::vector<PixelMatches> pairs =
       match_stretch(stretch.images, stretch.masks, assumed.description);
-  const DivisionLens found = find_division_lens(pairs, assumed.description, known.expected);
+  const DivisionLens found = find_division_lens(pairs, assumed.description, known_fov_rad);
   if (corner_angle(found, assumed.description) > kFisheyeRad) assumed.model = LensModel::kFisheye;
   const CameraDescription lens = with_coefficients(assumed.model,
                                                    found.focal_px(assumed.description.width_px),
                                                    found.division,
                                                    assumed.description);
-  const auto refined = refine_by_mapping(stretch, lens, known.focal_sigma, options);
+  const double focal_sigma = known_fov_rad ? kByDataSheet : kAnyFocalLength;
+  const auto refined = refine_by_mapping(stretch, lens, focal_sigma, options);
   EstimatedCalibration calibration = full_size(stretch, refined ? refined->description : lens);
   calibration.model = assumed.model;
   calibration.reason = "the motion does not tell, the likeliest is taken";
-  calibration.sigmas = lens_sigmas(calibration.camera.width_px, known.untold_sigma);
+  calibration.sigmas = lens_sigmas(calibration.camera.width_px, kOfMost);
   if (!refined) return calibration;
   calibration.num_keyframes = refined->num_keyframes;
   calibration.reprojection_px = refined->reprojection_px;
@@ -300,7 +284,7 @@ EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options) {
     }
     const Stretch stretch = read_stretch(input, options);
     if (stretch.images.empty() || (best && stretch.images.size() < kMinFrames)) break;
-    EstimatedCalibration next = calibrate_stretch(stretch, input.info(), options);
+    EstimatedCalibration next = calibrate_stretch(stretch, options);
     if (!best || next.sigmas[0] < best->sigmas[0]) best = std::move(next);
     if (best->is_sure) break;
   }

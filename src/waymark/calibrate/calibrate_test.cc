@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "waymark/base/testing/errors.h"
+#include "waymark/image/image_header.h"
 #include "waymark/simulate/sequence.h"
 
 namespace waymark {
@@ -18,17 +19,30 @@ using ::testing::Contains;
 using ::testing::HasSubstr;
 using ::testing::StartsWith;
 
+/// Grey images of a size.
+class BlankInput : public Input {
+ public:
+  explicit BlankInput(const ImageSize& size) : size_(size) {}
+  const InputInfo& info() const override { return info_; }
+  std::optional<InputFrame> next() override {
+    if (next_ == 20) return std::nullopt;
+    InputFrame frame;
+    frame.index = next_++;
+    frame.images.emplace_back(size_.width_px, size_.height_px);
+    return frame;
+  }
+
+ private:
+  ImageSize size_;
+  InputInfo info_;
+  std::size_t next_ = 0;
+};
+
 /// A camera that is moved through the room, of which nobody says what it is.
 class RenderedInput : public Input {
  public:
   RenderedInput(const CameraDescription& camera, const std::string& motion, int num_frames)
       : sequence_(spec_of(camera, motion, num_frames)) {}
-
-  /// As cameras do in photos.
-  void note(double focal_px, int width_px) {
-    info_.width_px = width_px;
-    info_.focal_px = focal_px;
-  }
 
   /// As fisheye lenses do: black is what lies farther from the centre.
   void light_circle(double radius_px) { circle_px_ = radius_px; }
@@ -105,22 +119,10 @@ TEST(Calibrate, SaysWhereNothingTells) {
   EXPECT_NEAR(calibrate(again, options).fov_deg, 80.0, 0.5);
 }
 
-TEST(Calibrate, BeginsWithWhatTheCameraNoted) {
-  RenderedInput still(wide_lens(), "still", 12);
-  still.note(focal_length_of(LensModel::kPerspective, 85.0 * kRadiansPerDegree, 400), 400);
-  const EstimatedCalibration taken = calibrate(still, {});
-  EXPECT_NEAR(taken.fov_deg, 85.0, 3.0);
-  EXPECT_EQ(taken.sigmas[0], 0.1);
-}
-
-/// Angles, not tangents, are in proportion to pixels there.
-TEST(Calibrate, KnowsWhatAFocalLengthMeansOfAFisheyeLens) {
+TEST(Calibrate, TakesAnImageInACircleForThatOfAFisheyeLens) {
   RenderedInput still(make_lens(LensModel::kFisheye, 55.0, 160, 160), "still", 12);
   still.light_circle(75.0);
-  still.note(55.0, 160);
-  const EstimatedCalibration taken = calibrate(still, {});
-  EXPECT_EQ(taken.model, LensModel::kFisheye);
-  EXPECT_NEAR(taken.fov_deg, 160.0 / 55.0 / kRadiansPerDegree, 5.0);
+  EXPECT_EQ(calibrate(still, {}).model, LensModel::kFisheye);
 }
 
 TEST(Calibrate, SeesAllDirections) {
@@ -129,6 +131,16 @@ TEST(Calibrate, SeesAllDirections) {
   EXPECT_EQ(found.model, LensModel::kEquirectangular);
   EXPECT_TRUE(found.is_sure);
   EXPECT_EQ(found.camera.camera_model, "equirectangular");
+}
+
+TEST(Calibrate, WantsImagesThatCamerasTake) {
+  for (const ImageSize& size : {ImageSize{15, 40}, {40, 8}, {1, 1}, {20001, 40}}) {
+    BlankInput input(size);
+    EXPECT_THAT(testing::input_error_of([&] { calibrate(input, {}); }),
+                HasSubstr("expected width and height from 16 to 20000"));
+  }
+  BlankInput least({16, 16});
+  EXPECT_FALSE(calibrate(least, {}).is_sure);
 }
 
 TEST(Calibrate, WantsImages) {

@@ -75,16 +75,12 @@ PixelMatches pixels_of(const Features& a,
 
 /// The image furthest from one that is recognised in it, by doubling.
 std::optional<PixelMatches> widest_pair(FeatureStore& store, std::size_t first, std::size_t end) {
-  AppearanceMatcher matcher;
   const Features& a = store.of(first);
-  std::vector<std::uint32_t> indices(a.num_primary);
-  std::iota(indices.begin(), indices.end(), 0u);
   std::optional<PixelMatches> widest;
   for (std::size_t apart = 4; apart <= kMaxApart && first + apart < end; apart *= 2) {
-    const Features& b = store.of(first + apart);
-    const auto matches = matcher.match_all(a, indices, b, AppearanceOptions{});
-    if (matches.size() < kMinMatches) break;
-    widest = pixels_of(a, b, matches);
+    auto next = match_pixels(a, store.of(first + apart));
+    if (!next) break;
+    widest = std::move(next);
   }
   return widest;
 }
@@ -128,6 +124,7 @@ void keep_valid(SideOfMatches& a, SideOfMatches& b) {
 
 constexpr double kNarrowestRad = 35.0 * kRadiansPerDegree;
 constexpr double kWidestRad = 200.0 * kRadiansPerDegree;
+constexpr double kUsualFovRad = 65.0 * kRadiansPerDegree;  ///< Many cameras have about that.
 constexpr double kFovRatio = 1.2;
 constexpr std::array<double, 5> kDivisions = {0.0, -0.1, -0.2, -0.33, -0.45};
 constexpr int kNumRefinements = 2;
@@ -139,10 +136,11 @@ struct RankedLens {
 };
 
 /// What a lens costs for being unusual: it decides where the images hardly tell. Per match.
-double unlikeliness(const DivisionLens& lens, const ExpectedFov& expected) {
+double unlikeliness(const DivisionLens& lens, double likely_fov_rad) {
+  constexpr double kSpreadOfFov = 0.35;  // Standard deviation of its logarithm.
   constexpr double kSpreadOfDivision = 0.2;
   constexpr double kWeight = 0.002;
-  const double of_fov = std::log(lens.fov_rad / expected.rad) / expected.spread;
+  const double of_fov = std::log(lens.fov_rad / likely_fov_rad) / kSpreadOfFov;
   const double of_division = lens.division / kSpreadOfDivision;
   return kWeight * (of_fov * of_fov + of_division * of_division);
 }
@@ -161,7 +159,7 @@ RankedLens better_of(const RankedLens& known,
                      const DivisionLens& lens,
                      std::span<const PixelMatches> pairs,
                      const CameraDescription& assumed,
-                     const ExpectedFov& expected) {
+                     double likely_fov_rad) {
   CameraDescription description = assumed;
   const double focal_px = lens.focal_px(assumed.width_px);
   if (!(focal_px > 0.1 * assumed.width_px)) return known;
@@ -172,11 +170,20 @@ RankedLens better_of(const RankedLens& known,
   description.intrinsics[0] = description.intrinsics[1] = focal_px;
   const auto camera = make_if_possible(description);
   if (!camera) return known;
-  const double cost = two_view_cost(*camera, pairs) + unlikeliness(lens, expected);
+  const double cost = two_view_cost(*camera, pairs) + unlikeliness(lens, likely_fov_rad);
   return cost < known.cost ? RankedLens{lens, cost} : known;
 }
 
 }  // namespace
+
+std::optional<PixelMatches> match_pixels(const Features& a, const Features& b) {
+  AppearanceMatcher matcher;
+  std::vector<std::uint32_t> indices(a.num_primary);
+  std::iota(indices.begin(), indices.end(), 0u);
+  const auto matches = matcher.match_all(a, indices, b, AppearanceOptions{});
+  if (matches.size() < kMinMatches) return std::nullopt;
+  return pixels_of(a, b, matches);
+}
 
 std::vector<PixelMatches> match_stretch(std::span<const Image> images,
                                         std::span<const Image> masks,
@@ -217,29 +224,31 @@ double DivisionLens::focal_px(int width_px) const {
 
 DivisionLens find_division_lens(std::span<const PixelMatches> pairs,
                                 const CameraDescription& assumed,
-                                const ExpectedFov& expected) {
+                                std::optional<double> known_fov_rad) {
+  const double likely_fov_rad = known_fov_rad.value_or(kUsualFovRad);
   std::vector<PixelMatches> half;
   for (std::size_t i = 0; i < pairs.size(); i += 2) half.push_back(pairs[i]);
   std::vector<double> fovs_rad;
-  if (expected.is_known || expected.spread < ExpectedFov().spread) fovs_rad = {expected.rad};
-  if (!expected.is_known) {
+  if (known_fov_rad) {
+    fovs_rad = {*known_fov_rad};
+  } else {
     for (double fov = kNarrowestRad; fov <= kWidestRad; fov *= kFovRatio) fovs_rad.push_back(fov);
   }
   RankedLens best;
   for (const double fov : fovs_rad) {
     for (const double division : kDivisions) {
-      best = better_of(best, {fov, division}, half, assumed, expected);
+      best = better_of(best, {fov, division}, half, assumed, likely_fov_rad);
     }
   }
   best.cost = kNever;
-  double fov_ratio = expected.is_known ? 1.0 : std::sqrt(kFovRatio);
+  double fov_ratio = known_fov_rad ? 1.0 : std::sqrt(kFovRatio);
   double step = 0.06;
   for (int round = 0; round < kNumRefinements; ++round) {
     const DivisionLens center = best.lens;
     for (const double ratio : {1.0, 1.0 / fov_ratio, fov_ratio}) {
       for (const double offset : {0.0, -step, step}) {
         const DivisionLens lens{center.fov_rad * ratio, center.division + offset};
-        best = better_of(best, lens, pairs, assumed, expected);
+        best = better_of(best, lens, pairs, assumed, likely_fov_rad);
       }
     }
     fov_ratio = std::sqrt(fov_ratio);

@@ -3,11 +3,13 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
 #include "waymark/calibrate/lens.h"
 #include "waymark/camera/camera.h"
+#include "waymark/image/features.h"
 #include "waymark/image/image.h"
 
 namespace waymark {
@@ -18,6 +20,9 @@ struct PixelMatches {
   std::vector<float> scales_a, scales_b;            ///< Size of one pixel of the feature's level.
   double shift_px = 0.0;                            ///< Median distance in the image.
 };
+
+/// What looks alike in two images; nothing where that is too little to tell.
+std::optional<PixelMatches> match_pixels(const Features& a, const Features& b);
 
 /// Pairs of images of a stretch, spread over it, each as far apart as enough of what the first
 /// shows is recognised in the second. Looks at pixels and their surroundings only; the camera says
@@ -40,17 +45,11 @@ struct DivisionLens {
   double focal_px(int width_px) const;
 };
 
-/// What is known of the horizontal field of view before images tell.
-struct ExpectedFov {
-  double rad = 65.0 * kRadiansPerDegree;  ///< Many cameras have about that.
-  double spread = 0.35;                   ///< Standard deviation of its logarithm.
-  bool is_known = false;                  ///< It is that, and no other is tried.
-};
-
-/// The lens that explains matches best, of all fields of view (unless it is known) and strengths of
-/// distortion; where nothing tells, the likeliest. Principal point and size are those of `assumed`.
+/// The lens that explains matches best, of all fields of view (horizontal; unless it is known) and
+/// strengths of distortion; where nothing tells, the likeliest. Principal point and size are those
+/// of `assumed`.
 DivisionLens find_division_lens(std::span<const PixelMatches> pairs,
                                 const CameraDescription& assumed,
-                                const ExpectedFov& expected = {});
+                                std::optional<double> known_fov_rad = std::nullopt);
 
 }  // namespace waymark

@@ -9,6 +9,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/calibrate/lens.h"
+#include "waymark/calibrate/missing_distortion.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {
@@ -69,10 +70,29 @@ TEST(FindDivisionLens, FindsFieldOfViewAndDistortion) {
 TEST(FindDivisionLens, KeepsAFieldOfViewThatIsKnown) {
   const double focal_px = focal_length_of(LensModel::kPerspective, 60.0 * kRadiansPerDegree, 640);
   const auto pairs = see_points(make_lens(LensModel::kPerspective, focal_px, 640, 480), 4);
-  EXPECT_EQ(
-      find_division_lens(pairs, any_lens(), {.rad = 50.0 * kRadiansPerDegree, .is_known = true})
-          .fov_rad,
-      50.0 * kRadiansPerDegree);
+  EXPECT_EQ(find_division_lens(pairs, any_lens(), 50.0 * kRadiansPerDegree).fov_rad,
+            50.0 * kRadiansPerDegree);
+}
+
+TEST(FindMissingDistortion, FindsWhatIsSaidToBeZero) {
+  CameraDescription lens = make_lens(LensModel::kPerspective, 420.0, 640, 480);
+  CameraDescription ideal = lens;
+  ideal.distortion_model = "none";
+  ideal.distortion_coeffs.clear();
+  const auto find = [&](int num_pairs) {
+    return find_missing_distortion(see_points(lens, num_pairs), ideal, *make_if_possible(ideal));
+  };
+  EXPECT_FALSE(find(12));
+  for (const double k1 : {-0.25, -0.1, 0.1}) {
+    lens.distortion_coeffs[0] = k1;
+    const auto found = find(12);
+    ASSERT_TRUE(found) << k1;
+    EXPECT_EQ(found->intrinsics, ideal.intrinsics);
+    EXPECT_NEAR(found->distortion_coeffs.at(0), k1, 0.07);
+    EXPECT_FALSE(find_missing_distortion(see_points(lens, 12), ideal, *make_if_possible(lens)))
+        << "where it is known by now";
+  }
+  EXPECT_FALSE(find(4)) << "by too few";
 }
 
 TEST(FindDivisionLens, TakesTheLikeliestWhereNothingTells) {

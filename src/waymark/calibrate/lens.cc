@@ -53,11 +53,6 @@ double focal_length_of(LensModel model, double fov_rad, int width_px) {
   return 0.5 * width_px / radius;
 }
 
-double fov_of(LensModel model, double focal_px, int width_px) {
-  const double radius = 0.5 * width_px / focal_px;
-  return 2.0 * (model == LensModel::kFisheye ? radius : std::atan(radius));
-}
-
 CameraDescription with_coefficients(LensModel model,
                                     double focal_px,
                                     double division,

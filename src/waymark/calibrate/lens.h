@@ -37,8 +37,6 @@ CameraDescription make_lens(LensModel model, double focal_px, int width_px, int 
 
 /// Focal length of an image that is that wide, for a horizontal field of view.
 double focal_length_of(LensModel model, double fov_rad, int width_px);
-/// The other way round, in radians.
-double fov_of(LensModel model, double focal_px, int width_px);
 
 /// A lens of the division model (camera/division.h) as one of radtan or equidistant coefficients:
 /// by least squares over the radii up to the corner of the image.

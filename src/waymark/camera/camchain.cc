@@ -273,12 +273,15 @@ std::optional<CameraChain> read_camchain(const ConfigNode& config) {
   }
   check_numbering(config, chain.cameras.size());
   if (chain.cameras.empty()) return std::nullopt;
+  chain.depth_factor = read_depth_factor(config);
+  return chain;
+}
+
+std::optional<double> read_depth_factor(const ConfigNode& config) {
   const ConfigNode* depth = config.find("depth");
   const ConfigNode* factor = depth == nullptr ? nullptr : depth->find("factor");
-  if (factor != nullptr) {
-    chain.depth_factor = config_double(*factor, "depth.factor", {.low = 1e-3, .high = 1e9});
-  }
-  return chain;
+  if (factor == nullptr) return std::nullopt;
+  return config_double(*factor, "depth.factor", {.low = 1e-3, .high = 1e9});
 }
 
 std::string format_camchain(const CameraChain& chain) {

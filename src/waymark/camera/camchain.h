@@ -35,6 +35,10 @@ struct CameraChain {
 /// malformed, with its line; models and their numbers are checked by make_rig().
 std::optional<CameraChain> read_camchain(const ConfigNode& config);
 
+/// depth.factor of such a document, which may be all of it; nothing if it has none. Throws
+/// InputError.
+std::optional<double> read_depth_factor(const ConfigNode& config);
+
 /// The chain in Kalibr's format, as read_camchain() reads it, with the standard deviations that it
 /// has.
 std::string format_camchain(const CameraChain& chain);

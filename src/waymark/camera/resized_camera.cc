@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <string_view>
+#include <vector>
 
 namespace waymark {
 namespace {
@@ -30,6 +31,19 @@ std::optional<CameraDescription> resized(const CameraDescription& camera, double
     for (int i = 2; i < 4; ++i) plane[i] = factor * (plane[i] + 0.5) - 0.5;
   } else if (camera.camera_model != "equirectangular") {
     return std::nullopt;
+  }
+  return result;
+}
+
+std::optional<ChainCamera> resized(const ChainCamera& camera, double factor) {
+  const auto description = resized(camera.description, factor);
+  if (!description) return std::nullopt;
+  ChainCamera result = camera;
+  result.description = *description;
+  std::vector<double>& sigmas = result.sigmas.intrinsics;
+  if (sigmas.size() < kNumPlaneIntrinsics) return result;
+  for (std::size_t i = sigmas.size() - kNumPlaneIntrinsics; i < sigmas.size(); ++i) {
+    sigmas[i] *= factor;
   }
   return result;
 }

@@ -5,7 +5,7 @@
 #include <cstddef>
 #include <optional>
 
-#include "waymark/camera/camera.h"
+#include "waymark/camera/camchain.h"
 
 namespace waymark {
 
@@ -18,5 +18,7 @@ bool has_image_plane(const CameraDescription& camera);
 /// The camera of images that are resized by the factor, their size rounded down; the corner of the
 /// image stays where it is. Nothing for models that are not ours, whose numbers mean anything.
 std::optional<CameraDescription> resized(const CameraDescription& camera, double factor);
+/// The same of a camera of a chain, with its standard deviations.
+std::optional<ChainCamera> resized(const ChainCamera& camera, double factor);
 
 }  // namespace waymark

@@ -28,7 +28,7 @@ TEST(ResizedCamera, SeesResizedWhatItSawBefore) {
         camera_of_640("ds", {-0.2, 0.6, 230.0, 231.0, 310.0, 170.0}),
         camera_of_640("equirectangular", {})}) {
     SCOPED_TRACE(camera.camera_model);
-    const auto expected = ScaledCamera::resized(registry.make_camera(camera), kFactor);
+    const auto expected = ScaledCamera(registry.make_camera(camera), kFactor);
     const auto small = resized(camera, kFactor);
     ASSERT_TRUE(small);
     const auto made = registry.make_camera(*small);
@@ -44,6 +44,13 @@ TEST(ResizedCamera, SeesResizedWhatItSawBefore) {
       EXPECT_LT((pixel - expected_pixel).norm(), 1e-9);
     }
   }
+}
+
+TEST(ResizedCamera, IsAsSureRelatively) {
+  ChainCamera camera{camera_of_640("eucm", {0.6, 1.05, 230.0, 231.0, 310.0, 170.0}), Rigid3()};
+  camera.sigmas.intrinsics = {0.01, 0.02, 1.0, 2.0, 3.0, 4.0};
+  EXPECT_EQ(resized(camera, 0.5)->sigmas.intrinsics,
+            (std::vector<double>{0.01, 0.02, 0.5, 1.0, 1.5, 2.0}));
 }
 
 TEST(ResizedCamera, KnowsNothingOfModelsOfOthers) {

@@ -11,6 +11,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/evaluate/association.h"
+#include "waymark/evaluate/clocks.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {
@@ -160,9 +161,13 @@ Rigid3 aligned_pose(const Sim3& groundtruth_from_estimate, const Rigid3& world_f
           groundtruth_from_estimate * world_from_camera.translation};
 }
 
-Evaluation evaluate(std::span<const StampedPose> estimate,
+Evaluation evaluate(std::span<const StampedPose> as_given,
                     std::span<const StampedPose> groundtruth,
                     const EvaluationOptions& options) {
+  std::vector<StampedPose> estimate(as_given.begin(), as_given.end());
+  for (StampedPose& pose : estimate) {
+    pose.timestamp_ns = moved_time(pose.timestamp_ns, options.time_offset_ns);
+  }
   const std::vector<TimeMatch> matches =
       match_by_time(estimate, groundtruth, options.max_difference_ns);
   if (matches.size() < kMinPairs) {
@@ -179,6 +184,8 @@ Evaluation evaluate(std::span<const StampedPose> estimate,
   }
   Evaluation evaluation;
   evaluation.alignment = options.alignment;
+  evaluation.time_offset_ns = options.time_offset_ns;
+  evaluation.is_by_line = options.is_by_line;
   evaluation.groundtruth_from_estimate = align(pairs, options.alignment);
   evaluation.num_estimate_poses = estimate.size();
   evaluation.num_pairs = matches.size();

@@ -27,6 +27,8 @@ struct EvaluationOptions {
   std::int64_t max_difference_ns = 20'000'000;  ///< Between a pose and its true one.
   /// Input frames of the run; with it the coverage counts poses, without it time.
   std::optional<std::size_t> num_frames;
+  std::int64_t time_offset_ns = 0;  ///< Is added to the times of the estimate.
+  bool is_by_line = false;          ///< See TrajectoryPair.
 };
 
 /// Of the distances between estimated and true positions.
@@ -60,6 +62,8 @@ struct SegmentErrors {
 /// What a comparison gives. Lengths are in the unit of the ground truth, which is taken for metres.
 struct Evaluation {
   TrajectoryAlignment alignment = TrajectoryAlignment::kSe3;  ///< That of the options.
+  std::int64_t time_offset_ns = 0;                            ///< The same.
+  bool is_by_line = false;                                    ///< The same.
   /// The motion that was applied to the estimate; identity for kNone.
   Sim3 groundtruth_from_estimate;
   std::size_t num_estimate_poses = 0;  ///< Poses of the estimate, with and without a true one.
@@ -72,7 +76,7 @@ struct Evaluation {
   double rpe_m = 0.0;                     ///< Root mean square of the relative error of
   double rpe_deg = 0.0;                   ///< consecutive pairs, after scaling.
   std::optional<SegmentErrors> segments;  ///< For paths beyond 100 m.
-  std::vector<PositionError> errors;      ///< Per pair.
+  std::vector<PositionError> errors;      ///< Per pair, at the times with their offset.
 };
 
 /// Compares two trajectories, each sorted by time. Alignment after Umeyama (1991); measures as

@@ -152,7 +152,7 @@ std::string draw_error(const Evaluation& evaluation, double max_gap_s) {
   const AxisRange time{0.0, std::max(points.back().x, 1e-3)};
   const AxisRange error{0.0, std::max(evaluation.ate_m.max * (1.0 + kMargin), 1e-6)};
   const Chart chart(kErrorFrame, time, error);
-  std::string svg = chart.axes("time [s]", "position error [m]");
+  std::string svg = chart.axes(evaluation.is_by_line ? "line" : "time [s]", "position error [m]");
   svg += chart.line(points, "class=\"error\"");
   svg += chart.line({{time.low, evaluation.ate_m.rmse}, {time.high, evaluation.ate_m.rmse}},
                     "class=\"rmse\"");

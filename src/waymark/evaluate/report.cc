@@ -34,12 +34,20 @@ Json to_json(const std::optional<SegmentErrors>& segments) {
 
 }  // namespace
 
+std::string format_offset(std::int64_t offset_ns) {
+  return fmt::format("{:.14g}", std::round(1e-5 * static_cast<double>(offset_ns)) * 1e-4);
+}
+
 std::string format_evaluation(const Evaluation& evaluation) {
   const ErrorStatistics& ate = evaluation.ate_m;
   std::string text = fmt::format("pairs      {} of {} poses, coverage {:.1f} %\n",
                                  evaluation.num_pairs,
                                  evaluation.num_estimate_poses,
                                  100.0 * evaluation.coverage);
+  if (evaluation.time_offset_ns != 0) {
+    text += fmt::format("clocks     {} s added to the times of the estimate\n",
+                        format_offset(evaluation.time_offset_ns));
+  }
   text += fmt::format("alignment  {}, scale {:.5f}\n",
                       to_string(evaluation.alignment),
                       evaluation.groundtruth_from_estimate.scale);
@@ -71,12 +79,14 @@ std::string format_evaluation(const Evaluation& evaluation) {
   return text;
 }
 
-std::string format_evaluation_json(const Evaluation& evaluation) {
+std::string format_evaluation_json(const Evaluation& evaluation,
+                                   std::span<const std::string> notes) {
   Json json;
   json["pairs"] = evaluation.num_pairs;
   json["poses"] = evaluation.num_estimate_poses;
   json["coverage"] = rounded(evaluation.coverage);
   json["align"] = to_string(evaluation.alignment);
+  json["time_offset_s"] = rounded(1e-9 * static_cast<double>(evaluation.time_offset_ns));
   json["scale"] = rounded(evaluation.groundtruth_from_estimate.scale);
   json["path_length_m"] = rounded(evaluation.path_length_m);
   json["ate_rmse_m"] = rounded(evaluation.ate_m.rmse);
@@ -88,6 +98,7 @@ std::string format_evaluation_json(const Evaluation& evaluation) {
   json["rpe_m"] = rounded(evaluation.rpe_m);
   json["rpe_deg"] = rounded(evaluation.rpe_deg);
   json["segments"] = to_json(evaluation.segments);
+  json["notes"] = notes;
   return json.dump(2) + "\n";
 }
 

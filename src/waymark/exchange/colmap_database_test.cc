@@ -10,7 +10,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/exchange/testing/small_map.h"
 
 namespace waymark {
 namespace {

@@ -5,9 +5,10 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
+#include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/openvslam_camera.h"
 #include "waymark/input/foreign_calibration.h"
 
 namespace waymark {
@@ -16,17 +17,15 @@ namespace {
 /// transforms.json lists every frame.
 constexpr std::size_t kMaxJsonBytes = std::size_t{256} << 20;
 
-/// Whether keys of a settings file begin with this section, in either way of writing.
-bool has_section(const ConfigNode& root, std::string_view section) {
-  return std::ranges::any_of(root.keys, [section](const std::string& key) {
-    return key.starts_with(section) && (key.size() == section.size() || key[section.size()] == '.');
-  });
-}
+SlamSettingsReader slam_settings_reader = nullptr;
 
-bool has_model(const ConfigNode& root) {
-  const ConfigNode* camera = root.find("Camera");
-  return root.find("Camera.model") != nullptr ||
-         (camera != nullptr && camera->kind == ConfigNode::Kind::kMap);
+/// Whether keys are of Camera or Camera1, in sections or flat.
+bool is_slam_settings(const ConfigNode& root) {
+  return root.kind == ConfigNode::Kind::kMap &&
+         std::ranges::any_of(root.keys, [](const std::string& key) {
+           const std::string section = key.substr(0, key.find('.'));
+           return section == "Camera" || section == "Camera1";
+         });
 }
 
 }  // namespace
@@ -36,25 +35,64 @@ ConfigSource read_calibration_source(const std::filesystem::path& path) {
   return {path.string(), read_text_file(path, "transforms.json of nerfstudio", kMaxJsonBytes)};
 }
 
+void set_slam_settings_reader(SlamSettingsReader reader) { slam_settings_reader = reader; }
+
+CameraChain read_slam_settings(const ConfigSource& source) {
+  if (slam_settings_reader != nullptr) return slam_settings_reader(source);
+  throw InputError(
+      source.name,
+      fmt::format("has settings of OpenVSLAM or ORB-SLAM, expected a camchain: waymark "
+                  "import --settings {} -o camchain.yaml",
+                  source.name));
+}
+
 std::optional<CameraChain> read_foreign_cameras(const ConfigSource& source) {
-  if (const auto kind = recognize_calibration(source)) return read_calibration(*kind, source);
-  const ConfigNode root = parse_config(without_opencv_header(source));
-  if (root.kind != ConfigNode::Kind::kMap) return std::nullopt;
-  if (has_section(root, "Camera1")) return read_orbslam_settings(source);
-  if (!has_section(root, "Camera")) return std::nullopt;
-  return has_model(root) ? read_openvslam_settings(source) : read_orbslam_settings(source);
+  if (auto chain = read_foreign_calibration(source)) return chain;
+  if (!is_slam_settings(parse_config(without_opencv_header(source)))) return std::nullopt;
+  return read_slam_settings(source);
+}
+
+std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::path> paths,
+                                            std::vector<std::string>& notes) {
+  std::vector<ConfigSource> sources;
+  std::string of_camera;            // The last file of a camera of another program.
+  std::optional<ConfigSource> ros;  // The same, of ROS, which may be one of a pair.
+  std::size_t at = 0;               // Where that is among the sources.
+  for (const std::filesystem::path& path : paths) {
+    ConfigSource source = read_calibration_source(path);
+    const bool is_ros = is_ros_calibration(source);
+    const bool is_pair = is_ros && ros;
+    const auto chain = is_pair ? read_ros_pair(*ros, source) : read_foreign_cameras(source);
+    if (!chain) {
+      sources.push_back(std::move(source));
+      continue;
+    }
+    const std::string name = is_pair ? fmt::format("{}, {}", ros->name, source.name) : source.name;
+    const bool is_one = chain->cameras.size() == 1;
+    notes.insert(notes.end(), chain->notes.begin(), chain->notes.end());
+    notes.push_back(fmt::format("{}: {} as another program writes {}",
+                                name,
+                                is_one ? "a camera" : "two cameras",
+                                is_one ? "it" : "them"));
+    if (!is_pair && !of_camera.empty()) {
+      notes.push_back(fmt::format("{}: takes the place of what {} says", name, of_camera));
+    }
+    of_camera = name;
+    ConfigSource camchain{name, format_camchain(*chain)};
+    if (is_pair) {
+      sources[at] = std::move(camchain);
+      ros.reset();
+      continue;
+    }
+    at = sources.size();
+    ros = is_ros ? std::optional(std::move(source)) : std::nullopt;
+    sources.push_back(std::move(camchain));
+  }
+  return sources;
 }
 
 ConfigSource read_config_file(const std::filesystem::path& path, std::vector<std::string>& notes) {
-  ConfigSource source = read_calibration_source(path);
-  const std::optional<CameraChain> chain = read_foreign_cameras(source);
-  if (!chain) return source;
-  notes.insert(notes.end(), chain->notes.begin(), chain->notes.end());
-  notes.push_back(fmt::format("{}: {} as another program writes {}",
-                              source.name,
-                              chain->cameras.size() == 1 ? "a camera" : "two cameras",
-                              chain->cameras.size() == 1 ? "it" : "them"));
-  return {source.name, format_camchain(*chain)};
+  return read_config_files({&path, 1}, notes).front();
 }
 
 }  // namespace waymark

@@ -34,18 +34,6 @@ constexpr const char* kNerfstudio =
 constexpr const char* kPerFrame =
     R"({"frames": [{"file_path": "a.jpg", "fl_x": 400, "fl_y": 401, "cx": 320.5, "cy": 240.5,
         "w": 640, "h": 480}]})";
-constexpr const char* kStella =
-    "Camera:\n  setup: monocular\n  model: perspective\n  fx: 400\n  fy: 401\n  cx: 320\n"
-    "  cy: 240\n  cols: 640\n  rows: 480\n";
-constexpr const char* kOpenvslam =
-    "Camera.setup: monocular\nCamera.model: perspective\nCamera.fx: 400\nCamera.fy: 401\n"
-    "Camera.cx: 320\nCamera.cy: 240\nCamera.cols: 640\nCamera.rows: 480\n";
-constexpr const char* kOrbslam =
-    "%YAML:1.0\nCamera.type: \"PinHole\"\nCamera1.fx: 400\nCamera1.fy: 401\nCamera1.cx: 320\n"
-    "Camera1.cy: 240\nCamera.width: 640\nCamera.height: 480\n";
-constexpr const char* kOlder =
-    "Camera.fx: 400\nCamera.fy: 401\nCamera.cx: 320\nCamera.cy: 240\nCamera.width: 640\n"
-    "Camera.height: 480\n";
 
 std::string colmap_binary() {
   std::string bytes;
@@ -76,11 +64,7 @@ TEST(ConfigFile, IsTakenAsOtherProgramsWriteIt) {
                                                                   {"cameras.txt", kColmap},
                                                                   {"cameras.bin", colmap_binary()},
                                                                   {"transforms.json", kNerfstudio},
-                                                                  {"per_frame.json", kPerFrame},
-                                                                  {"stella.yaml", kStella},
-                                                                  {"openvslam.yaml", kOpenvslam},
-                                                                  {"orbslam.yaml", kOrbslam},
-                                                                  {"older.yaml", kOlder}};
+                                                                  {"per_frame.json", kPerFrame}};
   for (const auto& [name, text] : files) {
     SCOPED_TRACE(name);
     folder.write(name, text);
@@ -98,6 +82,46 @@ TEST(ConfigFile, OfSettingsAloneStaysAsItIs) {
   std::vector<std::string> notes;
   EXPECT_EQ(read_config_file(folder / "s.yaml", notes).text, "features: {count: 700}\n");
   EXPECT_TRUE(notes.empty());
+}
+
+/// The tool that reads them has tests of its own, in Python.
+TEST(ConfigFile, OfASlamProgramIsLeftToWhoReadsIt) {
+  for (const char* text : {"Camera:\n  model: perspective\n",
+                           "Camera.model: perspective\n",
+                           "%YAML:1.0\nCamera1.fx: 400\n",
+                           "Camera.fx: 400\n"}) {
+    const ConfigSource source{"slam.yaml", text};
+    set_slam_settings_reader(nullptr);
+    EXPECT_THAT(input_error_of([&] { read_foreign_cameras(source); }),
+                HasSubstr("slam.yaml: has settings of OpenVSLAM or ORB-SLAM, expected a camchain: "
+                          "waymark import --settings slam.yaml -o camchain.yaml"));
+    set_slam_settings_reader([](const ConfigSource& read) {
+      CameraChain chain;
+      chain.notes.push_back(read.name);
+      return chain;
+    });
+    EXPECT_THAT(read_foreign_cameras(source).value().notes, ElementsAre("slam.yaml"));
+    set_slam_settings_reader(nullptr);
+  }
+}
+
+TEST(ConfigFile, OfTwoCamerasIsAPairOrTheLastOne) {
+  const testing::TemporaryFolder folder;
+  const std::string turn = "r: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
+  const std::string plane = "401, 240, 0, 0, 0, 1, 0]\n";
+  const std::vector<std::filesystem::path> pair = {
+      folder.write("left.yaml", kRos + turn + "p: [400, 0, 320, 0, 0, " + plane),
+      folder.write("right.yaml", kRos + turn + "p: [400, 0, 320, -40, 0, " + plane)};
+  std::vector<std::string> notes;
+  const auto chain = read_camchain(merge_configs(read_config_files(pair, notes)));
+  ASSERT_EQ(chain.value().cameras.size(), 2u);
+  EXPECT_NEAR(chain->cameras[1].cam_from_rig.translation.x(), -0.1, 1e-12);
+  const std::vector<std::filesystem::path> others = {folder.write("opencv.yaml", kOpencv),
+                                                     folder.write("ros.yaml", kRos)};
+  notes.clear();
+  EXPECT_EQ(read_camchain(merge_configs(read_config_files(others, notes))).value().cameras.size(),
+            1u);
+  EXPECT_THAT(notes, ::testing::Contains(HasSubstr("ros.yaml: takes the place of what ")));
 }
 
 TEST(ConfigFile, OfNerfstudioMayHaveOtherModels) {
@@ -131,7 +155,7 @@ TEST(ConfigFile, OfNerfstudioMayHaveOtherModels) {
 TEST(ConfigFile, ThatIsDamagedIsOneLine) {
   Rng rng(7, 1);
   for (const std::string& whole :
-       {std::string(kColmap), colmap_binary(), std::string(kNerfstudio), std::string(kOrbslam)}) {
+       {std::string(kColmap), colmap_binary(), std::string(kNerfstudio)}) {
     for (int i = 0; i < 300; ++i) {
       std::string text = whole.substr(0, 1 + rng.below(static_cast<std::uint32_t>(whole.size())));
       text[rng.below(static_cast<std::uint32_t>(text.size()))] = static_cast<char>(rng.below(256));

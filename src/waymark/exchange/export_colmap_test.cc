@@ -11,7 +11,7 @@
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/exchange/exports.h"
 #include "waymark/exchange/testing/colmap_reader.h"
-#include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/exchange/testing/small_map.h"
 
 namespace waymark {
 namespace {

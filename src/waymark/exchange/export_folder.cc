@@ -24,6 +24,7 @@ using ExportedNames = std::set<fs::path>;
 
 ExportedNames read_export_list(const fs::path& path) {
   ExportedNames names = {ExportFolder::kListName};
+  if (std::error_code error; !fs::is_regular_file(path, error)) return names;
   std::ifstream stream(path);
   for (std::string line; std::getline(stream, line);) names.insert(line);
   return names;
@@ -63,10 +64,11 @@ void expect_replaceable(const fs::path& folder) {
     const ExportedNames listed = read_export_list(folder / ExportFolder::kListName);
     for (const fs::path& name : files_below(folder)) {
       if (listed.contains(name)) continue;
-      throw InputError(folder.string(),
-                       fmt::format("holds {}, which no earlier export left there, expected a new "
-                                   "or empty folder, or an export",
-                                   quote_for_message(name.string())));
+      throw InputError(
+          folder.string(),
+          fmt::format("holds {}, which no earlier command of the same kind left there, "
+                      "expected a new or empty folder, or what one left",
+                      quote_for_message(name.string())));
     }
   } catch (const fs::filesystem_error& failure) {
     throw OutputError(folder.string(), "cannot be read: " + failure.code().message());
@@ -98,6 +100,7 @@ ExportFolder::ExportFolder(const fs::path& folder)
     : folder_(resolve(folder)), unfinished_(beside(folder_, "partial")) {
   expect_replaceable(folder_);
   std::error_code ignored;
+  is_again_ = fs::exists(folder_ / kListName, ignored);
   fs::remove_all(unfinished_, ignored);  // Of a program that was killed.
   make_output_folder(unfinished_);
 }

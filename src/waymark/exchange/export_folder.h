@@ -22,6 +22,8 @@ class ExportFolder {
   ExportFolder(const ExportFolder&) = delete;
   ExportFolder& operator=(const ExportFolder&) = delete;
 
+  /// Whether an earlier export is there.
+  bool is_again() const { return is_again_; }
   /// Where the files are to be made.
   const std::filesystem::path& unfinished() const { return unfinished_; }
   /// Once, after the last file is made. Throws like the constructor: what was there may have
@@ -31,6 +33,7 @@ class ExportFolder {
  private:
   const std::filesystem::path folder_;
   const std::filesystem::path unfinished_;
+  bool is_again_ = false;
 };
 
 }  // namespace waymark

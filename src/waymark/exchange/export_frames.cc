@@ -13,6 +13,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/image/opencv_image.h"
 
 namespace waymark {
 namespace {
@@ -159,13 +160,8 @@ std::vector<FramePlace> place_frames(const Map& map,
 }
 
 double sharpness(ImageView image) {
-  const cv::Mat grey(image.height_px,
-                     image.width_px,
-                     CV_8UC1,
-                     const_cast<std::uint8_t*>(image.row(0)),
-                     static_cast<std::size_t>(image.row(1) - image.row(0)));
   cv::Mat laplacian;
-  cv::Laplacian(grey, laplacian, CV_16S);
+  cv::Laplacian(mat_of(image), laplacian, CV_16S);
   cv::Scalar mean, deviation;
   cv::meanStdDev(laplacian, mean, deviation);
   return deviation[0] * deviation[0];
@@ -209,7 +205,7 @@ ExportScene with_frames(const ExportScene& scene,
   ExportScene result{scene.cameras, scene.cam_from_rig, {}, scene.points};
   for (ExportPoint& point : result.points) point.sightings.clear();
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const std::vector<RigCamera>& cameras = map.keyframes().at(places[i].nearest).rig->cameras;
+    const std::vector<RigCamera>& cameras = map.keyframes().at(places[i].nearest).rig().cameras;
     for (std::size_t c = 0; c < std::min(cameras.size(), frames[i].num_images); ++c) {
       const ExportView& nearest = *of_keyframes.at({places[i].nearest, c});
       const bool is_keyframe = nearest.timestamp_ns == places[i].timestamp_ns;

@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "waymark/base/testing/errors.h"
-#include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/exchange/testing/small_map.h"
 #include "waymark/map/align.h"
 
 namespace waymark {

@@ -34,6 +34,10 @@ std::filesystem::path numbered(std::filesystem::path path, std::size_t number) {
 
 void check_options(const MapExport& options) {
   const bool has_frames = options.frames.choice != FrameChoice::kKeyframes;
+  if (options.is_undistorted && (options.split_views > 0 || !makes_folder(options.format))) {
+    throw InputError("export",
+                     "--undistort (undistort) is for colmap and nerfstudio, without split views");
+  }
   if (!makes_folder(options.format)) {
     if (has_frames || !options.input.empty()) {
       throw InputError("export",
@@ -58,7 +62,7 @@ void check_options(const MapExport& options) {
 bool has_pairs(const Map& map) {
   bool has_pair = false;
   map.keyframes().for_each(
-      [&](KeyframeId, const Keyframe& keyframe) { has_pair |= keyframe.rig->cameras.size() > 1; });
+      [&](KeyframeId, const Keyframe& keyframe) { has_pair |= keyframe.rig().cameras.size() > 1; });
   return has_pair;
 }
 
@@ -81,8 +85,11 @@ class ModelWriter {
     const ExportScene scene = make_scene(submap);
     if (scene.views.empty()) return;  // The recording or the trajectory has none of it.
     SplitScene split;
+    const CameraRegistry registry = CameraRegistry::with_builtin_models();
     if (options_.split_views > 0) {
-      split = split_scene(scene, options_.split_views, CameraRegistry::with_builtin_models());
+      split = split_scene(scene, options_.split_views, registry);
+    } else if (options_.is_undistorted) {
+      split = undistort_scene(scene, registry);
     } else {
       split.parts.resize(scene.views.size());
       split.scene = scene;
@@ -138,7 +145,7 @@ class ModelWriter {
     if (options_.format == ExportFormat::kNerfstudio) {
       NerfstudioPaths paths;
       paths.point_file = numbered(paths.point_file, number).string();
-      const std::string json = format_nerfstudio(scene, paths);
+      const std::string json = format_nerfstudio(scene, paths, options_.is_undistorted);
       write_ply(folder_ / paths.point_file, scene);
       write_file_atomically(folder_ / numbered("transforms.json", number), json);
       return;
@@ -228,12 +235,13 @@ MapExportCounts export_map(const StoredMap& stored,
   if (submaps.empty()) throw InputError(name, "has no keyframes, expected some to export");
   if (!makes_folder(options.format)) {
     for (std::size_t i = 0; i < submaps.size(); ++i) write_file(options, stored, submaps[i], i);
-    return {submaps.size(), 0, 0};
+    return {submaps.size()};
   }
   ExportFolder folder(options.out);
   ModelWriter writer(stored, options, folder.unfinished());
   for (const SubmapId submap : submaps) writer.write(submap);
-  const MapExportCounts counts = writer.finish();
+  MapExportCounts counts = writer.finish();
+  counts.is_again = folder.is_again();
   if (counts.num_views == 0) {
     throw InputError(options.input.string(),
                      "has no frame of the map with a pose, expected the recording that it was made "

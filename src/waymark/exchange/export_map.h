@@ -20,10 +20,11 @@ enum class ExportFormat { kPly, kColmap, kNerfstudio, kTum, kKitti, kMarkers };
 /// What to write of a map, and where.
 struct MapExport {
   ExportFormat format = ExportFormat::kPly;
-  std::filesystem::path out;  ///< A folder for kColmap and kNerfstudio, a file for the others.
-  bool is_text = false;       ///< COLMAP's text form.
-  int split_views = 0;        ///< See split_scene(); 0: as they are.
-  ExportedFrames frames;      ///< For kColmap and kNerfstudio. All but keyframes need the below.
+  std::filesystem::path out;    ///< A folder for kColmap and kNerfstudio, a file for the others.
+  bool is_text = false;         ///< COLMAP's text form.
+  int split_views = 0;          ///< See split_scene(); 0: as they are.
+  bool is_undistorted = false;  ///< See undistort_scene().
+  ExportedFrames frames;        ///< For kColmap and kNerfstudio. All but keyframes need the below.
   /// The recording that the map was made of: has the images of all frames and cameras; empty: those
   /// in the map alone.
   std::filesystem::path input;
@@ -37,6 +38,7 @@ struct MapExportCounts {
   std::size_t num_submaps = 0;  ///< Each in files of its own.
   std::size_t num_views = 0;    ///< Of models for COLMAP and nerfstudio.
   std::size_t num_images = 0;   ///< Image files, of which split views share none.
+  bool is_again = false;        ///< An earlier export in the same folder was replaced.
 };
 
 /// Writes each sub-map that is a part of its own, the largest under the names that are asked for,

@@ -69,8 +69,10 @@ Json transform_of(const ExportView& view) {
 
 }  // namespace
 
-std::string format_nerfstudio(const ExportScene& scene, const NerfstudioPaths& paths) {
-  Json json = {{"camera_model", model_of(scene)}};
+std::string format_nerfstudio(const ExportScene& scene,
+                              const NerfstudioPaths& paths,
+                              bool is_undistorted) {
+  Json json = {{"camera_model", is_undistorted ? "PINHOLE" : model_of(scene)}};
   const bool is_shared = scene.cameras.size() == 1;
   if (is_shared) json.update(intrinsics_of(scene.cameras[0]));
   json["ply_file_path"] = paths.point_file;

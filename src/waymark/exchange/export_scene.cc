@@ -73,7 +73,7 @@ std::optional<SightedPixel> sight(const Keyframe& keyframe,
                                   std::size_t rig_camera,
                                   std::uint32_t feature,
                                   const Eigen::Vector3d& position_in_world) {
-  const RigCamera& camera = keyframe.rig->cameras[rig_camera];
+  const RigCamera& camera = keyframe.rig().cameras[rig_camera];
   const Features& features = *keyframe.features;
   const Keypoint& keypoint = features.keypoints[feature];
   if (camera.camera->can_project()) {
@@ -108,15 +108,15 @@ class SceneBuilder {
   void add_views(KeyframeId id, const Keyframe& keyframe) {
     first_view_[id] = static_cast<std::uint32_t>(scene_.views.size());
     const std::size_t num_cameras =
-        cameras_ == ExportCameras::kAll ? keyframe.rig->cameras.size() : 1;
+        cameras_ == ExportCameras::kAll ? keyframe.rig().cameras.size() : 1;
     for (std::size_t camera = 0; camera < num_cameras; ++camera) add_view(id, keyframe, camera);
   }
 
   void add_view(KeyframeId id, const Keyframe& keyframe, std::size_t rig_camera) {
-    const RigCamera& camera = keyframe.rig->cameras[rig_camera];
+    const RigCamera& camera = keyframe.rig().cameras[rig_camera];
     ExportView view;
     view.name = fmt::format("{:06}_{}.jpg", id.value, keyframe.timestamp_ns);
-    if (cameras_ == ExportCameras::kAll && keyframe.rig->cameras.size() > 1) {
+    if (cameras_ == ExportCameras::kAll && keyframe.rig().cameras.size() > 1) {
       view.name = fmt::format("cam{}/{}", rig_camera, view.name);
     }
     view.keyframe = id;
@@ -222,7 +222,7 @@ std::vector<StampedPose> keyframe_trajectory(const Map& map, SubmapId submap) {
   std::vector<StampedPose> poses;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     if (keyframe.submap != submap) return;
-    const Rigid3 cam_from_world = keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+    const Rigid3 cam_from_world = keyframe.rig().cameras[0].cam_from_rig * keyframe.rig_from_world;
     poses.push_back({keyframe.timestamp_ns, cam_from_world.inverse()});
   });
   std::stable_sort(poses.begin(), poses.end(), [](const StampedPose& a, const StampedPose& b) {

@@ -6,91 +6,24 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
+#include <functional>
 #include <utility>
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/camera/perspective.h"
-#include "waymark/camera/pixel_angles.h"
 #include "waymark/input/decode.h"
 
 namespace waymark {
 namespace {
 
-constexpr double kOffAxisRad = 55.0 * std::numbers::pi / 180.0;
-constexpr int kMinSizePx = 64;
-constexpr int kMaxPartSizePx = 4096;
-
-Eigen::Quaterniond turn(double angle_rad, const Eigen::Vector3d& axis) {
-  return Eigen::Quaterniond(Eigen::AngleAxisd(angle_rad, axis));
-}
-
-/// How the parts stand in the camera.
-std::vector<Eigen::Quaterniond> parts_from_camera(bool is_whole_sphere, int num_views) {
-  constexpr double kPi = std::numbers::pi;
-  const bool is_cube = is_whole_sphere && num_views == 6;
-  const int num_ring = is_cube ? 4 : is_whole_sphere ? num_views : num_views - 1;
-  std::vector<Eigen::Quaterniond> camera_from_part;
-  if (!is_whole_sphere) camera_from_part.push_back(Eigen::Quaterniond::Identity());
-  for (int i = 0; i < num_ring; ++i) {
-    const double angle = 2.0 * kPi * i / num_ring;
-    camera_from_part.push_back(is_whole_sphere
-                                   ? turn(angle, Eigen::Vector3d::UnitY())
-                                   : turn(kOffAxisRad, {-std::sin(angle), std::cos(angle), 0.0}));
-  }
-  if (is_cube) {
-    camera_from_part.push_back(turn(0.5 * kPi, Eigen::Vector3d::UnitX()));
-    camera_from_part.push_back(turn(-0.5 * kPi, Eigen::Vector3d::UnitX()));
-  }
-  for (Eigen::Quaterniond& rotation : camera_from_part) rotation = rotation.conjugate();
-  return camera_from_part;
-}
-
-PerspectiveModel perspective_of(const SplitPart& part) {
-  const double focal_px = 0.5 * part.size_px;  // 45 degrees from the centre to the rim.
-  const double center_px = 0.5 * (part.size_px - 1);
-  return {{focal_px, focal_px}, {center_px, center_px}};
-}
-
 CameraDescription describe(const SplitPart& part) {
-  const PerspectiveModel model = perspective_of(part);
+  const Eigen::Vector2d &focal_px = part.pinhole.focal_px(), &center_px = part.pinhole.center_px();
   CameraDescription description;
   description.camera_model = "pinhole";
-  description.intrinsics = {
-      model.focal_px().x(), model.focal_px().y(), model.center_px().x(), model.center_px().y()};
-  description.width_px = description.height_px = part.size_px;
+  description.intrinsics = {focal_px.x(), focal_px.y(), center_px.x(), center_px.y()};
+  description.width_px = part.width_px;
+  description.height_px = part.height_px;
   return description;
-}
-
-SplitLookup make_lookup(const SplitPart& part) {
-  const PerspectiveModel model = perspective_of(part);
-  const Eigen::Quaterniond camera_from_part = part.part_from_camera.conjugate();
-  std::vector<Eigen::Vector3d> bearings;
-  for (int y = 0; y < part.size_px; ++y) {
-    for (int x = 0; x < part.size_px; ++x) {
-      bearings.push_back(camera_from_part * *model.unproject(Eigen::Vector2d(x, y)));
-    }
-  }
-  SplitLookup lookup{std::vector<Eigen::Vector2d>(bearings.size()),
-                     std::vector<std::uint8_t>(bearings.size())};
-  part.camera->project(bearings, lookup.pixels, lookup.is_visible);
-  return lookup;
-}
-
-std::vector<SplitPart> parts_of(std::shared_ptr<const Camera> camera, int num_views) {
-  const int size_px = std::clamp(static_cast<int>(std::lround(2.0 / central_pixel_angle(*camera))),
-                                 kMinSizePx,
-                                 kMaxPartSizePx);
-  std::vector<SplitPart> parts;
-  for (const Eigen::Quaterniond& rotation :
-       parts_from_camera(camera->wrap_width_px() > 0.0, num_views)) {
-    SplitPart part{camera, rotation, size_px};
-    const std::vector<std::uint8_t> is_visible = make_lookup(part).is_visible;
-    part.sees_all = std::find(is_visible.begin(), is_visible.end(), 0) == is_visible.end();
-    parts.push_back(std::move(part));
-  }
-  return parts;
 }
 
 bool is_perspective(const CameraDescription& camera) {
@@ -99,11 +32,12 @@ bool is_perspective(const CameraDescription& camera) {
 
 class Splitter {
  public:
-  Splitter(const ExportScene& scene, int num_views, const CameraRegistry& registry)
-      : scene_(scene) {
+  /// parts_of: none for a camera that is left as it is.
+  using PartsOf = std::function<std::vector<SplitPart>(const CameraDescription&)>;
+
+  Splitter(const ExportScene& scene, const PartsOf& parts_of) : scene_(scene) {
     for (const CameraDescription& camera : scene.cameras) {
-      std::vector<SplitPart> parts;
-      if (!is_perspective(camera)) parts = parts_of(registry.make_camera(camera), num_views);
+      std::vector<SplitPart> parts = parts_of(camera);
       first_camera_.push_back(result_.scene.cameras.size());
       result_.scene.cameras.push_back(parts.empty() ? camera : describe(parts.front()));
       result_.scene.cam_from_rig.push_back(scene.cam_from_rig[parts_.size()]);
@@ -139,9 +73,10 @@ class Splitter {
                 const std::vector<std::uint8_t>& has_bearing,
                 std::size_t part) {
     const SplitPart& split = parts_[view.camera][part];
-    const PerspectiveModel model = perspective_of(split);
     ExportView added;
-    added.name = fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
+    added.name = split.is_only_one
+                     ? view.name
+                     : fmt::format("{}_{}.jpg", view.name.substr(0, view.name.rfind('.')), part);
     if (!split.sees_all) added.mask_name = added.name + ".png";
     added.keyframe = view.keyframe;
     added.timestamp_ns = view.timestamp_ns;
@@ -149,12 +84,13 @@ class Splitter {
     added.camera = first_camera_[view.camera];
     added.cam_from_world =
         Rigid3(split.part_from_camera, Eigen::Vector3d::Zero()) * view.cam_from_world;
-    const double end_px = split.size_px - 0.5;
+    const Eigen::AlignedBox2d image(Eigen::Vector2d::Constant(-0.5),
+                                    Eigen::Vector2d(split.width_px, split.height_px).array() - 0.5);
     for (std::size_t i = 0; i < bearings.size(); ++i) {
       if (!has_bearing[i]) continue;
       const std::optional<Eigen::Vector2d> pixel =
-          model.project(split.part_from_camera * bearings[i]);
-      if (!pixel || pixel->minCoeff() < -0.5 || !(pixel->maxCoeff() < end_px)) continue;
+          split.pinhole.project(split.part_from_camera * bearings[i]);
+      if (!pixel || !image.contains(*pixel)) continue;
       added.pixels.push_back(*pixel);
       added.points.push_back(view.points[i]);
     }
@@ -215,20 +151,12 @@ Rgb sample(const ColorImage& image, const Eigen::Vector2d& pixel, bool wraps) {
 }
 
 ColorImage render(const SplitPart& part, const SplitLookup& lookup, const ColorImage& image) {
-  ColorImage rendered(part.size_px, part.size_px);
+  ColorImage rendered(part.width_px, part.height_px);
   const bool wraps = part.camera->wrap_width_px() > 0.0;
   for (std::size_t i = 0; i < lookup.pixels.size(); ++i) {
     if (lookup.is_visible[i]) rendered.values[i] = sample(image, lookup.pixels[i], wraps);
   }
   return rendered;
-}
-
-Image mask_of(const SplitPart& part, const SplitLookup& lookup) {
-  Image mask(part.size_px, part.size_px);
-  for (std::size_t i = 0; i < lookup.is_visible.size(); ++i) {
-    mask.values[i] = lookup.is_visible[i] ? 255 : 0;
-  }
-  return mask;
 }
 
 bool is_same_part(const SplitPart& a, const SplitPart& b) {
@@ -239,16 +167,40 @@ bool is_same_part(const SplitPart& a, const SplitPart& b) {
 
 SplitScene split_scene(const ExportScene& scene, int num_views, const CameraRegistry& registry) {
   WAYMARK_CHECK(num_views >= kMinSplitViews && num_views <= kMaxSplitViews);
-  return Splitter(scene, num_views, registry).split();
+  return Splitter(scene,
+                  [&](const CameraDescription& camera) {
+                    if (is_perspective(camera)) return std::vector<SplitPart>();
+                    return split_parts(registry.make_camera(camera), num_views);
+                  })
+      .split();
 }
 
-Image split_mask(const SplitPart& part) { return mask_of(part, make_lookup(part)); }
+SplitScene undistort_scene(const ExportScene& scene, const CameraRegistry& registry) {
+  ExportScene stated = scene;
+  for (CameraDescription& camera : stated.cameras) {
+    if (camera.distortion_coeffs != std::vector<double>(camera.distortion_coeffs.size(), 0.0) ||
+        !is_perspective(camera)) {
+      continue;
+    }
+    camera.distortion_model = "none";
+    camera.distortion_coeffs.clear();
+  }
+  return Splitter(stated,
+                  [&](const CameraDescription& camera) {
+                    std::vector<SplitPart> parts;
+                    if (!is_perspective(camera) || !camera.distortion_coeffs.empty()) {
+                      parts.push_back(undistorted_part(registry.make_camera(camera)));
+                    }
+                    return parts;
+                  })
+      .split();
+}
 
 /// Writes the views that are one part of one camera.
 class SplitImageWriter::PartWriter {
  public:
   explicit PartWriter(const SplitPart& part) : part_(part), lookup_(make_lookup(part)) {
-    if (!part.sees_all) mask_ = encode_png(mask_of(part, lookup_));
+    if (!part.sees_all) mask_ = encode_png(split_mask(part, lookup_));
   }
 
   const SplitPart& part() const { return part_; }

@@ -10,11 +10,14 @@
 #include <fstream>
 #include <iterator>
 #include <nlohmann/json.hpp>
+#include <opencv2/calib3d.hpp>
+#include <opencv2/core.hpp>
+#include <opencv2/imgproc.hpp>
 
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/exchange/exports.h"
 #include "waymark/exchange/testing/colmap_reader.h"
-#include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/exchange/testing/small_map.h"
 #include "waymark/input/decode.h"
 
 namespace waymark {
@@ -22,11 +25,7 @@ namespace {
 
 const CameraRegistry kRegistry = CameraRegistry::with_builtin_models();
 
-Map map_around() {
-  const testing::Document camera = {
-      {"model_type", "Equirectangular"}, {"setup_type", "Monocular"}, {"cols", 640}, {"rows", 320}};
-  return import_openvslam_map(testing::make_small_map(camera).bytes(), "map.msg").map;
-}
+Map map_around() { return testing::make_small_map(testing::camera_around(640)).map(); }
 
 SplitScene split(const Map& map, int num_views) {
   return split_scene(make_export_scene(map, SubmapId{0}), num_views, kRegistry);
@@ -113,7 +112,7 @@ TEST(ExportSplit, ImagesShowTheirDirections) {
     return color;
   };
   const Map map = map_around();
-  const Camera& camera = *map.keyframes().at(KeyframeId{0}).rig->cameras[0].camera;
+  const Camera& camera = *map.keyframes().at(KeyframeId{0}).rig().cameras[0].camera;
   ColorImage wide(640, 320);
   for (int y = 0; y < 320; ++y) {
     for (int x = 0; x < 640; ++x) {
@@ -134,10 +133,10 @@ TEST(ExportSplit, ImagesShowTheirDirections) {
     const auto image =
         decode_color_image(content_of(folder / "images" / around.scene.views[part].name));
     ASSERT_TRUE(image);
-    ASSERT_EQ(image->width_px, split_part.size_px);
+    ASSERT_EQ(image->width_px, split_part.width_px);
     for (int y = 2; y < image->height_px; y += 17) {
       for (int x = 2; x < image->width_px; x += 17) {
-        const double half = 0.5 * split_part.size_px, center = half - 0.5;
+        const double half = 0.5 * split_part.width_px, center = half - 0.5;
         const Eigen::Vector3d bearing =
             split_part.part_from_camera.conjugate() *
             Eigen::Vector3d((x - center) / half, (y - center) / half, 1.0).normalized();
@@ -171,6 +170,109 @@ TEST(ExportSplit, MasksShowWhatIsNotSeen) {
   }
   EXPECT_GT(num_seen, expected.values.size() / 20);
   EXPECT_LT(num_seen, expected.values.size() * 19 / 20);
+}
+
+/// A camera as OpenCV has it.
+struct OpencvCamera {
+  cv::Matx33d matrix;
+  std::vector<double> distortion;
+
+  explicit OpencvCamera(const CameraDescription& camera)
+      : matrix(camera.intrinsics[0],
+               0,
+               camera.intrinsics[2],
+               0,
+               camera.intrinsics[1],
+               camera.intrinsics[3],
+               0,
+               0,
+               1),
+        distortion(camera.distortion_coeffs) {}
+};
+
+/// Something smooth in every direction.
+ColorImage waves(int width_px, int height_px) {
+  ColorImage image(width_px, height_px);
+  for (int y = 0; y < height_px; ++y) {
+    for (int x = 0; x < width_px; ++x) {
+      image.row(y)[x] = {static_cast<std::uint8_t>(std::lround(127 + 100 * std::sin(0.03 * x))),
+                         static_cast<std::uint8_t>(std::lround(127 + 100 * std::cos(0.04 * y))),
+                         static_cast<std::uint8_t>((x + y) / 8)};
+    }
+  }
+  return image;
+}
+
+/// What OpenCV makes of the image for the camera of the export.
+TEST(Undistort, IsWhatOpencvMakes) {
+  for (const bool is_fisheye : {false, true}) {
+    SCOPED_TRACE(is_fisheye);
+    const Map map = testing::small_map(is_fisheye ? "fisheye" : "distorted");
+    const ExportScene whole = make_export_scene(map, SubmapId{0});
+    const SplitScene flat = undistort_scene(whole, kRegistry);
+    ASSERT_EQ(flat.scene.views.size(), whole.views.size());
+    expect_small_errors(flat.scene);
+    const OpencvCamera from(whole.cameras[0]), to(flat.scene.cameras[0]);
+    const cv::Size size(flat.scene.cameras[0].width_px, flat.scene.cameras[0].height_px);
+    EXPECT_GT(size.width, 500);  // Little of 640 x 480 px goes.
+    EXPECT_GT(size.height, 380);
+    EXPECT_TRUE(flat.parts[0]->sees_all);
+
+    const ColorImage image = waves(640, 480);
+    const testing::TemporaryFolder folder;
+    write_split_images(
+        folder / "images", folder / "masks", flat, {{KeyframeId{0}, shared(encode_jpeg(image))}});
+    const auto written = decode_color_image(content_of(folder / "images" / whole.views[0].name));
+    ASSERT_TRUE(written);
+    ASSERT_EQ(cv::Size(written->width_px, written->height_px), size);
+    cv::Mat map_x, map_y, expected;
+    if (is_fisheye) {
+      cv::fisheye::initUndistortRectifyMap(
+          from.matrix, from.distortion, cv::noArray(), to.matrix, size, CV_32F, map_x, map_y);
+    } else {
+      cv::initUndistortRectifyMap(
+          from.matrix, from.distortion, cv::noArray(), to.matrix, size, CV_32F, map_x, map_y);
+    }
+    cv::remap(cv::Mat(480, 640, CV_8UC3, const_cast<Rgb*>(image.values.data())),
+              expected,
+              map_x,
+              map_y,
+              cv::INTER_LINEAR);
+    for (int y = 0; y < size.height; y += 7) {
+      for (int x = 0; x < size.width; x += 7) {
+        for (int c = 0; c < 3; ++c) {
+          ASSERT_NEAR(
+              written->row(y)[x][static_cast<std::size_t>(c)], expected.at<cv::Vec3b>(y, x)[c], 8)
+              << x << " " << y;
+        }
+      }
+    }
+  }
+}
+
+TEST(Undistort, LeavesAndRefusesWhatItCannotChange) {
+  const ExportScene plain = make_export_scene(testing::small_map("plain"), SubmapId{0});
+  const SplitScene same = undistort_scene(plain, kRegistry);
+  EXPECT_FALSE(same.parts[0]);  // The image stays as it is.
+  EXPECT_NE(format_colmap(same.scene, ColmapForm::kText).cameras.find(" PINHOLE "),
+            std::string::npos);
+  EXPECT_THROW(undistort_scene(make_export_scene(map_around(), SubmapId{0}), kRegistry),
+               InputError);
+}
+
+/// Of a lens of 180 degrees what is up to 60 degrees off the axis; the rest of the circle's square
+/// is masked.
+TEST(Undistort, OfWideLensesTheMiddle) {
+  CameraDescription wide;
+  wide.camera_model = "ds";
+  wide.intrinsics = {-0.2, 0.58, 160.0, 160.0, 319.5, 319.5};
+  wide.width_px = wide.height_px = 640;
+  const SplitPart part = undistorted_part(kRegistry.make_camera(wide));
+  const Eigen::Vector2d rim = part.pinhole.project({0.0, std::sqrt(3.0), 1.0}).value();
+  EXPECT_NEAR(rim.y(), part.height_px - 1, 1.0);
+  EXPECT_LE(part.width_px, 2 * wide.width_px);
+  const auto middle = part.pinhole.project({0.0, 0.0, 1.0}).value();
+  EXPECT_NEAR(middle.x(), 0.5 * (part.width_px - 1), 1.0);
 }
 
 }  // namespace

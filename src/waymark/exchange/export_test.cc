@@ -11,26 +11,20 @@
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/exchange/exports.h"
-#include "waymark/exchange/openvslam_map.h"
 #include "waymark/exchange/testing/colmap_reader.h"
-#include "waymark/exchange/testing/openvslam_document.h"
+#include "waymark/exchange/testing/small_map.h"
 #include "waymark/map/parts.h"
 
 namespace waymark {
 namespace {
 
-using testing::Document;
 using testing::small_map;
 
 TEST(ExportScene, LeavesOutSightingsThatAreOff) {
   testing::SmallMap small = testing::make_small_map();
-  small.keyframe(1)["undist_keypts"][4]["pt"][0] =
-      small.keyframe(1)["undist_keypts"][4]["pt"][0].get<double>() + 6.0;
-  for (int id : {1, 2}) {
-    small.keyframe(id)["undist_keypts"][5]["pt"][1] =
-        small.keyframe(id)["undist_keypts"][5]["pt"][1].get<double>() + 6.0;
-  }
-  const Map map = import_openvslam_map(small.bytes(), "map.msg").map;
+  small.moved_px[1][4].x() = 6.0;
+  for (int id : {1, 2}) small.moved_px[id][5].y() = 6.0;
+  const Map map = small.map();
   const ExportScene scene = make_export_scene(map, SubmapId{0});
   EXPECT_EQ(scene.points.size(), 29u);
   EXPECT_EQ(scene.points[4].sightings.size(), 2u);
@@ -93,10 +87,9 @@ TEST(ExportScene, TakesColoursFromImages) {
 
 TEST(ExportScene, OrdersSubmapsBySizeAndPosesByTime) {
   testing::SmallMap small = testing::make_small_map();
-  small.keyframe(1)["span_parent"] = -1;
-  small.keyframe(1)["ts"] = 110.0;
-  small.keyframe(2)["span_parent"] = 1;
-  const Map map = import_openvslam_map(small.bytes(), "map.msg").map;
+  small.parents[1] = KeyframeId{};
+  small.timestamps_ns[1] = 110'000'000'000;
+  const Map map = small.map();
   EXPECT_THAT(submaps_by_size(map), ::testing::ElementsAre(SubmapId{1}, SubmapId{0}));
   const std::vector<StampedPose> poses = keyframe_trajectory(map, SubmapId{1});
   ASSERT_EQ(poses.size(), 2u);
@@ -202,11 +195,7 @@ TEST(ExportNerfstudio, KnowsLenses) {
 }
 
 TEST(Export, RefusesWhatOthersHaveNot) {
-  const Document around = {{"model_type", "Equirectangular"},
-                           {"setup_type", "Monocular"},
-                           {"cols", 1280},
-                           {"rows", 640}};
-  const Map map = import_openvslam_map(testing::make_small_map(around).bytes(), "map.msg").map;
+  const Map map = testing::make_small_map(testing::camera_around(1280)).map();
   const ExportScene scene = make_export_scene(map, SubmapId{0});
   EXPECT_EQ(scene.points.size(), 30u);
   EXPECT_THAT(testing::input_error_of([&] { format_colmap(scene, ColmapForm::kText); }),

@@ -62,8 +62,11 @@ struct NerfstudioPaths {
 
 /// The views of a scene as the transforms.json of nerfstudio ("Data conventions" of its
 /// documentation): cameras look along -z with y up, pixels are counted from the corner of the
-/// image. InputError for a camera model that nerfstudio does not have.
-std::string format_nerfstudio(const ExportScene& scene, const NerfstudioPaths& paths);
+/// image. is_undistorted: no camera has distortion, and the file says so. InputError for a camera
+/// model that nerfstudio does not have.
+std::string format_nerfstudio(const ExportScene& scene,
+                              const NerfstudioPaths& paths,
+                              bool is_undistorted = false);
 
 /// The points of a scene in the Stanford polygon format (Turk 1994), binary, little-endian: x, y, z
 /// and the normal (nx, ny, nz) as float, red, green, blue.

@@ -28,21 +28,24 @@ std::string as_grey_jpeg(const Image& image) {
   return encode_jpeg(color);
 }
 
-/// Throws for a first frame that the cameras of the map did not take.
-void expect_size(const Map& map, const InputFrame& frame, const std::filesystem::path& input) {
+/// Throws for a first frame that the cameras of the map did not take. enlargement: of its images.
+void expect_size(const Map& map,
+                 const InputFrame& frame,
+                 int enlargement,
+                 const std::filesystem::path& input) {
   const Image& image = frame.images.front();
   bool is_any = false;
   std::string sizes;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    const Camera& camera = *keyframe.rig->cameras[0].camera;
+    const Camera& camera = *keyframe.rig().cameras[0].camera;
     is_any |= camera.width_px() == image.width_px && camera.height_px() == image.height_px;
     if (sizes.empty()) sizes = fmt::format("{}x{}", camera.width_px(), camera.height_px());
   });
   if (is_any) return;
   throw InputError(input.string(),
                    fmt::format("has images of {}x{} px, expected {} px as the map's camera",
-                               image.width_px,
-                               image.height_px,
+                               image.width_px / enlargement,
+                               image.height_px / enlargement,
                                sizes));
 }
 
@@ -63,6 +66,7 @@ std::unique_ptr<Input> RecordedImages::open(bool has_jpeg) const {
   InputOptions reading = reading_;
   reading.has_jpeg = has_jpeg;
   reading.has_right_jpeg = has_jpeg;
+  reading.enlarges_small = true;
   return open_input(input_, reading);
 }
 
@@ -74,7 +78,7 @@ void RecordedImages::survey(const Map& map, bool has_images) {
   }
   while (std::optional<InputFrame> frame = input->next()) {
     if (frame->fault != FrameFault::kNone || frame->images.empty()) continue;
-    if (frames_.empty()) expect_size(map, *frame, input_);
+    if (frames_.empty()) expect_size(map, *frame, input->info().enlargement, input_);
     frames_[frame->timestamp_ns] = {
         frame->index, sharpness(whole(frame->images.front())), frame->images.size()};
     if (frame->jpeg.empty()) continue;

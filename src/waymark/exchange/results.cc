@@ -6,17 +6,25 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <iterator>
+#include <map>
 #include <nlohmann/json.hpp>
 #include <numeric>
 
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+/// What frames.csv and summary.json begin with.
+constexpr std::string_view kFrameColumns =
+    "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap";
+constexpr std::string_view kSummaryBegin = "{\n  \"frames\": ";
 
 /// Figures with 4 decimals, which is plenty and keeps the files readable.
 double rounded(double value) { return std::isfinite(value) ? std::round(value * 1e4) / 1e4 : 0.0; }
@@ -31,6 +39,7 @@ Json to_json(const TimeStatistics& times, bool has_max) {
 
 Json to_json(const RunQuality& quality) {
   return {{"reprojection_px", rounded(quality.reprojection_px)},
+          {"reprojection_percent", rounded(quality.reprojection_percent)},
           {"matches_kept", rounded(quality.matches_kept)},
           {"length", rounded(quality.length)},
           {"is_metric", quality.is_metric}};
@@ -70,10 +79,7 @@ Json to_json(const std::vector<LoopFrames>& loops) {
 Json to_json(const std::vector<ScaleSummary>& scales) {
   Json list = Json::array();
   for (const ScaleSummary& scale : scales) {
-    list.push_back({{"submap", scale.submap},
-                    {"same_as", scale.same_as},
-                    {"sigma", rounded(scale.sigma)},
-                    {"landmarks", scale.num_landmarks}});
+    list.push_back({{"submap", scale.submap}, {"same_as", scale.same_as}});
   }
   return list;
 }
@@ -95,6 +101,15 @@ std::string picture_fields(const FrameRecord& frame) {
   if (!picture.is_known) return text + ",,,";
   return text +
          fmt::format(",{},{},{}", picture.brightness, picture.contrast, picture.blur_percent);
+}
+
+/// Quoted where it would be more than one field (RFC 4180).
+std::string name_field(const std::string& name) {
+  const std::string text = printable(name);
+  if (text.find_first_of(",\"") == std::string::npos) return text;
+  std::string field = "\"";
+  for (const char c : text) field += c == '"' ? "\"\"" : std::string(1, c);
+  return field + "\"";
 }
 
 void append_counts(Json& json, const FrameCounts& counts, std::size_t num_trajectory_lines) {
@@ -187,15 +202,17 @@ std::vector<std::pair<std::string, TimeStatistics>> summarize_stages(const Frame
 }
 
 std::string format_frames_csv(const FrameTable& table) {
-  std::string text = "index,timestamp_ns,state,reason,matches,inliers,is_keyframe,submap";
+  std::string text(kFrameColumns);
   for (const std::string& stage : table.stages) text += fmt::format(",{}_ms", stage);
-  text += ",features,brightness,contrast,blur,is_relocalized\n";
+  text += ",features,brightness,contrast,blur,is_relocalized";
+  text += table.names.empty() ? "\n" : ",name\n";
+  WAYMARK_CHECK(table.names.empty() || table.names.size() == table.frames.size());
   for (const FrameRecord& frame : table.frames) {
     auto out = std::back_inserter(text);
     fmt::format_to(out,
                    "{},{},{},{},",
                    frame.index,
-                   frame.timestamp_ns,
+                   table.has_times ? fmt::to_string(frame.timestamp_ns) : "",
                    to_string(frame.state),
                    to_string(frame.reason));
     fmt::format_to(
@@ -206,7 +223,28 @@ std::string format_frames_csv(const FrameTable& table) {
       fmt::format_to(
           out, ",{:.4f}", frame.num_stages == 0 ? 0.0 : static_cast<double>(frame.stage_ms[i]));
     }
-    text += picture_fields(frame) + (frame.is_relocalized ? ",1\n" : ",0\n");
+    text += picture_fields(frame) + (frame.is_relocalized ? ",1" : ",0");
+    const auto row = static_cast<std::size_t>(&frame - table.frames.data());
+    text += table.names.empty() ? "\n" : fmt::format(",{}\n", name_field(table.names[row]));
+  }
+  return text;
+}
+
+std::string format_poses_csv(const FrameTable& table,
+                             std::span<const std::vector<StampedPose>> trajectories) {
+  std::map<std::int64_t, const StampedPose*> poses;
+  for (const std::vector<StampedPose>& trajectory : trajectories) {
+    for (const StampedPose& pose : trajectory) poses[pose.timestamp_ns] = &pose;
+  }
+  std::string text = "name,submap,tx,ty,tz,qx,qy,qz,qw\n";
+  for (std::size_t i = 0; i < table.frames.size(); ++i) {
+    const auto found = poses.find(table.frames[i].timestamp_ns);
+    if (found == poses.end()) continue;
+    const Rigid3& pose = found->second->world_from_camera;
+    text += fmt::format("{},{}", name_field(table.names[i]), table.frames[i].submap.value);
+    for (const double value : pose.translation) text += fmt::format(",{:.9g}", value);
+    for (const double value : pose.rotation.coeffs()) text += fmt::format(",{:.9g}", value);
+    text += "\n";
   }
   return text;
 }
@@ -263,6 +301,34 @@ std::string format_points_ply(std::span<const Eigen::Vector3f> points) {
   return text;
 }
 
+bool is_result_name(std::string_view name) {
+  constexpr std::array<std::string_view, 9> kNames = {"trajectory.txt",
+                                                      "poses.csv",
+                                                      "keyframes.txt",
+                                                      "points.ply",
+                                                      "summary.json",
+                                                      "frames.csv",
+                                                      "view_mask.png",
+                                                      "calibration.yaml",
+                                                      "report.html"};
+  constexpr std::string_view kPart = "trajectory_", kSuffix = ".txt";
+  if (name.starts_with(kPart) && name.ends_with(kSuffix)) {
+    name.remove_prefix(kPart.size());
+    name.remove_suffix(kSuffix.size());
+    return !name.empty() && std::ranges::all_of(name, is_digit);
+  }
+  return std::ranges::find(kNames, name) != kNames.end();
+}
+
+bool holds_results(const std::filesystem::path& folder) {
+  const auto begins = [&folder](const char* name, std::string_view with) {
+    std::string begin(with.size(), '\0');
+    std::ifstream(folder / name).read(begin.data(), static_cast<std::streamsize>(begin.size()));
+    return begin == with;
+  };
+  return begins("summary.json", kSummaryBegin) || begins("frames.csv", kFrameColumns);
+}
+
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table) {
   write_file_atomically(folder / "frames.csv", format_frames_csv(table));
 }
@@ -272,16 +338,17 @@ void write_summary_json(const std::filesystem::path& folder, const RunSummary& s
 }
 
 void write_trajectories(const std::filesystem::path& folder,
-                        std::span<const std::vector<StampedPose>> trajectories) {
+                        std::span<const std::vector<StampedPose>> trajectories,
+                        bool has_times) {
   const auto path_of = [&folder](std::size_t i) {
     return folder / (i == 0 ? std::string("trajectory.txt") : fmt::format("trajectory_{}.txt", i));
   };
-  write_trajectory(path_of(0),
-                   trajectories.empty() ? std::vector<StampedPose>() : trajectories[0],
-                   TrajectoryFormat::kTum);
-  std::size_t i = 1;
-  for (; i < trajectories.size(); ++i)
-    write_trajectory(path_of(i), trajectories[i], TrajectoryFormat::kTum);
+  std::size_t i = 0;
+  for (; has_times && i < std::max<std::size_t>(trajectories.size(), 1); ++i) {
+    write_trajectory(path_of(i),
+                     trajectories.empty() ? std::vector<StampedPose>() : trajectories[i],
+                     TrajectoryFormat::kTum);
+  }
   std::error_code error;
   while (std::filesystem::remove(path_of(i), error)) ++i;
 }

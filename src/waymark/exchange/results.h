@@ -12,6 +12,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <string_view>
 #include <utility>
 #include <vector>
 
@@ -45,6 +46,9 @@ struct FrameRecord : FrameStatus {
 struct FrameTable {
   std::vector<std::string> stages;  ///< Columns "STAGE_ms".
   std::vector<FrameRecord> frames;  ///< In the order of the input.
+  /// Of the image files of the frames, where images have nothing to do with each other; else empty.
+  std::vector<std::string> names;
+  bool has_times = true;  ///< Else the times of frames only tell them apart, and are not written.
 };
 
 /// Of times in milliseconds.
@@ -77,6 +81,7 @@ FrameCounts count_frames(std::span<const FrameRecord> frames);
 struct RunQuality {
   /// Root mean square over all observations of the map, in pixels of the level of the feature.
   double reprojection_px = 0.0;
+  double reprojection_percent = 0.0;  ///< The same, of the longer side of the images.
   double matches_kept = 0.0;  ///< Share of the matches of tracked frames that agree on the pose.
   double length = 0.0;        ///< Of all trajectories together.
   bool is_metric = false;     ///< Whether the length is in metres, rather than in map units.
@@ -105,12 +110,10 @@ struct LoopFrames {
   std::optional<std::uint32_t> to;    ///< That showed its place again.
 };
 
-/// A part of a map in mono whose unit of length is that of another part.
+/// A part of a map in mono whose unit of length is that of another part, to about a quarter.
 struct ScaleSummary {
-  std::uint32_t submap = 0;       ///< That has it, as frames.csv numbers it.
-  std::uint32_t same_as = 0;      ///< Whose it is.
-  double sigma = 0.0;             ///< Of the ratio of the two units, as a part of it.
-  std::size_t num_landmarks = 0;  ///< Of both that tell it; 0: the speed of the camera does.
+  std::uint32_t submap = 0;   ///< That has it, as frames.csv numbers it.
+  std::uint32_t same_as = 0;  ///< Whose it is.
 };
 
 /// The markers of a run.
@@ -155,7 +158,8 @@ struct RunSummary {
   std::optional<std::size_t> localized;  ///< Of localize only.
   std::optional<RunQuality> quality;     ///< Of run only.
   std::optional<double> moves_along;  ///< Of run only: part of the image, see System::ego_mask().
-  /// Of run only: what seems to be wrong with the calibration and the time stamps, in words.
+  /// What seems to be wrong with the calibration and the time stamps, in words; of localize only
+  /// where depth contradicts the map.
   std::optional<std::vector<std::string>> mistakes = std::nullopt;
   std::optional<EstimatedCalibrationSummary> calibration = std::nullopt;  ///< Where none was given.
   std::vector<CalibrationEstimate> refined_calibration;  ///< Empty where it stayed as it was.
@@ -176,6 +180,16 @@ std::string format_frames_csv(const FrameTable& table);
 /// The text of summary.json.
 std::string format_summary_json(const RunSummary& summary);
 
+/// Whether a file of this name in a folder is one of those that a run leaves there.
+bool is_result_name(std::string_view name);
+/// Whether a run left its results in a folder: its summary or its table is there.
+bool holds_results(const std::filesystem::path& folder);
+
+/// The text of poses.csv: a line of names, a line per frame that was found in one of the
+/// trajectories. For tables with names.
+std::string format_poses_csv(const FrameTable& table,
+                             std::span<const std::vector<StampedPose>> trajectories);
+
 /// Writes frames.csv into the folder; throws OutputError.
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table);
 /// Writes summary.json into the folder; throws OutputError.
@@ -185,8 +199,10 @@ void write_summary_json(const std::filesystem::path& folder, const RunSummary& s
 std::string format_points_ply(std::span<const Eigen::Vector3f> points);
 
 /// Writes trajectory.txt (TUM) for the first trajectory, trajectory_1.txt ... for the others, and
-/// removes those of an earlier run that are left over. The caller orders them by size.
+/// removes those of an earlier run that are left over. Without times there is none. The caller
+/// orders them by size.
 void write_trajectories(const std::filesystem::path& folder,
-                        std::span<const std::vector<StampedPose>> trajectories);
+                        std::span<const std::vector<StampedPose>> trajectories,
+                        bool has_times = true);
 
 }  // namespace waymark

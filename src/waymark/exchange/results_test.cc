@@ -164,5 +164,42 @@ TEST(Results, TrajectoriesOfAnEarlierRunGo) {
   EXPECT_THROW(write_trajectories(folder / "none", trajectories), OutputError);
 }
 
+TEST(Results, OfImagesWithoutTimesHaveNamesInstead) {
+  FrameTable table;
+  table.frames = {make_record(0, FrameState::kLost, FrameReason::kNoCandidate),
+                  make_record(1, FrameState::kTracked)};
+  table.frames[1].submap = SubmapId{2};
+  table.names = {"a.jpg", "b, \"red\".jpg"};
+  table.has_times = false;
+  const std::string rows = format_frames_csv(table);
+  EXPECT_NE(rows.find("is_relocalized,name\n0,,lost,"), std::string::npos) << rows;
+  EXPECT_NE(rows.find(",\"b, \"\"red\"\".jpg\"\n"), std::string::npos) << rows;
+  const std::vector<std::vector<StampedPose>> found = {
+      {{1000, Rigid3(Eigen::Quaterniond::Identity(), {1.5, 0.0, -2.0})}}};
+  EXPECT_EQ(format_poses_csv(table, found),
+            "name,submap,tx,ty,tz,qx,qy,qz,qw\n\"b, \"\"red\"\".jpg\",2,1.5,0,-2,0,0,0,1\n");
+  const TemporaryFolder folder;
+  write_trajectories(folder.path(), found);
+  write_trajectories(folder.path(), found, table.has_times);
+  EXPECT_FALSE(std::filesystem::exists(folder / "trajectory.txt"));
+}
+
+TEST(Results, AreKnownByTheirFiles) {
+  for (const char* name : {"trajectory.txt", "trajectory_12.txt", "poses.csv", "frames.csv"}) {
+    EXPECT_TRUE(is_result_name(name)) << name;
+  }
+  for (const char* name : {"trajectory_.txt", "trajectory_a.txt", "groundtruth.txt", "m.wmap"}) {
+    EXPECT_FALSE(is_result_name(name)) << name;
+  }
+  const TemporaryFolder folder;
+  folder.write("frames.csv", "index,time\n");
+  EXPECT_FALSE(holds_results(folder.path()));
+  write_frames_csv(folder.path(), make_table());
+  EXPECT_TRUE(holds_results(folder.path()));
+  std::filesystem::remove(folder / "frames.csv");
+  write_summary_json(folder.path(), {});
+  EXPECT_TRUE(holds_results(folder.path()));
+}
+
 }  // namespace
 }  // namespace waymark

@@ -14,6 +14,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/base/time_column.h"
 #include "waymark/input/datasets.h"
 
 namespace waymark {
@@ -99,6 +100,7 @@ TrajectoryFormat recognize_format(std::string_view text, const std::string& name
                                rows.fields().size()));
 }
 
+/// times.txt of a file of KITTI poses; empty where there is none.
 std::filesystem::path find_times(const std::filesystem::path& poses_path) {
   const std::filesystem::path folder = poses_path.parent_path();
   const std::array<std::filesystem::path, 2> candidates = {
@@ -106,8 +108,20 @@ std::filesystem::path find_times(const std::filesystem::path& poses_path) {
   for (const std::filesystem::path& candidate : candidates) {
     if (std::filesystem::is_regular_file(candidate)) return candidate;
   }
-  throw InputError(poses_path.string(),
-                   "KITTI poses carry no time, expected times.txt beside them");
+  return {};
+}
+
+std::string read_poses_file(const std::filesystem::path& path) {
+  return read_text_file(path, "a trajectory in TUM, EuRoC or KITTI format");
+}
+
+/// With the number of the line for a time in seconds.
+std::vector<StampedPose> numbered(const std::vector<Rigid3>& poses) {
+  std::vector<StampedPose> trajectory;
+  for (const Rigid3& pose : poses) {
+    trajectory.push_back({static_cast<std::int64_t>(trajectory.size()) * 1'000'000'000, pose});
+  }
+  return trajectory;
 }
 
 std::vector<StampedPose> read_kitti(const std::filesystem::path& path,
@@ -115,6 +129,9 @@ std::vector<StampedPose> read_kitti(const std::filesystem::path& path,
                                     const std::optional<std::filesystem::path>& times_path) {
   const std::vector<Rigid3> poses = parse_kitti_poses(text, path.string());
   const std::filesystem::path times_file = times_path ? *times_path : find_times(path);
+  if (times_file.empty()) {
+    throw InputError(path.string(), "KITTI poses carry no time, expected times.txt beside them");
+  }
   const std::string times_text = read_text_file(times_file, "one time in seconds per pose");
   const std::vector<std::int64_t> times_ns = parse_times(times_text, times_file.string());
   if (times_ns.size() != poses.size()) {
@@ -157,13 +174,13 @@ void write_trajectory(const std::filesystem::path& path,
 
 std::vector<StampedPose> parse_tum_trajectory(std::string_view text, const std::string& name) {
   std::vector<StampedPose> poses;
+  const TimeColumn column(text, ' ');
   RowReader rows(text, name, ' ');
   while (rows.next()) {
     rows.expect_exactly(8, kTumLayout);
     const Eigen::Quaterniond rotation(
         rows.number(7), rows.number(4), rows.number(5), rows.number(6));
-    poses.push_back(
-        {rows.seconds_as_ns(0), {checked_rotation(rows, rotation), read_position(rows)}});
+    poses.push_back({column.read(rows), {checked_rotation(rows, rotation), read_position(rows)}});
   }
   return poses;
 }
@@ -194,7 +211,7 @@ std::vector<Rigid3> parse_kitti_poses(std::string_view text, const std::string& 
 
 std::vector<StampedPose> read_trajectory(const std::filesystem::path& path,
                                          const std::optional<std::filesystem::path>& times_path) {
-  const std::string text = read_text_file(path, "a trajectory in TUM, EuRoC or KITTI format");
+  const std::string text = read_poses_file(path);
   std::vector<StampedPose> poses;
   switch (recognize_format(text, path.string())) {
     case TrajectoryFormat::kTum:
@@ -215,6 +232,27 @@ std::vector<StampedPose> read_trajectory(const std::filesystem::path& path,
     return a.timestamp_ns < b.timestamp_ns;
   });
   return poses;
+}
+
+TrajectoryPair read_trajectories(const std::filesystem::path& estimate,
+                                 const std::filesystem::path& groundtruth) {
+  const std::array texts = {read_poses_file(estimate), read_poses_file(groundtruth)};
+  const bool are_kitti =
+      recognize_format(texts[0], estimate.string()) == TrajectoryFormat::kKitti &&
+      recognize_format(texts[1], groundtruth.string()) == TrajectoryFormat::kKitti;
+  if (!are_kitti || (!find_times(estimate).empty() && !find_times(groundtruth).empty())) {
+    return {read_trajectory(estimate), read_trajectory(groundtruth), false};
+  }
+  const std::vector<Rigid3> poses = parse_kitti_poses(texts[0], estimate.string());
+  const std::vector<Rigid3> true_poses = parse_kitti_poses(texts[1], groundtruth.string());
+  if (poses.size() != true_poses.size()) {
+    throw InputError(estimate.string(),
+                     fmt::format("{} poses without times, expected {} as in {}",
+                                 poses.size(),
+                                 true_poses.size(),
+                                 groundtruth.string()));
+  }
+  return {numbered(poses), numbered(true_poses), true};
 }
 
 }  // namespace waymark

@@ -52,4 +52,18 @@ std::vector<StampedPose> read_trajectory(
     const std::filesystem::path& path,
     const std::optional<std::filesystem::path>& times_path = std::nullopt);
 
+/// An estimated trajectory and the true one.
+struct TrajectoryPair {
+  std::vector<StampedPose> estimate;     ///< What is judged.
+  std::vector<StampedPose> groundtruth;  ///< What it is held against.
+  /// Whether neither has times, and line i of the one goes with line i of the other: the times are
+  /// then the numbers of the lines, in seconds.
+  bool is_by_line = false;
+};
+
+/// Reads both as read_trajectory() does. Two files of KITTI poses of which one at least has no
+/// times go together line by line; InputError where they have different numbers of lines.
+TrajectoryPair read_trajectories(const std::filesystem::path& estimate,
+                                 const std::filesystem::path& groundtruth);
+
 }  // namespace waymark

@@ -91,6 +91,17 @@ TEST(Trajectory, IsSortedByTime) {
   EXPECT_EQ(poses[2].world_from_camera.translation.x(), 9);
 }
 
+TEST(Trajectory, TakesTumColumnsInNanoseconds) {
+  const std::string name = "f";
+  const auto poses = parse_tum_trajectory(
+      "1403636579000000000.000000 1 2 3 0 0 0 1\n1403636579025000192.000000 1 2 3 0 0 0 1\n", name);
+  ASSERT_EQ(poses.size(), 2u);
+  EXPECT_EQ(poses[0].timestamp_ns, 1403636579000000000);
+  EXPECT_EQ(poses[1].timestamp_ns, 1403636579025000192);
+  EXPECT_THAT(input_error_of([&] { parse_tum_trajectory("-1e18 1 2 3 0 0 0 1\n", name); }),
+              HasSubstr("field 1 is '-1e18', expected a time"));
+}
+
 TEST(Trajectory, NamesFileAndLineOfWhatIsWrong) {
   const TemporaryFolder folder;
   const auto error = [&](const char* text) {

@@ -16,7 +16,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/geometry/relative_pose.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

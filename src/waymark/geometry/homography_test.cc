@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "waymark/base/rng.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

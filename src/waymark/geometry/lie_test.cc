@@ -9,7 +9,7 @@
 #include "waymark/base/rng.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/sim3.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

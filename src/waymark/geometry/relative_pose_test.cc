@@ -9,7 +9,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/geometry/essential.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

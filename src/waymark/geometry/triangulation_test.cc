@@ -13,7 +13,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/geometry/bearing.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

@@ -254,11 +254,4 @@ TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOpti
   return result;
 }
 
-TwoViewResult take_motion(const Rigid3& b_from_a,
-                          TwoViewModel model,
-                          const BearingMatches& matches,
-                          const TwoViewOptions& options) {
-  return judge(make_candidate(b_from_a, matches), model, matches, options.min_num_points, options);
-}
-
 }  // namespace waymark

@@ -65,13 +65,6 @@ struct TwoViewResult {
 /// The best is the result, if it beats each different candidate significantly (Vuong 1989).
 TwoViewResult estimate_two_view(const BearingMatches& matches, const TwoViewOptions& options);
 
-/// The result for a motion that is known, whatever share of the matches agrees with it: the points
-/// it gives them, if it has the number and the parallax that an estimate needs.
-TwoViewResult take_motion(const Rigid3& b_from_a,
-                          TwoViewModel model,
-                          const BearingMatches& matches,
-                          const TwoViewOptions& options);
-
 /// Squared epipolar error, in squared standard deviations, from which a match is an outlier: the
 /// 95 % quantile of chi-squared of 1 degree of freedom.
 inline constexpr double kMaxSquaredEpipolarError = 3.84;

@@ -10,7 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
-#include "waymark/geometry/test_scenes.h"
+#include "waymark/geometry/testing/scenes.h"
 
 namespace waymark {
 namespace {

@@ -14,7 +14,7 @@
 #include "waymark/image/corners.h"
 #include "waymark/image/hamming.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/test_references.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {

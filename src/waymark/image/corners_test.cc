@@ -11,7 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/fast.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/test_references.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {

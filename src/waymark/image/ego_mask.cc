@@ -28,7 +28,7 @@ constexpr double kSamePx = 2.5;
 /// With more pairs of images in the same direction nothing is told.
 constexpr double kMaxUnturnedPart = 0.5;
 /// The part of the gradients that stays, beyond that of a world at infinity: .15 at most in
-/// recordings in which nothing moves along, .3 to .9 of burnt-in text (docs/decisions.md).
+/// recordings in which nothing moves along, .3 to .9 of burnt-in text (docs/decisions/image.md).
 constexpr double kAlong = 0.25, kNotAlong = 0.1;
 /// So many landmarks within this distance, in the median, are where they were.
 constexpr std::size_t kMinAnchors = 8;

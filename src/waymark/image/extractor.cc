@@ -24,7 +24,7 @@ namespace {
 constexpr int kBorderPx = kBriefRadius;
 
 // Points on edges join in where strong corners are in less than this part of the image, whose
-// longer side has so many blocks (docs/decisions.md).
+// longer side has so many blocks (docs/decisions/image.md).
 constexpr double kFewCovered = 0.45;
 // So many corners in all are needed per block that is expected to have some.
 constexpr int kCornersPerBlock = 4;

@@ -12,7 +12,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/image/image_testing.h"
-#include "waymark/image/test_references.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {

@@ -72,6 +72,7 @@ FoundFrame FeatureFinder::find(const FrameImages& images, const FrameView& view)
   check_sizes(images, *view.rig);
   FoundFrame found;
   found.features = std::make_shared<Features>();
+  found.features->rig = view.rig;
   const auto features_start = std::chrono::steady_clock::now();
   extract_primary(images, view, found);
   found.times.features_ms = ms_since(features_start);

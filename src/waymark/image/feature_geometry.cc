@@ -153,20 +153,21 @@ void derive_anew(const Rig& rig, const Features& before, bool is_moved, Features
 
 }  // namespace
 
-std::shared_ptr<const Features> measure_anew(const Features& features,
-                                             const Rig& rig,
-                                             const RigMotion& motion) {
+std::shared_ptr<const Features> recompute(const Features& features,
+                                          std::shared_ptr<const Rig> rig,
+                                          const RigMotion& motion) {
   auto anew = std::make_shared<Features>(features);
-  if (rig.cameras.size() == 1) correct_depth(rig.inverse_depth_offset, *anew);
-  const bool is_moved = correct_rolling(rig, motion, *anew);
-  derive_anew(rig, features, is_moved, *anew);
+  if (rig->cameras.size() == 1) correct_depth(rig->inverse_depth_offset, *anew);
+  const bool is_moved = correct_rolling(*rig, motion, *anew);
+  derive_anew(*rig, features, is_moved, *anew);
+  anew->rig = std::move(rig);
   return anew;
 }
 
 std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
-                                      const Rig& rig,
                                       const RigMotion& motion) {
   if (features->motion == motion) return features;
+  const Rig& rig = *features->rig;
   auto anew = std::make_shared<Features>(*features);
   if (correct_rolling(rig, motion, *anew)) derive_anew(rig, *features, true, *anew);
   return anew;
@@ -182,7 +183,6 @@ void insert_at(FeatureArray<T>& values, std::size_t at, std::size_t count, const
 }  // namespace
 
 Features with_points(const Features& features,
-                     const Rig& rig,
                      std::span<const Keypoint> keypoints,
                      std::span<const Descriptor> descriptors) {
   WAYMARK_CHECK(keypoints.size() == descriptors.size());
@@ -200,7 +200,7 @@ Features with_points(const Features& features,
   for (std::uint32_t& partner : result.partner) {
     if (partner != kNoFeature && partner >= at) partner += static_cast<std::uint32_t>(count);
   }
-  derive_geometry(rig, result);
+  derive_geometry(*features.rig, result);
   return result;
 }
 

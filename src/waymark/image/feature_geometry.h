@@ -34,20 +34,18 @@ void measure_stereo_ranges(const Rig& rig, Features& features);
 /// Features and in addition points of camera 0 that were found otherwise, without range: they
 /// become its last corners. Keypoints and descriptors of these are parallel.
 Features with_points(const Features& features,
-                     const Rig& rig,
                      std::span<const Keypoint> keypoints,
                      std::span<const Descriptor> descriptors);
 
 /// The same features as a rig of the same cameras measures them that is calibrated otherwise:
 /// bearings, level_pixel_from_bearing, sizes and ranges anew. Where a pixel has no bearing any more
 /// all of that stays as it was. motion: of the rig while they were seen.
-std::shared_ptr<const Features> measure_anew(const Features& features,
-                                             const Rig& rig,
-                                             const RigMotion& motion);
+std::shared_ptr<const Features> recompute(const Features& features,
+                                          std::shared_ptr<const Rig> rig,
+                                          const RigMotion& motion);
 
 /// The same features of a rig that moved otherwise while they were seen.
 std::shared_ptr<const Features> moved(std::shared_ptr<const Features> features,
-                                      const Rig& rig,
                                       const RigMotion& motion);
 
 }  // namespace waymark

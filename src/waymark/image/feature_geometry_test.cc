@@ -63,8 +63,7 @@ TEST(FeatureGeometry, TakesPointsInAsItsLastCorners) {
   ASSERT_GT(built->size(), built->num_primary);
   const std::vector<Keypoint> keypoints = {{.x_px = 100.0f, .y_px = 50.0f, .level = 4},
                                            {.x_px = 30.0f, .y_px = 200.0f, .level = 4}};
-  const Features all =
-      with_points(*built, make_rig(), keypoints, std::vector<Descriptor>{{1, 2, 3, 4}, {}});
+  const Features all = with_points(*built, keypoints, std::vector<Descriptor>{{1, 2, 3, 4}, {}});
   ASSERT_EQ(all.num_corners(), built->num_corners() + 2);
   ASSERT_EQ(all.size(), built->size() + 2);
   const std::size_t first = built->num_corners();
@@ -158,7 +157,7 @@ TEST(FeatureGeometry, IsMeasuredAnewByAnotherCalibration) {
       Eigen::AngleAxisd(2e-3, Eigen::Vector3d::UnitY()) * rig.cameras[1].cam_from_rig.rotation;
   Features expected = before;
   measure_stereo_ranges(turned, expected);
-  const auto anew = measure_anew(before, turned, {});
+  const auto anew = recompute(before, std::make_shared<const Rig>(turned), {});
   EXPECT_EQ(anew->range_m, expected.range_m);
   EXPECT_GT(std::abs(anew->range_m[0] / before.range_m[0] - 1.0f), 0.01f);
 }

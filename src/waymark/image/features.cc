@@ -26,7 +26,8 @@ std::size_t bytes_of(const Features& features) {
 }
 
 Features copy(const Features& features, std::pmr::memory_resource* memory) {
-  return {.num_primary = features.num_primary,
+  return {.rig = features.rig,
+          .num_primary = features.num_primary,
           .num_edges = features.num_edges,
           .keypoints = {features.keypoints, memory},
           .descriptors = {features.descriptors, memory},

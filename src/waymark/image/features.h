@@ -13,6 +13,7 @@
 #include <vector>
 
 #include "waymark/camera/camera.h"
+#include "waymark/camera/rig.h"
 #include "waymark/image/feature_grid.h"
 
 namespace waymark {
@@ -51,7 +52,7 @@ inline Eigen::Vector2f edge_normal(float angle_rad) {
 }
 
 /// How much surer than a corner's place that of a line through nine places of an edge is.
-/// (docs/decisions.md)
+/// (docs/decisions/image.md)
 inline constexpr float kEdgePrecision = 2.0f;
 
 /// What an edge leaves of W: n n^T W, n being its normal in the image. Residuals are in pixels of
@@ -71,6 +72,8 @@ using FeatureArray = std::pmr::vector<T>;
 /// points on edges, which tell their place across the edge only. A copy lies on the heap, wherever
 /// what it is of does; see stored_in().
 struct Features {
+  /// The cameras that measured all this, as calibrated then; null only while it is being made.
+  std::shared_ptr<const Rig> rig;
   std::size_t num_primary = 0;             ///< Features of camera 0.
   std::size_t num_edges = 0;               ///< The last of these are points on edges.
   FeatureArray<Keypoint> keypoints;        ///< All features; pixels are those of each one's camera.

@@ -37,8 +37,8 @@ void move_to_depth(const RigCamera& camera,
 
 }  // namespace
 
-FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
-    : rig_(std::make_shared<const Rig>(std::move(rig))),
+FrameBuilder::FrameBuilder(std::shared_ptr<const Rig> rig, const FrameSettings& settings)
+    : rig_(std::move(rig)),
       depth_(settings.depth),
       is_auto_masked_(settings.view.is_auto_masked()),
       finder_(rig_, settings) {
@@ -47,9 +47,9 @@ FrameBuilder::FrameBuilder(Rig rig, const FrameSettings& settings)
   }
 }
 
-void FrameBuilder::look_with(const Rig& rig) {
-  rig_ = std::make_shared<const Rig>(rig);
-  depth_.inverse_offset = rig.inverse_depth_offset;
+void FrameBuilder::set_calibration(std::shared_ptr<const Rig> rig) {
+  rig_ = std::move(rig);
+  depth_.inverse_offset = rig_->inverse_depth_offset;
 }
 
 FrameView FrameBuilder::view() const {
@@ -84,7 +84,7 @@ std::shared_ptr<const Features> FrameBuilder::build(FoundFrame found,
     times_.depth_ms = taken.count();
   }
   keep_across(features);
-  return moved(std::move(found.features), *rig_, motion);
+  return moved(std::move(found.features), motion);
 }
 
 void FrameBuilder::watch(const LocatedImage& located, bool is_same_world) {

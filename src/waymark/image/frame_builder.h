@@ -3,6 +3,7 @@
 #pragma once
 
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "waymark/camera/rig.h"
@@ -21,7 +22,9 @@ namespace waymark {
 class FrameBuilder {
  public:
   /// Throws InputError for a word that view.auto_mask does not know.
-  FrameBuilder(Rig rig, const FrameSettings& settings);
+  FrameBuilder(std::shared_ptr<const Rig> rig, const FrameSettings& settings);
+  FrameBuilder(Rig rig, const FrameSettings& settings)
+      : FrameBuilder(std::make_shared<const Rig>(std::move(rig)), settings) {}
 
   /// Throws InputError where the size of an image is not the camera's. image1 takes a rig of two
   /// cameras; a rig of two without image1 gives features without range.
@@ -55,8 +58,10 @@ class FrameBuilder {
 
   const FrameTimes& times() const { return times_; }
 
+  /// The cameras as calibrated by now.
+  const std::shared_ptr<const Rig>& rig() const { return rig_; }
   /// From now on the images are of the same cameras calibrated otherwise.
-  void look_with(const Rig& rig);
+  void set_calibration(std::shared_ptr<const Rig> rig);
 
  private:
   void add_depth(const FrameImages& images, const RigMotion& motion, Features& features);

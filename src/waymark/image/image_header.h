@@ -29,10 +29,13 @@ ImageSize size_of(const BasicImage<T>& image) {
 /// Larger images are refused by what their header says, before there is memory for them:
 /// 16384x8192, twice what the largest 360 degree cameras have, are within.
 inline constexpr int kMaxMegapixels = 135;
+/// The longest side that a JPEG has.
+inline constexpr int kMaxSidePx = 65500;
 
 /// Whether an image of this size is refused.
 inline bool is_too_large(const ImageSize& size) {
-  return 1e-6 * size.width_px * size.height_px > kMaxMegapixels;
+  return 1e-6 * size.width_px * size.height_px > kMaxMegapixels || size.width_px > kMaxSidePx ||
+         size.height_px > kMaxSidePx;
 }
 
 /// The size that the header of a PNG, JPEG, TIFF, BMP, WebP, PGM or PPM states, from 1x1 on.

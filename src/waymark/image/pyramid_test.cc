@@ -10,7 +10,7 @@
 #include "waymark/image/brief.h"
 #include "waymark/image/image_testing.h"
 #include "waymark/image/pyramid.h"
-#include "waymark/image/test_references.h"
+#include "waymark/image/testing/references.h"
 
 namespace waymark {
 namespace {

@@ -11,7 +11,7 @@ namespace waymark {
 /// Standard deviation of stereo parallax in pixels of the feature's level. On rendered images 80 %
 /// of the errors are below 0.11 and 95 % below 0.25; lenses, motion and compression add to that,
 /// and what the patch of a slanted surface adds stays the same from frame to frame, so that many
-/// frames tell less than their number says (docs/decisions.md).
+/// frames tell less than their number says (docs/decisions/image.md).
 inline constexpr double kStereoSigmaPx = 0.5;
 
 /// Standard deviation of the range of a primary feature relative to the range itself. Nothing where

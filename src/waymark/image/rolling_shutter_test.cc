@@ -99,12 +99,13 @@ TEST_F(RollingShutterTest, TheTurnAloneIsMostOfIt) {
 }
 
 TEST_F(RollingShutterTest, ReplacesACorrectionByAnother) {
+  seen_.rig = std::make_shared<const Rig>(rolling_);
   const auto seen = std::make_shared<const Features>(seen_);
   RigMotion other = motion_;
   other.turn_rad_s *= 0.5f;
-  const auto half = moved(seen, rolling_, other);
+  const auto half = moved(seen, other);
   EXPECT_GT(largest_error_px(*half), 2.0);
-  EXPECT_LT(largest_error_px(*moved(half, rolling_, motion_)), 0.3);
+  EXPECT_LT(largest_error_px(*moved(half, motion_)), 0.3);
   const auto bearing = [](const Features& features) { return features.bearings[3]; };
   EXPECT_NE(bearing(*half), bearing(*seen)) << "the geometry follows";
 }
@@ -134,8 +135,9 @@ TEST_F(RollingShutterTest, PointsBeyondInfinityOnlyTurn) {
 }
 
 TEST_F(RollingShutterTest, IsUndoneByACalibrationWithoutReadout) {
-  const auto corrected = moved(std::make_shared<const Features>(seen_), rolling_, motion_);
-  const auto back = measure_anew(*corrected, global_, corrected->motion);
+  seen_.rig = std::make_shared<const Rig>(rolling_);
+  const auto corrected = moved(std::make_shared<const Features>(seen_), motion_);
+  const auto back = recompute(*corrected, std::make_shared<const Rig>(global_), corrected->motion);
   for (std::size_t i = 0; i < back->size(); ++i) {
     EXPECT_NEAR(back->keypoints[i].x_px, seen_.keypoints[i].x_px, 0.3f);
     EXPECT_NEAR(back->keypoints[i].y_px, seen_.keypoints[i].y_px, 0.3f);

@@ -24,7 +24,7 @@ LevelCounts share_among_levels(int count, const LevelCounts& available);
 /// in the square around one that was; the size of the squares is searched such that half of the
 /// count remains. The other half are the strongest corners left: which of two neighbours of like
 /// strength wins changes from image to image, so spacing alone chooses corners that are not found
-/// again (docs/decisions.md). Keeps its buffers.
+/// again (docs/decisions/image.md). Keeps its buffers.
 class SpreadSelector {
  public:
   /// Makes room for any corners of images up to this size, so that select() allocates nothing.

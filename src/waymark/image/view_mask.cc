@@ -8,7 +8,6 @@
 #include <numbers>
 #include <vector>
 
-#include "waymark/camera/scaled_camera.h"
 #include "waymark/image/brief.h"
 #include "waymark/image/pyramid.h"
 
@@ -156,6 +155,16 @@ void combine(ImageView levels, ImageView mask, Image& result) {
       result.row(y)[x] = mask.at(x, y) == 0 ? 0 : count;
     }
   }
+}
+
+/// Where a camera sees straight ahead; the centre of the image if it does not.
+Eigen::Vector2d principal_point(const Camera& camera) {
+  const Eigen::Vector3d ahead(0.0, 0.0, 1.0);
+  Eigen::Vector2d pixel;
+  std::uint8_t is_visible = 0;
+  camera.project({&ahead, 1}, {&pixel, 1}, {&is_visible, 1});
+  if (is_visible) return pixel;
+  return {0.5 * camera.width_px() - 0.5, 0.5 * camera.height_px() - 0.5};
 }
 
 }  // namespace

@@ -10,7 +10,6 @@
 #include <cmath>
 #include <cstring>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 #include <optional>
 
@@ -20,6 +19,7 @@
 #include "waymark/base/text.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/image_header.h"
+#include "waymark/image/opencv_image.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/reading.h"
 
@@ -78,7 +78,7 @@ const PixelEncoding& encoding_of(const RosImage& image, const std::string& where
           "an image of encoding {}, expected one of {}", quote_for_message(image.encoding), known));
 }
 
-bool is_compressed(const BagTopic& topic) { return topic.type == "sensor_msgs/CompressedImage"; }
+bool is_compressed(const BagTopic& topic) { return topic.type != "sensor_msgs/Image"; }
 
 [[noreturn]] void fail_message(const BagTopic& topic, const std::string& where) {
   throw InputError(
@@ -97,7 +97,8 @@ RosImage parse_image(std::string_view bytes, const BagTopic& topic, const std::s
 RosCompressedImage parse_compressed(std::string_view bytes,
                                     const BagTopic& topic,
                                     const std::string& where) {
-  std::optional<RosCompressedImage> image = parse_ros_compressed_image(bytes, topic.encoding);
+  std::optional<RosCompressedImage> image =
+      parse_ros_compressed_image(bytes, topic.encoding, topic.type);
   if (!image) fail_message(topic, where);
   return *std::move(image);
 }
@@ -140,25 +141,15 @@ cv::Mat rows_of(const RosImage& image, int type, const std::string& where) {
   return copy;
 }
 
-cv::Mat convert(const cv::Mat& pixels, int code, const std::string& where) {
-  constexpr double kScale = 255.0 / 65535.0;
+/// Of 16 bits as levels have it.
+cv::Mat convert(const cv::Mat& pixels, int code, const Levels& levels, const std::string& where) {
   try {
     cv::Mat converted = pixels;
     if (code != kAsItIs) cv::cvtColor(pixels, converted, code);
-    if (converted.depth() == CV_16U) converted.convertTo(converted, CV_8U, kScale);
-    return converted;
+    return converted.depth() == CV_16U ? in_8_bits(converted, levels) : converted;
   } catch (const cv::Exception&) {
     throw InputError(where, "an image that cannot be converted, expected one of even size");
   }
-}
-
-template <class T>
-BasicImage<T> copy_of(const cv::Mat& mat) {
-  BasicImage<T> image(mat.cols, mat.rows);
-  for (int y = 0; y < mat.rows; ++y) {
-    std::memcpy(image.row(y), mat.ptr(y), sizeof(T) * static_cast<std::size_t>(mat.cols));
-  }
-  return image;
 }
 
 [[noreturn]] void fail_compressed(const RosCompressedImage& image,
@@ -194,6 +185,26 @@ DepthImage decode_compressed_depth(const RosCompressedImage& image,
 
 }  // namespace
 
+std::string video_codec_of(std::string_view format) {
+  struct Name {
+    std::string_view part;
+    std::string_view codec;
+  };
+  constexpr std::array kNames = {Name{"264", "h264"},
+                                 Name{"avc", "h264"},
+                                 Name{"265", "hevc"},
+                                 Name{"hevc", "hevc"},
+                                 Name{"vp9", "vp9"},
+                                 Name{"vp8", "vp8"},
+                                 Name{"av1", "av1"}};
+  std::string lower(format);
+  for (char& c : lower) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  for (const Name& name : kNames) {
+    if (lower.find(name.part) != std::string::npos) return std::string(name.codec);
+  }
+  return {};
+}
+
 BagImageHeader read_bag_image_header(std::string_view bytes,
                                      const BagTopic& topic,
                                      const std::string& where) {
@@ -213,10 +224,13 @@ BagImageHeader read_bag_image_header(std::string_view bytes,
   return {image.frame_id, image.encoding, is_depth};
 }
 
-Image read_bag_image(std::string_view bytes, const BagTopic& topic, const std::string& where) {
+Image read_bag_image(std::string_view bytes,
+                     const BagTopic& topic,
+                     const std::string& where,
+                     const Levels& levels) {
   if (is_compressed(topic)) {
     const RosCompressedImage image = parse_compressed(bytes, topic, where);
-    std::optional<Image> decoded = decode_grey_image(image.data);
+    std::optional<Image> decoded = decode_grey_image(image.data, levels);
     if (!decoded) fail_compressed(image, "jpeg or png", where);
     return *std::move(decoded);
   }
@@ -224,10 +238,22 @@ Image read_bag_image(std::string_view bytes, const BagTopic& topic, const std::s
   const PixelEncoding& encoding = encoding_of(image, where);
   const cv::Mat rows = rows_of(image, encoding.type, where);
   if (encoding.to_grey != kViaColour) {
-    return copy_of<std::uint8_t>(convert(rows, encoding.to_grey, where));
+    return image_of<std::uint8_t>(convert(rows, encoding.to_grey, levels, where));
   }
-  const cv::Mat colour = convert(rows, encoding.to_bgr, where);
-  return copy_of<std::uint8_t>(convert(colour, cv::COLOR_BGR2GRAY, where));
+  const cv::Mat colour = convert(rows, encoding.to_bgr, levels, where);
+  return image_of<std::uint8_t>(convert(colour, cv::COLOR_BGR2GRAY, levels, where));
+}
+
+std::optional<BasicImage<std::uint16_t>> read_bag_grey16(std::string_view bytes,
+                                                         const BagTopic& topic,
+                                                         const std::string& where) {
+  if (is_compressed(topic)) {
+    return decode_grey16_image(parse_compressed(bytes, topic, where).data);
+  }
+  const RosImage image = parse_image(bytes, topic, where);
+  const PixelEncoding& encoding = encoding_of(image, where);
+  if (CV_MAT_DEPTH(encoding.type) != CV_16U) return std::nullopt;
+  return image_of<std::uint16_t>(rows_of(image, encoding.type, where));
 }
 
 DepthImage read_bag_depth(std::string_view bytes,
@@ -239,30 +265,31 @@ DepthImage read_bag_depth(std::string_view bytes,
   }
   const RosImage image = parse_image(bytes, topic, where);
   if (image.encoding == "16UC1" || image.encoding == "mono16") {
-    return copy_of<std::uint16_t>(rows_of(image, CV_16UC1, where));
+    return image_of<std::uint16_t>(rows_of(image, CV_16UC1, where));
   }
   if (image.encoding != "32FC1") {
     throw InputError(where,
                      fmt::format("an image of encoding {}, expected depth: 16UC1 or 32FC1",
                                  quote_for_message(image.encoding)));
   }
-  const BasicImage<float> depth_m = copy_of<float>(rows_of(image, CV_32FC1, where));
+  const BasicImage<float> depth_m = image_of<float>(rows_of(image, CV_32FC1, where));
   return depth_in_units(depth_m.view(), {.factor = units_per_m});
 }
 
-std::string read_bag_jpeg(std::string_view bytes, const BagTopic& topic, const std::string& where) {
+std::string read_bag_jpeg(std::string_view bytes,
+                          const BagTopic& topic,
+                          const std::string& where,
+                          const Levels& levels) {
   if (is_compressed(topic)) {
     const RosCompressedImage image = parse_compressed(bytes, topic, where);
-    std::optional<std::string> jpeg = as_jpeg(image.data);
+    std::optional<std::string> jpeg = as_jpeg(image.data, levels);
     if (!jpeg) fail_compressed(image, "jpeg or png", where);
     return *std::move(jpeg);
   }
   const RosImage image = parse_image(bytes, topic, where);
   const PixelEncoding& encoding = encoding_of(image, where);
-  std::vector<std::uint8_t> jpeg;
-  WAYMARK_CHECK(cv::imencode(
-      ".jpg", convert(rows_of(image, encoding.type, where), encoding.to_bgr, where), jpeg));
-  return {jpeg.begin(), jpeg.end()};
+  const cv::Mat rows = rows_of(image, encoding.type, where);
+  return jpeg_of(convert(rows, encoding.to_bgr, levels, where));
 }
 
 }  // namespace waymark

@@ -10,8 +10,10 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/bag_calibration.h"
+#include "waymark/input/bag_frames.h"
 #include "waymark/input/bag_image.h"
 #include "waymark/input/bag_topics.h"
+#include "waymark/input/bag_video.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
@@ -22,12 +24,6 @@ namespace {
 /// As drivers give depth in 16 bits (REP 118).
 constexpr double kUnitsPerMetre = 1000.0;
 constexpr std::size_t kMaxBadMessagesAtStart = 50;
-
-/// Of the messages of a bag those of a moment.
-struct BagFrame {
-  const BagMessage* first = nullptr;
-  const BagMessage* second = nullptr;  ///< Null: none.
-};
 
 /// Every image topic with what its first message tells.
 std::vector<ImageTopic> list_image_topics(Bag& bag) {
@@ -102,10 +98,11 @@ std::optional<CameraChain> calibration_of(Bag& bag, const TopicChoice& choice) {
     topics += fmt::format(
         "{}{} ({})", topics.empty() ? "" : ", ", printable(topic.name), printable(topic.type));
   }
-  throw InputError(path,
-                   fmt::format("holds no message of sensor_msgs/Image or CompressedImage, expected "
-                               "images; its topics: {}",
-                               topics.empty() ? "none" : topics));
+  throw InputError(
+      path,
+      fmt::format("holds no message of sensor_msgs/Image, CompressedImage or of video, "
+                  "expected images; its topics: {}",
+                  topics.empty() ? "none" : topics));
 }
 
 class BagInput : public Input {
@@ -114,16 +111,17 @@ class BagInput : public Input {
       : path_(path), bag_(path), masks_(options.mask), has_jpeg_(options.has_jpeg) {
     info_.format = "bag";
     choose(options);
-    list_frames();
-    selection_ = select_frames(path, options, frames_.size());
-    info_.num_frames = selection_.count(frames_.size());
+    list_frames(options);
+    find_levels();
+    selection_ = select_frames(path, options, frames_.frames.size());
+    info_.num_frames = selection_.count(frames_.frames.size());
     info_.calibration = choose_calibration(path, options.calibration, carried_, info_.setup);
     if (info_.calibration && info_.setup == Setup::kRgbd) {
       if (!info_.calibration->depth_factor) info_.calibration->depth_factor = kUnitsPerMetre;
       units_per_m_ = *info_.calibration->depth_factor;
     }
     std::vector<std::string> stems;
-    for (std::size_t i = 0; i < frames_.size(); ++i) stems.push_back(mask_name(i));
+    for (std::size_t i = 0; i < frames_.frames.size(); ++i) stems.push_back(mask_name(i));
     masks_.match(stems);
     start();
     describe_all(options);
@@ -175,75 +173,68 @@ class BagInput : public Input {
     });
   }
 
-  /// The messages of a topic, as far as their times increase.
-  std::vector<const BagMessage*> messages_of(const ImageTopic& topic) {
-    std::vector<const BagMessage*> messages;
-    for (const BagMessage& message : bag_.content().messages) {
-      if (message.topic == topic.topic) messages.push_back(&message);
-    }
-    std::vector<std::int64_t> times_ns;
-    for (const BagMessage* message : messages) times_ns.push_back(message->timestamp_ns);
-    std::vector<const BagMessage*> used;
-    const std::string where = fmt::format("{}: {}", path_.string(), printable(topic.name));
-    for (const std::size_t i : increasing_times(times_ns, where, "messages")) {
-      used.push_back(messages[i]);
-    }
-    info_.counts.out_of_order += messages.size() - used.size();
-    return used;
-  }
-
-  void list_frames() {
-    const auto times_of = [](const std::vector<const BagMessage*>& messages) {
-      std::vector<std::int64_t> times_ns;
-      for (const BagMessage* message : messages) times_ns.push_back(message->timestamp_ns);
-      return times_ns;
-    };
-    for (const BagMessage* message : messages_of(choice_.first)) frames_.push_back({message});
-    if (choice_.second) {
-      std::vector<std::int64_t> times_ns;
-      for (const BagFrame& frame : frames_) times_ns.push_back(frame.first->timestamp_ns);
-      const std::vector<const BagMessage*> second = messages_of(*choice_.second);
-      const auto pairs = pair_depth(times_ns, times_of(second), median_step_ns(times_ns) / 2);
-      for (std::size_t i = 0; i < frames_.size(); ++i) {
-        if (pairs[i]) frames_[i].second = second[*pairs[i]];
-      }
-      drop_start_without_partner();
-    }
-    for (const BagFrame& frame : frames_) {
-      info_.times_ns.push_back(frame.first->timestamp_ns);
+  void list_frames(const InputOptions& options) {
+    frames_ = list_bag_frames(bag_, choice_, options.times, path_.string());
+    notes_.insert(notes_.end(), frames_.notes.begin(), frames_.notes.end());
+    info_.counts.out_of_order = frames_.num_doubles + frames_.num_out_of_order;
+    for (const BagFrame& frame : frames_.frames) {
+      info_.times_ns.push_back(frames_.time_of(*frame.first));
       info_.counts.without_partner += choice_.second && !frame.second;
     }
-  }
-
-  /// Recorders hear of one topic before the other; without the other there is no scale to start by.
-  void drop_start_without_partner() {
-    const auto first =
-        std::ranges::find_if(frames_, [](const auto& frame) { return frame.second; });
-    if (first == frames_.end()) {
-      throw InputError(path_.string(),
-                       fmt::format("no message of {} within half a frame of one of {}, expected "
-                                   "pairs (or --setup mono)",
-                                   printable(choice_.second->name),
-                                   printable(choice_.first.name)));
-    }
-    if (first != frames_.begin()) {
-      notes_.push_back(fmt::format("{} frames at the start are left out, before the first of {}",
-                                   first - frames_.begin(),
-                                   printable(choice_.second->name)));
-    }
-    frames_.erase(frames_.begin(), first);
   }
 
   std::string where_of(const ImageTopic& topic, const BagMessage& message) const {
     return fmt::format("{}: {} at {} s",
                        path_.string(),
                        printable(topic.name),
-                       format_seconds(message.timestamp_ns));
+                       format_seconds(frames_.time_of(message)));
+  }
+
+  /// The decoder of a topic of video packets; nothing where it is of images.
+  BagVideo* video_of(const ImageTopic& topic) {
+    const std::string codec = video_codec_of(topic.encoding);
+    if (codec.empty()) return nullptr;
+    return &videos_.try_emplace(topic.topic, bag_, topic.topic, codec).first->second;
   }
 
   Image read_image(const ImageTopic& topic, const BagMessage& message) {
-    return read_bag_image(
-        bag_.read(message), bag_.content().topics[topic.topic], where_of(topic, message));
+    const std::string where = where_of(topic, message);
+    if (BagVideo* const video = video_of(topic)) return *grey_of(video->picture(message, where));
+    return read_bag_image(bag_.read(message), bag_.content().topics[topic.topic], where, levels_);
+  }
+
+  std::string read_jpeg(const ImageTopic& topic, const BagMessage& message) {
+    const std::string where = where_of(topic, message);
+    if (BagVideo* const video = video_of(topic)) return jpeg_of(video->picture(message, where));
+    return read_bag_jpeg(bag_.read(message), bag_.content().topics[topic.topic], where, levels_);
+  }
+
+  /// Of images of 16 bits.
+  void find_levels() {
+    LevelMeter meter;
+    const std::size_t num_looked = std::min(frames_.frames.size(), kNumLevelFrames);
+    for (std::size_t i = 0; i < num_looked; ++i) {
+      const BagFrame& frame = frames_.frames[i * frames_.frames.size() / num_looked];
+      add_levels(choice_.first, *frame.first, meter);
+      if (frame.second && info_.setup == Setup::kStereo) {
+        add_levels(*choice_.second, *frame.second, meter);
+      }
+    }
+    levels_ = meter.levels();
+    if (levels_ != Levels{}) notes_.push_back(levels_.describe());
+  }
+
+  void add_levels(const ImageTopic& topic, const BagMessage& message, LevelMeter& meter) {
+    const bool may_be_wide = topic.encoding.find("16") != std::string::npos ||
+                             topic.encoding.find("png") != std::string::npos;
+    if (!may_be_wide) return;
+    try {
+      const auto image = read_bag_grey16(
+          bag_.read(message), bag_.content().topics[topic.topic], where_of(topic, message));
+      if (image) meter.add(*image);
+    } catch (const InputError&) {
+      // Is told of when it is read.
+    }
   }
 
   bool is_whole(const InputFrame& frame) const {
@@ -252,19 +243,17 @@ class BagInput : public Input {
   }
 
   InputFrame read(std::size_t index) {
-    const BagFrame& listed = frames_[index];
+    const BagFrame& listed = frames_.frames[index];
     InputFrame frame;
     frame.index = index;
-    frame.timestamp_ns = listed.first->timestamp_ns;
+    frame.timestamp_ns = frames_.time_of(*listed.first);
     try {
       take_image(choice_.first, *listed.first, frame);
       if (listed.second && info_.setup == Setup::kStereo) {
         take_image(*choice_.second, *listed.second, frame);
       }
       if (has_jpeg_ && frame.fault == FrameFault::kNone) {
-        frame.jpeg = read_bag_jpeg(bag_.read(*listed.first),
-                                   bag_.content().topics[choice_.first.topic],
-                                   where_of(choice_.first, *listed.first));
+        frame.jpeg = read_jpeg(choice_.first, *listed.first);
       }
     } catch (const InputError& error) {
       frame.fault = FrameFault::kUnreadable;
@@ -296,7 +285,7 @@ class BagInput : public Input {
     try {
       frame.depth = read_bag_depth(
           bag_.read(message), bag_.content().topics[message.topic], units_per_m_, where);
-      frame.depth_lag_ns = message.timestamp_ns - frame.timestamp_ns;
+      frame.depth_lag_ns = frames_.time_of(message) - frame.timestamp_ns;
       if (size_of(*frame.depth) == size) return;
       frame.warning = describe_wrong_size(where, size_of(*frame.depth), size);
       frame.depth.reset();
@@ -322,7 +311,7 @@ class BagInput : public Input {
   }
 
   void learn_sizes(std::size_t index, const InputFrame& frame) {
-    const BagFrame& listed = frames_[index];
+    const BagFrame& listed = frames_.frames[index];
     for (std::size_t i = 0; i < frame.images.size(); ++i) {
       const ImageTopic& topic = i == 0 ? choice_.first : *choice_.second;
       sizes_.push_back(size_of(frame.images[i]));
@@ -358,8 +347,8 @@ class BagInput : public Input {
         fmt::format("images of {}x{} px from {}", info_.width_px, info_.height_px, used));
     lines.insert(lines.end(), notes_.begin(), notes_.end());
     for (const std::string& fault : content.faults) lines.push_back("note: " + fault);
-    if (info_.counts.out_of_order > 0)
-      lines.push_back(describe_out_of_order(info_.counts.out_of_order, "messages"));
+    if (frames_.num_out_of_order > 0)
+      lines.push_back(describe_out_of_order(frames_.num_out_of_order, "messages"));
     if (info_.counts.without_partner > 0) {
       lines.push_back(fmt::format("note: {} frames have none of {} and are used without",
                                   info_.counts.without_partner,
@@ -377,7 +366,9 @@ class BagInput : public Input {
   bool has_jpeg_;
   TopicChoice choice_;
   std::optional<CameraChain> carried_;
-  std::vector<BagFrame> frames_;
+  std::map<std::uint32_t, BagVideo> videos_;  ///< By topic.
+  BagFrames frames_;
+  Levels levels_;
   FrameSelection selection_;
   double units_per_m_ = kUnitsPerMetre;
   InputInfo info_;

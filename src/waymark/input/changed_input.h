@@ -22,6 +22,10 @@ class ChangedInput : public Input {
     return frame;
   }
 
+  CameraChain of_unchanged_images(CameraChain chain) const override {
+    return input_->of_unchanged_images(std::move(chain));
+  }
+
   bool can_decode_apart() const override { return input_->can_decode_apart(); }
 
   std::optional<Decoding> next_decoding() override {
@@ -44,6 +48,9 @@ class ChangedInput : public Input {
  protected:
   explicit ChangedInput(std::unique_ptr<Input> input)
       : input_(std::move(input)), info_(input_->info()) {}
+
+  /// What the other input says.
+  const InputInfo& unchanged_info() const { return input_->info(); }
 
  private:
   /// Changes all images that a frame has. Called from any thread.

@@ -331,6 +331,27 @@ TEST(TumRgbd, KeepsColourImagesWithoutDepth) {
   EXPECT_FALSE(input->next());
 }
 
+TEST(TumRgbd, DepthHasTheUnitsOfTheBenchmarkUnlessOthersAreStated) {
+  const TemporaryFolder folder;
+  make_tum(folder);
+  InputOptions options;
+  CameraDescription camera;
+  camera.camera_model = "pinhole";
+  camera.width_px = 32;
+  camera.height_px = 24;
+  options.calibration.emplace().cameras.push_back({camera, Rigid3()});
+  const InputInfo silent = open_input(folder.path(), options)->info();
+  EXPECT_EQ(silent.calibration->depth_factor, 5000.0);
+  EXPECT_THAT(silent.lines, ::testing::Contains(HasSubstr("depth in units of 1/5000 m")));
+  options.calibration->depth_factor = 1000.0;
+  const InputInfo stated = open_input(folder.path(), options)->info();
+  EXPECT_EQ(stated.calibration->depth_factor, 1000.0);
+  EXPECT_THAT(stated.lines, ::testing::Not(::testing::Contains(HasSubstr("in units of"))));
+  options.calibration->depth_factor.reset();
+  options.setup = Setup::kMono;
+  EXPECT_FALSE(open_input(folder.path(), options)->info().calibration->depth_factor);
+}
+
 TEST(TumRgbd, ABadDepthImageInTheMiddleIsAMissingOne) {
   const TemporaryFolder folder;
   make_tum(folder);

@@ -107,7 +107,7 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
 Listing list_image_folder(const std::filesystem::path& folder, const InputOptions& options);
 
 /// The images of options.image_list, with options.right or options.depth as above.
-Listing list_named_images(const InputOptions& options);
+Listing list_named_images(const InputOptions& options, const std::filesystem::path& name);
 
 /// The file of true poses that belongs to an input, if its layout has one and it is there:
 /// mav0/state_groundtruth_estimate0/data.csv (EuRoC), mav0/mocap0/data.csv (TUM-VI),
@@ -115,9 +115,16 @@ Listing list_named_images(const InputOptions& options);
 /// that is a file they are looked for beside it. read_trajectory() reads what is found.
 std::optional<std::filesystem::path> find_groundtruth(const std::filesystem::path& input);
 
-/// Opens a video file. Times come from times.txt beside it (one per frame), else from the
-/// container. Reads the first frame. Throws InputError.
-std::unique_ptr<Input> open_video(const std::filesystem::path& path, const InputOptions& options);
+/// The videos of a folder in the order of their names, if together they are one recording, as they
+/// are where there is one only: cameras begin a new file after so many minutes or bytes. Those say
+/// so by name (GoPro's GH010123.MP4 GH020123.MP4, GOPR0123.MP4 GP010123.MP4), or were begun when
+/// the one before ended, as they state it. Nothing for others.
+std::vector<std::filesystem::path> find_chapters(const std::filesystem::path& folder);
+
+/// Opens a video, of one or several files. Times come from times.txt beside it (one per frame),
+/// else from the container. Reads the first frame. Throws InputError.
+std::unique_ptr<Input> open_video(const std::vector<std::filesystem::path>& files,
+                                  const InputOptions& options);
 
 /// Opens a bag of ROS: a .bag, .mcap or .db3 file, or the folder of a bag of ROS 2. Reads the first
 /// frame. Throws InputError.

@@ -4,8 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdlib>
-#include <cstring>
 #include <fstream>
 #include <new>
 #include <opencv2/core.hpp>
@@ -17,6 +17,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/image/image_header.h"
+#include "waymark/image/opencv_image.h"
+#include "waymark/input/reading.h"
 
 namespace waymark {
 namespace {
@@ -73,36 +75,45 @@ std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
   }
 }
 
+constexpr int kGreyOfAnyDepth =
+    cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
+
 std::string encode(const cv::Mat& image, const char* extension) {
+  if (std::max(image.cols, image.rows) > kMaxSidePx) {
+    throw InputError(
+        "image",
+        fmt::format(
+            "is {}x{} px, expected at most {} px a side", image.cols, image.rows, kMaxSidePx));
+  }
   std::vector<std::uint8_t> bytes;
   WAYMARK_CHECK(cv::imencode(extension, image, bytes));
   return {bytes.begin(), bytes.end()};
 }
 
-template <class T>
-BasicImage<T> copy_rows(const cv::Mat& mat) {
-  BasicImage<T> image(mat.cols, mat.rows);
-  for (int y = 0; y < mat.rows; ++y) {
-    std::memcpy(image.row(y), mat.ptr(y), sizeof(T) * static_cast<std::size_t>(mat.cols));
-  }
-  return image;
-}
-
 }  // namespace
 
-std::optional<Image> read_grey_image(const std::filesystem::path& path) {
+std::optional<Image> read_grey_image(const std::filesystem::path& path, const Levels& levels) {
   const std::optional<std::string> bytes = read_bytes(path);
-  return bytes ? decode_grey_image(*bytes) : std::nullopt;
+  return bytes ? decode_grey_image(*bytes, levels) : std::nullopt;
 }
 
-std::optional<Image> decode_grey_image(std::string_view bytes) {
-  constexpr double kScale = 255.0 / 65535.0;
-  std::optional<cv::Mat> mat = decode_bytes(
-      bytes, cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION);
+std::optional<Image> decode_grey_image(std::string_view bytes, const Levels& levels) {
+  std::optional<cv::Mat> mat = decode_bytes(bytes, kGreyOfAnyDepth);
   if (!mat) return std::nullopt;
-  if (mat->type() == CV_16UC1) mat->convertTo(*mat, CV_8U, kScale);
+  if (mat->type() == CV_16UC1) *mat = in_8_bits(*mat, levels);
   if (mat->type() != CV_8UC1) return std::nullopt;
-  return copy_rows<std::uint8_t>(*mat);
+  return image_of<std::uint8_t>(*mat);
+}
+
+std::optional<BasicImage<std::uint16_t>> read_grey16_image(const std::filesystem::path& path) {
+  const std::optional<std::string> bytes = read_bytes(path);
+  return bytes ? decode_grey16_image(*bytes) : std::nullopt;
+}
+
+std::optional<BasicImage<std::uint16_t>> decode_grey16_image(std::string_view bytes) {
+  const std::optional<cv::Mat> mat = decode_bytes(bytes, kGreyOfAnyDepth);
+  if (!mat || mat->type() != CV_16UC1) return std::nullopt;
+  return image_of<std::uint16_t>(*mat);
 }
 
 std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
@@ -113,7 +124,7 @@ std::optional<DepthImage> read_depth_image(const std::filesystem::path& path) {
 std::optional<DepthImage> decode_depth_image(std::string_view bytes) {
   const std::optional<cv::Mat> mat = decode_bytes(bytes, cv::IMREAD_UNCHANGED);
   if (!mat || mat->type() != CV_16UC1) return std::nullopt;
-  return copy_rows<std::uint16_t>(*mat);
+  return image_of<std::uint16_t>(*mat);
 }
 
 std::string describe_bad_image(const std::filesystem::path& path, std::string_view expected) {
@@ -130,10 +141,11 @@ std::string describe_bad_image(const std::filesystem::path& path, std::string_vi
   if (!is_too_large(*size)) {
     return fmt::format("unreadable, damaged or of another kind, expected {}", expected);
   }
-  return fmt::format("is {}x{} px, expected at most {} megapixels",
+  return fmt::format("is {}x{} px, expected at most {} megapixels and {} px a side",
                      size->width_px,
                      size->height_px,
-                     kMaxMegapixels);
+                     kMaxMegapixels,
+                     kMaxSidePx);
 }
 
 std::optional<ColorImage> decode_color_image(std::string_view bytes) {
@@ -150,18 +162,19 @@ std::optional<ColorImage> decode_color_image(std::string_view bytes) {
   return image;
 }
 
-std::optional<std::string> read_as_jpeg(const std::filesystem::path& path) {
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path, const Levels& levels) {
   const std::optional<std::string> bytes = read_bytes(path);
-  return bytes ? as_jpeg(*bytes) : std::nullopt;
+  return bytes ? as_jpeg(*bytes, levels) : std::nullopt;
 }
 
-std::optional<std::string> as_jpeg(std::string_view bytes) {
+std::optional<std::string> as_jpeg(std::string_view bytes, const Levels& levels) {
   std::optional<std::string> unused;
   if (bytes.starts_with(kJpegStart) && vet(bytes, unused)) return std::string(bytes);
+  const int depth = levels == Levels{} ? 0 : cv::IMREAD_ANYDEPTH;
   const std::optional<cv::Mat> mat =
-      decode_bytes(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION);
+      decode_bytes(bytes, cv::IMREAD_ANYCOLOR | cv::IMREAD_IGNORE_ORIENTATION | depth);
   if (!mat) return std::nullopt;
-  return encode(*mat, ".jpg");
+  return encode(mat->depth() == CV_16U ? in_8_bits(*mat, levels) : *mat, ".jpg");
 }
 
 std::string encode_jpeg(const ColorImage& image) {
@@ -175,13 +188,7 @@ std::string encode_jpeg(const ColorImage& image) {
   return encode(mat, ".jpg");
 }
 
-std::string encode_png(const Image& image) {
-  const cv::Mat mat(image.height_px,
-                    image.width_px,
-                    CV_8UC1,
-                    const_cast<std::uint8_t*>(image.values.data()));  // Is only read.
-  return encode(mat, ".png");
-}
+std::string encode_png(const Image& image) { return encode(mat_of(image.view()), ".png"); }
 
 void silence_image_library() {
   static const bool is_done = [] {

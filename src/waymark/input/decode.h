@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <filesystem>
 #include <optional>
 #include <string>
@@ -9,16 +10,22 @@
 
 #include "waymark/image/convert.h"
 #include "waymark/image/image.h"
+#include "waymark/input/levels.h"
 
 namespace waymark {
 
 /// Decodes an image file to 8-bit grey: colour is converted, 16 bit scaled down, transparency
 /// dropped, orientation tags ignored. Nothing when the file is missing, truncated, too
 /// large or no image.
-std::optional<Image> read_grey_image(const std::filesystem::path& path);
+std::optional<Image> read_grey_image(const std::filesystem::path& path, const Levels& levels = {});
 
 /// The same of the bytes of such a file.
-std::optional<Image> decode_grey_image(std::string_view bytes);
+std::optional<Image> decode_grey_image(std::string_view bytes, const Levels& levels = {});
+
+/// The same of an image of 16 bits, as they are; nothing for one of 8.
+std::optional<BasicImage<std::uint16_t>> read_grey16_image(const std::filesystem::path& path);
+/// The same of the bytes of such a file.
+std::optional<BasicImage<std::uint16_t>> decode_grey16_image(std::string_view bytes);
 
 /// Decodes a single-channel 16-bit image, otherwise nothing.
 std::optional<DepthImage> read_depth_image(const std::filesystem::path& path);
@@ -35,9 +42,10 @@ std::string describe_bad_image(const std::filesystem::path& path,
 std::optional<ColorImage> decode_color_image(std::string_view bytes);
 
 /// The image of a file as a JPEG: the file itself if it is one. Nothing when it is no image.
-std::optional<std::string> read_as_jpeg(const std::filesystem::path& path);
+std::optional<std::string> read_as_jpeg(const std::filesystem::path& path,
+                                        const Levels& levels = {});
 /// The same of the bytes of such a file.
-std::optional<std::string> as_jpeg(std::string_view bytes);
+std::optional<std::string> as_jpeg(std::string_view bytes, const Levels& levels = {});
 
 /// The bytes of an image file.
 std::string encode_jpeg(const ColorImage& image);

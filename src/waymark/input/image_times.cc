@@ -9,7 +9,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-
+#include "waymark/base/time_column.h"
 namespace waymark {
 namespace {
 
@@ -73,29 +73,29 @@ std::optional<std::vector<std::int64_t>> times_in_names(
 
 ImageList parse_image_list(std::string_view text, const std::string& name) {
   ImageList list;
-  std::size_t number = 0;
-  while (!text.empty()) {
-    const std::string_view whole = text.substr(0, text.find('\n'));
-    text.remove_prefix(std::min(text.size(), whole.size() + 1));
-    ++number;
-    const std::string_view line = trimmed(whole);
-    if (line.empty() || line.front() == '#') continue;
-    const std::size_t space = line.find_first_of(" \t");
-    constexpr std::int64_t kNone = -1;
-    const std::int64_t time_ns = space == std::string_view::npos
-                                     ? kNone
-                                     : parse_seconds(line.substr(0, space)).value_or(kNone);
-    const bool has_time = time_ns >= 0;
-    if (!list.images.empty() && has_time == list.times_ns.empty()) {
-      throw InputError(fmt::format("{}:{}", name, number),
+  std::vector<std::string_view> times;
+  RowReader rows(text, name, '\n');
+  while (rows.next()) {
+    const std::string_view line = rows.fields().front();
+    const std::string_view first = line.substr(0, line.find_first_of(" \t"));
+    const std::optional<double> time = parse_number(first);
+    const bool has_time = time && *time >= 0.0 && first.size() < line.size();
+    if (!list.images.empty() && has_time == times.empty()) {
+      throw InputError(rows.where(),
                        fmt::format("{} a time, expected one in every line or in none",
                                    has_time ? "has" : "has not"));
     }
-    if (has_time) list.times_ns.push_back(time_ns);
-    list.images.emplace_back(trimmed(has_time ? line.substr(space) : line));
+    if (has_time) times.push_back(first);
+    list.images.emplace_back(trimmed(has_time ? line.substr(first.size()) : line));
   }
   if (list.images.empty()) {
     throw InputError(name, "holds no line, expected one path of an image per line");
+  }
+  const std::int64_t unit_ns = time_unit_ns(times);
+  for (const std::string_view time : times) {
+    const std::optional<std::int64_t> time_ns = parse_time(time, unit_ns);
+    if (!time_ns) throw InputError(name, quote_for_message(time) + " is no time, expected seconds");
+    list.times_ns.push_back(*time_ns);
   }
   return list;
 }

@@ -22,8 +22,9 @@ struct ImageList {
   std::vector<std::int64_t> times_ns;         ///< As many, or none.
 };
 
-/// Parses a line per image, "PATH" or "SECONDS PATH", all alike; empty lines and those that begin
-/// with # are passed over. Throws InputError with the line; name is what it calls the list.
+/// Parses a line per image, "PATH" or "TIME PATH", all alike, times as time_unit_ns() has them;
+/// empty lines and those that begin with # are passed over. Throws InputError with the line; name
+/// is what it calls the list.
 ImageList parse_image_list(std::string_view text, const std::string& name);
 
 }  // namespace waymark

@@ -56,6 +56,10 @@ TEST(ImageList, HasAPathPerLineAndTimesWhereAllDo) {
   const ImageList timed = parse_image_list("1.25 a b.png\n2e0\tc.png", "list");
   EXPECT_THAT(timed.images, ElementsAre("a b.png", "c.png"));
   EXPECT_THAT(timed.times_ns, ElementsAre(1'250'000'000, 2'000'000'000));
+  const ImageList whole =
+      parse_image_list("1403636579763555584 1.png\n1403636579813555456 2.png\n", "list");
+  EXPECT_THAT(whole.times_ns, ElementsAre(1403636579763555584, 1403636579813555456));
+  EXPECT_THAT(whole.images, ElementsAre("1.png", "2.png"));
   EXPECT_THAT(input_error_of([] { parse_image_list("1.5 a.png\nb.png\n", "list"); }),
               HasSubstr("list:2: has not a time, expected one in every line or in none"));
   EXPECT_THAT(input_error_of([] { parse_image_list("\n# nothing\n", "list"); }),

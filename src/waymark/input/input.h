@@ -17,6 +17,13 @@
 
 namespace waymark {
 
+/// How two cameras come in one picture, or in one file.
+enum class Split { kNone, kSideBySide, kTopBottom, kTracks };
+
+/// What the messages of a bag are timed by: the stamps in their headers, or when they were
+/// recorded.
+enum class BagTimes { kHeaders, kRecording };
+
 /// Which images of a moment are used together.
 enum class Setup { kMono, kStereo, kRgbd };
 
@@ -42,6 +49,7 @@ struct InputFrame {
   std::string jpeg;                 ///< Of camera 0 in colour, if that was asked for.
   /// The same of camera 1, of data sets and folders of images; of other inputs empty.
   std::string right_jpeg = {};
+  std::string name = {};  ///< Of its image file, as from INPUT, if that was asked for.
   FrameFault fault = FrameFault::kNone;  ///< Why there are no images.
   /// What is wrong with a file of the frame, be it that of the fault or a depth image that is left
   /// out, for people: "FILE: ..., expected ...". Empty: nothing.
@@ -60,19 +68,29 @@ struct InputOptions {
   std::filesystem::path right = {};
   /// What is read where the path is "-": a line per image, "PATH" or "SECONDS PATH".
   std::optional<std::string> image_list = {};
+  /// Two cameras in each picture, or in two tracks of a video; nothing: found by the sizes in the
+  /// calibration, without one by what the pictures show.
+  std::optional<Split> split = {};
+  /// Image files to read, whatever the path is; empty: what the path holds.
+  std::vector<std::filesystem::path> images = {};
   /// Depth images of a folder of images, by name or order; empty: none.
   std::filesystem::path depth = {};
   std::optional<double> fps = {};  ///< Frames per second where nothing tells their times.
   /// Width that images of camera 0 are made smaller to, and all else with them: see
   /// resize_input().
   std::optional<int> resize_px = {};
+  /// Without such a width, images that are small for features come larger: see enlarge_if_small().
+  bool enlarges_small = false;
   std::optional<int> rotate_deg = {};  ///< See rotate_input(), which comes before.
   /// One image, a folder with one per frame by name or order, or a video; empty: none.
   std::filesystem::path mask = {};
   bool has_jpeg = false;        ///< Frames come with a JPEG file, too.
   bool has_right_jpeg = false;  ///< And with one of camera 1.
+  bool has_names = false;       ///< Frames of image files come with the name of theirs.
   /// Of a bag: the images of camera 0, and those of camera 1 or the depth; empty: found.
   std::vector<std::string> topics = {};
+  /// Of a bag; nothing: those of the headers, unless their clock was set back.
+  std::optional<BagTimes> times = {};
   /// Calibration from settings; takes the place of the one the data set carries.
   std::optional<CameraChain> calibration = {};
 };
@@ -103,16 +121,15 @@ struct InputInfo {
   std::optional<std::size_t> num_frames;
   /// One camera per image of a frame: from the options, else from the data set, else nothing.
   std::optional<CameraChain> calibration;
-  bool is_live = false;  ///< A camera: frames come when they come.
-  int width_px = 0;      ///< Of the images of camera 0.
-  int height_px = 0;     ///< Of the images of camera 0.
-  /// About, as the camera noted it in the first image that can be read, where nothing calibrates
-  /// it.
-  std::optional<double> focal_px = std::nullopt;
-  InputCounts counts = {};                  ///< Of the whole input, before --first, --every.
-  std::vector<TopicInfo> topics = {};       ///< Of a bag.
+  bool is_live = false;                ///< A camera: frames come when they come.
+  int width_px = 0;                    ///< Of the images of camera 0.
+  int height_px = 0;                   ///< Of the images of camera 0.
+  int enlargement = 1;                 ///< How many times larger images are than in their files.
+  InputCounts counts = {};             ///< Of the whole input, before --first, --every.
+  std::vector<TopicInfo> topics = {};  ///< Of a bag.
   std::vector<std::int64_t> times_ns = {};  ///< Of all frames, where that is known.
-  std::vector<std::string> lines;           ///< The same in words, for people.
+  bool has_times = true;  ///< Times are stated somewhere, rather than made up from the order.
+  std::vector<std::string> lines;  ///< The same in words, for people.
 };
 
 /// A recorded input, read frame after frame. For one thread.
@@ -127,6 +144,11 @@ class Input {
   /// The next frame, or nothing at the end. A bad image is a fault of its frame, never an
   /// exception.
   virtual std::optional<InputFrame> next() = 0;
+
+  /// A calibration of the images that come out as one of those that are read, before --rotate and
+  /// --resize, which InputOptions and files state. Throws InputError where it cannot be turned
+  /// back.
+  virtual CameraChain of_unchanged_images(CameraChain chain) const { return chain; }
 
   /// Whether other threads may decode: next_decoding() and complete() take the place of next().
   virtual bool can_decode_apart() const { return false; }
@@ -144,6 +166,9 @@ class Input {
 /// Whether a path means a camera: camera:N, a device such as /dev/video0, or the address of a
 /// stream (rtsp://HOST/PATH; of http:// those that do not end as the name of a video does).
 bool is_camera(const std::filesystem::path& path);
+
+/// Whether a path has the name of an image file.
+bool is_image_name(const std::filesystem::path& path);
 
 /// Recognises what path holds and opens it: a folder in the layout of EuRoC / TUM-VI, KITTI
 /// odometry or TUM RGB-D, a folder of images, a video file, a folder that holds one video or

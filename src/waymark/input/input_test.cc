@@ -190,13 +190,14 @@ TEST(ReadGreyImage, RefusesHugeImagesByTheirHeaders) {
   input->next();
   const std::optional<InputFrame> frame = input->next();
   EXPECT_EQ(frame->fault, FrameFault::kUnreadable);
-  EXPECT_EQ(
-      frame->warning,
-      (folder / "images/2.png").string() + ": is 12000x12000 px, expected at most 135 megapixels");
+  EXPECT_EQ(frame->warning,
+            (folder / "images/2.png").string() +
+                ": is 12000x12000 px, expected at most 135 megapixels and 65500 px a side");
   InputOptions options;
   options.mask = folder / "images/2.png";
-  EXPECT_THAT(input_error_of([&] { open_input(folder.path(), options); }),
-              HasSubstr("2.png: is 12000x12000 px, expected at most 135 megapixels"));
+  EXPECT_THAT(
+      input_error_of([&] { open_input(folder.path(), options); }),
+      HasSubstr("2.png: is 12000x12000 px, expected at most 135 megapixels and 65500 px a side"));
 }
 
 TEST(ReadGreyImage, LeavesStandardErrorToTheProgram) {

@@ -49,6 +49,7 @@ std::vector<std::int64_t> frame_times(const std::filesystem::path& folder,
                                       Listing& listing) {
   const std::filesystem::path path = folder / "times.txt";
   if (std::filesystem::exists(path)) return read_times(path, num_images, "image_0");
+  listing.has_times = false;
   const double rate_hz = options.fps.value_or(kKittiRateHz);
   listing.notes.push_back(fmt::format("no times.txt: {:g} images per second assumed", rate_hz));
   return even_times(num_images, rate_hz);

@@ -10,6 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/base/time_column.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/image_times.h"
 #include "waymark/input/pairing.h"
@@ -20,7 +21,9 @@ namespace {
 constexpr std::array kImageExtensions = {
     ".png", ".jpg", ".jpeg", ".bmp", ".tif", ".tiff", ".pgm", ".ppm", ".webp"};
 constexpr std::array kVideoExtensions = {
-    ".mp4", ".mov", ".avi", ".mkv", ".webm", ".m4v", ".mpg", ".mpeg", ".mts", ".insv", ".360"};
+    ".mp4",  ".mov", ".avi",  ".mkv", ".webm", ".m4v", ".mpg",  ".mpeg", ".mts",
+    ".m2ts", ".ts",  ".insv", ".360", ".h264", ".264", ".h265", ".265",  ".hevc",
+    ".y4m",  ".flv", ".asf",  ".wmv", ".ogv",  ".dv",  ".3gp",  ".vob",  ".mjpeg"};
 
 template <class Extensions>
 bool has_extension(const std::filesystem::path& path, const Extensions& extensions) {
@@ -106,6 +109,7 @@ std::vector<std::int64_t> image_times(const std::vector<std::filesystem::path>& 
       return *named;
     }
   }
+  listing.has_times = false;
   const double rate_hz = options.fps.value_or(kAssumedRateHz);
   listing.notes.push_back(
       options.fps ? fmt::format("no times.txt: {:g} images per second, as --fps says", rate_hz)
@@ -167,6 +171,10 @@ std::vector<std::filesystem::path> list_videos(const std::filesystem::path& fold
   return list_files(folder, kVideoExtensions);
 }
 
+bool is_image_name(const std::filesystem::path& path) {
+  return has_extension(path, kImageExtensions);
+}
+
 bool is_video_name(const std::filesystem::path& path) {
   return has_extension(path, kVideoExtensions);
 }
@@ -187,10 +195,11 @@ std::vector<std::int64_t> read_times(const std::filesystem::path& path,
 std::vector<std::int64_t> read_times(const std::filesystem::path& path) {
   const std::string text = read_text_file(path, "one time in seconds per image");
   std::vector<std::int64_t> times_ns;
+  const TimeColumn column(text, ' ');
   RowReader rows(text, path.string(), ' ');
   while (rows.next()) {
     rows.expect_exactly(1, "1: a time in seconds");
-    times_ns.push_back(rows.seconds_as_ns(0));
+    times_ns.push_back(column.read(rows));
   }
   if (times_ns.empty())
     throw InputError(path.string(), "empty, expected one time in seconds per row");
@@ -209,8 +218,10 @@ std::string describe_rate(const std::vector<std::int64_t>& times_ns) {
   if (times_ns.size() < 2) return fmt::format("{} frame", times_ns.size());
   const double duration_s = 1e-9 * static_cast<double>(times_ns.back() - times_ns.front());
   const double rate_hz = static_cast<double>(times_ns.size() - 1) / duration_s;
-  return fmt::format(
-      "{} frames over {:.1f} s, {:.4g} per second", times_ns.size(), duration_s, rate_hz);
+  return fmt::format("{} over {:.1f} s, {:.4g} per second",
+                     count_of(times_ns.size(), "frame"),
+                     duration_s,
+                     rate_hz);
 }
 
 namespace {
@@ -257,16 +268,17 @@ Listing list_image_folder(const std::filesystem::path& folder, const InputOption
   return listing;
 }
 
-Listing list_named_images(const InputOptions& options) {
-  constexpr const char* kName = "standard input";
-  Listing listing = image_listing(kName, "list of images", options);
-  ImageList list = parse_image_list(options.image_list.value_or(""), kName);
+Listing list_named_images(const InputOptions& options, const std::filesystem::path& name) {
+  const std::string where = name.string();
+  Listing listing = image_listing(where, "list of images", options);
+  ImageList list = options.images.empty() ? parse_image_list(options.image_list.value_or(""), where)
+                                          : ImageList{options.images, {}};
   if (list.times_ns.empty()) {
     list.times_ns = image_times(list.images, {}, options, listing);
   } else {
     listing.notes.push_back("times from the list");
   }
-  add_images(listing, list.images, list.times_ns, kName, options);
+  add_images(listing, list.images, list.times_ns, where, options);
   return listing;
 }
 

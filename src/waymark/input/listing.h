@@ -30,6 +30,9 @@ struct Listing {
   Setup setup = Setup::kMono;       ///< That of the frames' images.
   /// Calibration that the data set carries; a resolution of 0 is that of the first image.
   std::optional<CameraChain> calibration;
+  /// Units of depth images per metre in this layout, for where no calibration states them.
+  std::optional<double> depth_factor = {};
+  bool has_times = true;           ///< As in InputInfo.
   InputCounts counts = {};         ///< What is imperfect.
   std::vector<std::string> notes;  ///< What else was understood.
 };

@@ -9,8 +9,8 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/input/decode.h"
-#include "waymark/input/exif.h"
 
 namespace waymark {
 namespace {
@@ -41,6 +41,13 @@ DepthImage enlarged(const DepthImage& depth, const ImageSize& size) {
   return result;
 }
 
+/// Of a file, as from a folder that it is in; else as it is.
+std::string name_below(const std::filesystem::path& folder, const std::filesystem::path& file) {
+  const std::filesystem::path below = file.lexically_relative(folder);
+  const bool is_below = !below.empty() && below != "." && *below.begin() != "..";
+  return (is_below ? below : file).string();
+}
+
 std::string stem_of(const ListedFrame& frame) { return frame.images.front().stem().string(); }
 
 }  // namespace
@@ -53,6 +60,8 @@ ListingInput::ListingInput(const std::filesystem::path& path,
       masks_(options.mask),
       has_jpeg_(options.has_jpeg),
       has_right_jpeg_(options.has_right_jpeg) {
+  if (options.has_names) names_from_ = path;
+  info_.has_times = listing_.has_times;
   info_.format = listing_.format;
   info_.setup = listing_.setup;
   info_.counts = listing_.counts;
@@ -60,9 +69,17 @@ ListingInput::ListingInput(const std::filesystem::path& path,
   info_.num_frames = selection_.count(listing_.frames.size());
   info_.calibration =
       choose_calibration(path, options.calibration, listing_.calibration, info_.setup);
+  if (info_.calibration && !info_.calibration->depth_factor && listing_.depth_factor) {
+    info_.calibration->depth_factor = listing_.depth_factor;
+    listing_.notes.push_back(
+        fmt::format("depth in units of 1/{:g} m, as in {}: depth.factor states others",
+                    *listing_.depth_factor,
+                    listing_.title));
+  }
   std::vector<std::string> stems;
   for (const ListedFrame& frame : listing_.frames) stems.push_back(stem_of(frame));
   masks_.match(stems);
+  find_levels();
   check_first_frame(find_first_readable());
   check_first_depth();
   describe(path, options);
@@ -108,6 +125,7 @@ InputFrame ListingInput::decode(std::size_t index) const {
   InputFrame frame;
   frame.index = index;
   frame.timestamp_ns = listed.timestamp_ns;
+  if (names_from_) frame.name = name_below(*names_from_, listed.images.front());
   frame.fault = read_images(listed, frame);
   if (frame.fault == FrameFault::kNone) decode_rest(listed, frame);
   return frame;
@@ -116,9 +134,9 @@ InputFrame ListingInput::decode(std::size_t index) const {
 /// What comes with images that are used.
 void ListingInput::decode_rest(const ListedFrame& listed, InputFrame& frame) const {
   read_depth(listed, frame);
-  if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front()).value_or("");
+  if (has_jpeg_) frame.jpeg = read_as_jpeg(listed.images.front(), levels_).value_or("");
   if (has_right_jpeg_ && frame.images.size() > 1) {
-    frame.right_jpeg = read_as_jpeg(listed.images[1]).value_or("");
+    frame.right_jpeg = read_as_jpeg(listed.images[1], levels_).value_or("");
   }
   if (!masks_.is_video()) masks_.attach(stem_of(listed), frame);
 }
@@ -126,7 +144,7 @@ void ListingInput::decode_rest(const ListedFrame& listed, InputFrame& frame) con
 FrameFault ListingInput::read_images(const ListedFrame& listed, InputFrame& frame) const {
   for (std::size_t i = 0; i < listed.images.size(); ++i) {
     const std::filesystem::path& path = listed.images[i];
-    std::optional<Image> image = read_grey_image(path);
+    std::optional<Image> image = read_grey_image(path, levels_);
     if (!image) {
       frame.warning =
           fmt::format("{}{}: {}", path.string(), describe_camera(i), describe_bad_image(path));
@@ -156,6 +174,21 @@ void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) cons
   } else if (depth_size_ != size) {
     frame.depth = enlarged(*frame.depth, size);
   }
+}
+
+/// Of images of 16 bits, as the first one seen is.
+void ListingInput::find_levels() {
+  LevelMeter meter;
+  const std::size_t num_looked = std::min(listing_.frames.size(), kNumLevelFrames);
+  for (std::size_t i = 0; i < num_looked; ++i) {
+    for (const auto& path : listing_.frames[i * listing_.frames.size() / num_looked].images) {
+      const auto image = read_grey16_image(path);
+      if (!image && read_grey_image(path)) return;
+      if (image) meter.add(*image);
+    }
+  }
+  levels_ = meter.levels();
+  if (levels_ != Levels{}) listing_.notes.push_back(levels_.describe());
 }
 
 std::size_t ListingInput::find_first_readable() const {
@@ -192,7 +225,6 @@ void ListingInput::check_first_frame(std::size_t index) {
   }
   info_.width_px = sizes_.front().width_px;
   info_.height_px = sizes_.front().height_px;
-  if (!info_.calibration) info_.focal_px = read_focal_px(listed.images.front(), sizes_.front());
   masks_.attach(stem_of(listed), frame);
   masks_.check_first(stem_of(listed), frame);
 }
@@ -231,14 +263,10 @@ void ListingInput::describe(const std::filesystem::path& path, const InputOption
   }
   info_.lines.push_back(fmt::format("images of {} px", sizes));
   for (const std::string& note : listing_.notes) info_.lines.push_back(note);
-  if (info_.focal_px) {
-    info_.lines.push_back(
-        fmt::format("focal length {:.0f} px, as the camera noted it (EXIF)", *info_.focal_px));
-  }
   info_.lines.push_back(describe_calibration(options.calibration.has_value(), info_.calibration));
   if (*info_.num_frames != listing_.frames.size()) {
-    info_.lines.push_back(fmt::format("{} frames used, from {} on, every {}",
-                                      *info_.num_frames,
+    info_.lines.push_back(fmt::format("{} used, from {} on, every {}",
+                                      count_of(*info_.num_frames, "frame"),
                                       selection_.first,
                                       selection_.every));
   }

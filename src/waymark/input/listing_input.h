@@ -31,6 +31,7 @@ class ListingInput : public Input {
   FrameFault read_images(const ListedFrame& listed, InputFrame& frame) const;
   std::string describe_camera(std::size_t camera) const;
   void read_depth(const ListedFrame& listed, InputFrame& frame) const;
+  void find_levels();
   std::size_t find_first_readable() const;
   void check_first_frame(std::size_t index);
   void check_first_depth();
@@ -39,8 +40,10 @@ class ListingInput : public Input {
   Listing listing_;
   FrameSelection selection_;
   MaskSource masks_;
+  Levels levels_;
   bool has_jpeg_;
   bool has_right_jpeg_;
+  std::optional<std::filesystem::path> names_from_;  ///< Nothing: frames have no names.
   InputInfo info_;
   std::vector<ImageSize> sizes_;  ///< Expected, per camera; empty until known.
   ImageSize depth_size_;          ///< Of depth images, as they are in their files.

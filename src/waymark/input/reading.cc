@@ -5,12 +5,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cstring>
+#include <opencv2/imgcodecs.hpp>
 #include <opencv2/imgproc.hpp>
 
 #include "waymark/base/check.h"
+#include "waymark/camera/resized_camera.h"
+#include "waymark/image/opencv_image.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/listing.h"
+#include "waymark/input/resized_input.h"
 #include "waymark/input/video_reader.h"
 
 namespace waymark {
@@ -45,6 +48,13 @@ void fit_first_image(CameraChain& chain,
     description.height_px = size.height_px;
   }
   if (size == ImageSize{description.width_px, description.height_px}) return;
+  const int times = enlargement_for(size);
+  const auto of_file = resized(description, 1.0 / times);
+  if (of_file && ImageSize{times * size.width_px, times * size.height_px} ==
+                     ImageSize{description.width_px, description.height_px}) {
+    description = *of_file;
+    return;
+  }
   throw InputError(
       image.string(),
       fmt::format("is {}x{} px, expected {}x{} px as the calibration of camera {} says",
@@ -67,7 +77,8 @@ std::string describe_wrong_size(const std::filesystem::path& image,
 }
 
 std::string describe_calibration(bool is_given, const std::optional<CameraChain>& chain) {
-  if (!chain) return "no calibration in the data set: it must come from the settings";
+  if (!chain)
+    return "no calibration in the input: given with -c, or found from the images of one camera";
   std::string text = is_given ? "calibration from the settings:" : "calibration from the data set:";
   for (const ChainCamera& camera : chain->cameras) {
     const CameraDescription& description = camera.description;
@@ -81,9 +92,7 @@ std::string describe_calibration(bool is_given, const std::optional<CameraChain>
   return text;
 }
 
-std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times_ns,
-                                          const std::string& where,
-                                          std::string_view what) {
+std::vector<std::size_t> longest_increasing(const std::vector<std::int64_t>& times_ns) {
   constexpr std::size_t kNone = SIZE_MAX;
   // Of the increasing parts of each length the one that ends earliest, and what comes before each.
   std::vector<std::size_t> ends;
@@ -104,8 +113,19 @@ std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times
     used.push_back(i);
   }
   std::ranges::reverse(used);
+  return used;
+}
+
+bool are_most(std::size_t num_used, std::size_t num_times) {
+  return 10 * (num_times - num_used) <= num_times;
+}
+
+std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times_ns,
+                                          const std::string& where,
+                                          std::string_view what) {
+  std::vector<std::size_t> used = longest_increasing(times_ns);
+  if (are_most(used.size(), times_ns.size())) return used;
   const std::size_t num_left_out = times_ns.size() - used.size();
-  if (10 * num_left_out <= times_ns.size()) return used;
   throw InputError(where,
                    fmt::format("{} of {} {} have a time that is not later than the one before, "
                                "expected increasing times but for a tenth",
@@ -147,7 +167,7 @@ MaskSource::MaskSource(const std::filesystem::path& path) : path_(path) {
     return;
   }
   if (is_video_name(path_)) {
-    video_ = std::make_unique<VideoReader>(path_);
+    video_ = std::make_unique<VideoReader>(std::vector{path_});
     return;
   }
   fixed_ = read_grey_image(path_);
@@ -217,17 +237,34 @@ void MaskSource::check_first(const std::string& stem, const InputFrame& frame) c
                        : describe_bad_image(path_of(stem), "a mask image"));
 }
 
+cv::Mat in_8_bits(const cv::Mat& wide, const Levels& levels) {
+  const double scale = 255.0 / (levels.white - levels.black);
+  cv::Mat narrow;
+  wide.convertTo(narrow, CV_8U, scale, -scale * levels.black);
+  return narrow;
+}
+
 std::optional<Image> grey_of(const cv::Mat& frame) {
   if (frame.empty() || frame.depth() != CV_8U) return std::nullopt;
   cv::Mat grey = frame;
   if (frame.channels() == 3) cv::cvtColor(frame, grey, cv::COLOR_BGR2GRAY);
   if (frame.channels() == 4) cv::cvtColor(frame, grey, cv::COLOR_BGRA2GRAY);
   if (grey.channels() != 1) return std::nullopt;
-  Image image(grey.cols, grey.rows);
-  for (int y = 0; y < grey.rows; ++y) {
-    std::memcpy(image.row(y), grey.ptr(y), static_cast<std::size_t>(grey.cols));
-  }
-  return image;
+  return image_of<std::uint8_t>(grey);
+}
+
+std::string jpeg_of(const cv::Mat& frame) {
+  std::vector<std::uint8_t> bytes;
+  WAYMARK_CHECK(cv::imencode(".jpg", frame, bytes));
+  return {bytes.begin(), bytes.end()};
+}
+
+std::string change_jpeg(const std::string& jpeg,
+                        const std::function<cv::Mat(const cv::Mat&)>& change) {
+  if (jpeg.empty()) return {};
+  const std::vector<char> bytes(jpeg.begin(), jpeg.end());
+  const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
+  return image.empty() ? std::string() : jpeg_of(change(image));
 }
 
 }  // namespace waymark

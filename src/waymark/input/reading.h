@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 #include <opencv2/core.hpp>
@@ -18,6 +19,7 @@
 #include "waymark/base/check.h"
 #include "waymark/image/image_header.h"
 #include "waymark/input/input.h"
+#include "waymark/input/levels.h"
 
 namespace waymark {
 
@@ -29,7 +31,8 @@ std::optional<CameraChain> choose_calibration(const std::filesystem::path& path,
                                               Setup setup);
 
 /// Compares a camera with the first image of it. A camera without a resolution takes the size of
-/// the image; InputError that names the image when they differ.
+/// the image, one of that image enlarged (enlarge_if_small()), as results have it, is that of the
+/// image then; InputError that names the image when they differ.
 void fit_first_image(CameraChain& chain,
                      std::size_t camera,
                      const ImageSize& size,
@@ -73,8 +76,14 @@ inline FrameSelection select_frames(const std::filesystem::path& path,
   return selection;
 }
 
-/// Which of these times to use: the longest part of them that increases (Fredman 1975), most often
-/// all. Throws InputError at `where` when more than a tenth has to be left out. what: "images", ...
+/// The longest part of these times that increases (Fredman 1975), most often all.
+std::vector<std::size_t> longest_increasing(const std::vector<std::int64_t>& times_ns);
+
+/// Whether so many are most of them: all but a tenth.
+bool are_most(std::size_t num_used, std::size_t num_times);
+
+/// Which of these times to use: the longest increasing part. Throws InputError at `where` when more
+/// than a tenth has to be left out. what: "images", ...
 std::vector<std::size_t> increasing_times(const std::vector<std::int64_t>& times_ns,
                                           const std::string& where,
                                           std::string_view what);
@@ -129,8 +138,19 @@ class MaskSource {
   std::map<std::string, std::filesystem::path> by_name_;
 };
 
+/// Numbers of 16 bits in 8.
+cv::Mat in_8_bits(const cv::Mat& wide, const Levels& levels);
+
 /// A frame of a video or a camera in grey; nothing if it has not 8 bits per channel or an odd
 /// number of channels.
 std::optional<Image> grey_of(const cv::Mat& frame);
+
+/// A frame as a JPEG file.
+std::string jpeg_of(const cv::Mat& frame);
+
+/// A JPEG of what is made of the image of a JPEG, which is kept in colour for people and programs
+/// that follow; empty where there is none.
+std::string change_jpeg(const std::string& jpeg,
+                        const std::function<cv::Mat(const cv::Mat&)>& change);
 
 }  // namespace waymark

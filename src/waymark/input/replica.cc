@@ -97,6 +97,7 @@ Listing list_replica(const std::filesystem::path& folder, const InputOptions& op
                                  images.size(),
                                  depths.size()));
   }
+  listing.has_times = false;
   const std::vector<std::int64_t> times_ns =
       even_times(images.size(), options.fps.value_or(kReplicaRateHz));
   for (std::size_t i = 0; i < images.size(); ++i) {

@@ -4,15 +4,14 @@
 
 #include <fmt/format.h>
 
-#include <cstring>
 #include <opencv2/core.hpp>
-#include <opencv2/imgcodecs.hpp>
 #include <utility>
-#include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/camera/rotated_camera.h"
+#include "waymark/image/opencv_image.h"
 #include "waymark/input/changed_input.h"
+#include "waymark/input/reading.h"
 
 namespace waymark {
 namespace {
@@ -27,26 +26,16 @@ cv::Mat turn(const cv::Mat& image, int num_quarters) {
 
 template <class T>
 BasicImage<T> turn(const BasicImage<T>& image, int num_quarters) {
-  const cv::Mat mat(image.height_px,
-                    image.width_px,
-                    cv::DataType<T>::type,
-                    const_cast<T*>(image.values.data()));  // Is only read.
-  const cv::Mat turned = turn(mat, num_quarters);
-  BasicImage<T> result(turned.cols, turned.rows);
-  for (int y = 0; y < turned.rows; ++y) {
-    std::memcpy(result.row(y), turned.ptr(y), sizeof(T) * static_cast<std::size_t>(turned.cols));
-  }
-  return result;
+  return image_of<T>(turn(mat_of(image.view()), num_quarters));
 }
 
-std::string turn_jpeg(const std::string& jpeg, int num_quarters) {
-  if (jpeg.empty()) return {};
-  const std::vector<char> bytes(jpeg.begin(), jpeg.end());
-  const cv::Mat image = cv::imdecode(bytes, cv::IMREAD_COLOR | cv::IMREAD_IGNORE_ORIENTATION);
-  if (image.empty()) return {};
-  std::vector<unsigned char> result;
-  cv::imencode(".jpg", turn(image, num_quarters), result);
-  return {result.begin(), result.end()};
+ChainCamera turn(const ChainCamera& camera, int num_quarters) {
+  if (const auto turned = rotated(camera, num_quarters)) return *turned;
+  throw InputError("--rotate",
+                   fmt::format("cannot turn a camera of model '{}' by {} degrees, expected images "
+                               "as it was calibrated for",
+                               camera.description.camera_model,
+                               90 * num_quarters));
 }
 
 class RotatedInput final : public ChangedInput {
@@ -61,17 +50,14 @@ class RotatedInput final : public ChangedInput {
     if (!info_.calibration) return;
     for (ChainCamera& camera : info_.calibration->cameras) {
       const bool has_readout = camera.readout_s != 0.0 && num_quarters % 2 == 1;
-      const auto turned = rotated(camera, num_quarters);
-      if (!turned) {
-        throw InputError("--rotate",
-                         fmt::format("cannot turn a camera of model '{}' by {} degrees, expected "
-                                     "images as it was calibrated for",
-                                     camera.description.camera_model,
-                                     90 * num_quarters));
-      }
-      camera = *turned;
+      camera = turn(camera, num_quarters);
       if (has_readout) info_.lines.push_back("note: the readout of turned rows is not used");
     }
+  }
+
+  CameraChain of_unchanged_images(CameraChain chain) const override {
+    for (ChainCamera& camera : chain.cameras) camera = turn(camera, 4 - num_quarters_);
+    return ChangedInput::of_unchanged_images(std::move(chain));
   }
 
  private:
@@ -79,8 +65,9 @@ class RotatedInput final : public ChangedInput {
     for (Image& image : frame.images) image = turn(image, num_quarters_);
     if (frame.depth) frame.depth = turn(*frame.depth, num_quarters_);
     if (frame.mask) frame.mask = turn(*frame.mask, num_quarters_);
-    frame.jpeg = turn_jpeg(frame.jpeg, num_quarters_);
-    frame.right_jpeg = turn_jpeg(frame.right_jpeg, num_quarters_);
+    const auto turned = [this](const cv::Mat& image) { return turn(image, num_quarters_); };
+    frame.jpeg = change_jpeg(frame.jpeg, turned);
+    frame.right_jpeg = change_jpeg(frame.right_jpeg, turned);
   }
 
   const int num_quarters_;

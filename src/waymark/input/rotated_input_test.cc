@@ -61,6 +61,9 @@ TEST(RotatedInput, TurnsAllThatBelongsTogether) {
     EXPECT_EQ(frame.mask->view().at(u, v), 255);
     EXPECT_NE(frame.images.at(0).view().at(24, 24), 250);
     EXPECT_EQ(decode_color_image(frame.jpeg)->width_px, is_upright ? 48 : 64);
+    const CameraChain unchanged = input->of_unchanged_images(*input->info().calibration);
+    EXPECT_TRUE(unchanged.cameras[0].description.is_same(
+        options_for(folder, degrees).calibration->cameras[0].description));
   }
 }
 
@@ -73,6 +76,20 @@ TEST(RotatedInput, ResizesAfterwards) {
   const auto input = open_input(folder / "rgb", options);
   EXPECT_EQ(input->next()->images.at(0).width_px, 24);
   EXPECT_EQ(input->info().height_px, 32);
+  CameraDescription found;
+  found.camera_model = "pinhole";
+  found.intrinsics = {20.0, 21.0, 11.0, 14.0};
+  found.width_px = 24;
+  found.height_px = 32;
+  const CameraChain unchanged = input->of_unchanged_images({{{found, Rigid3()}}, {}, {}});
+  const CameraDescription& camera = unchanged.cameras[0].description;
+  EXPECT_EQ(camera.width_px, 64);
+  EXPECT_EQ(camera.height_px, 48);
+  // Twice as large, then turned back by a quarter: (u, v) comes from (v, 47 - u).
+  EXPECT_NEAR(camera.intrinsics[0], 42.0, 1e-3);
+  EXPECT_NEAR(camera.intrinsics[1], 40.0, 1e-3);
+  EXPECT_NEAR(camera.intrinsics[2], 2.0 * 14.5 - 0.5, 1e-3);
+  EXPECT_NEAR(camera.intrinsics[3], 47.0 - (2.0 * 11.5 - 0.5), 1e-3);
 }
 
 TEST(RotatedInput, SaysWhatItCannotTurn) {

@@ -6,6 +6,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/base/time_column.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/pairing.h"
 
@@ -13,6 +14,8 @@ namespace waymark {
 namespace {
 
 constexpr std::int64_t kMaxDepthDifferenceNs = 20'000'000;
+/// Units per metre, as the benchmark defines its files (Sturm et al. 2012).
+constexpr double kDepthFactor = 5000.0;
 
 std::size_t nearest(const std::vector<std::int64_t>& times_ns, std::int64_t time_ns) {
   const auto after = std::lower_bound(times_ns.begin(), times_ns.end(), time_ns);
@@ -43,10 +46,11 @@ std::vector<TumImage> read_tum_images(const std::filesystem::path& path, Listing
 
 std::vector<TumImage> parse_tum_images(std::string_view text, const std::string& name) {
   std::vector<TumImage> images;
+  const TimeColumn column(text, ' ');
   RowReader rows(text, name, ' ');
   while (rows.next()) {
     rows.expect_exactly(2, "2: seconds and file name");
-    TumImage image{rows.seconds_as_ns(0), rows.relative_path(1)};
+    TumImage image{column.read(rows), rows.relative_path(1)};
     images.push_back(std::move(image));
   }
   if (images.empty()) throw InputError(name, "empty, expected rows of seconds and file name");
@@ -95,6 +99,7 @@ Listing list_tum_rgbd(const std::filesystem::path& folder, const InputOptions& o
         (folder / "depth.txt").string(),
         "no depth image within 0.02 s of a colour image, expected pairs (or --setup mono)");
   }
+  listing.depth_factor = kDepthFactor;
   listing.counts.without_partner = colour.size() - num_pairs;
   listing.notes.push_back(
       fmt::format("{} of {} colour images have depth", num_pairs, colour.size()));

@@ -95,6 +95,49 @@ TEST(Video, OfTwoCamerasIsStereo) {
             500'000'000);
 }
 
+TEST(Video, GoesOnInTheNextFileOfOneRecording) {
+  const TemporaryFolder folder;
+  make_video(folder / "GX010042.avi", 6);
+  make_video(folder / "GX020042.avi", 4);
+  const std::unique_ptr<Input> input = open_input(folder.path(), {});
+  EXPECT_EQ(input->info().num_frames, std::size_t{10});
+  EXPECT_THAT(input->info().lines, ::testing::Contains(HasSubstr("goes on in")));
+  for (int i = 0; i < 10; ++i) {
+    const InputFrame frame = input->next().value();
+    EXPECT_EQ(frame.timestamp_ns, i * 100'000'000);
+    EXPECT_NEAR(frame.images.at(0).view().at(8, 6), 20 * (i % 6 + 1), 3);
+  }
+  EXPECT_FALSE(input->next());
+  make_video(folder / "GX010043.avi", 4);
+  EXPECT_THAT(input_error_of([&] { open_input(folder.path(), {}); }), HasSubstr("holds 3 videos"));
+}
+
+TEST(Video, IsRecognisedByContent) {
+  const TemporaryFolder folder;
+  make_video(folder / "v.avi", 3);
+  std::filesystem::rename(folder / "v.avi", folder / "recording.001");
+  EXPECT_EQ(open_input(folder / "recording.001", {})->info().format, "video");
+  folder.write("list.001", "#EXTM3U\n#EXTINF:10,\nrecording.001\n#EXT-X-ENDLIST\n");
+  EXPECT_THAT(input_error_of([&] { open_input(folder / "list.001", {}); }),
+              HasSubstr("is neither folder nor video nor bag"));
+}
+
+TEST(Video, TellsThatARecordingWasNotClosed) {
+  const TemporaryFolder folder;
+  const std::string box(
+      "\0\0\0\x10"
+      "ftypisom\0\0\0\0",
+      16);
+  folder.write("v.mp4",
+               box +
+                   std::string("\0\x10\0\0"
+                               "mdat",
+                               8) +
+                   std::string(5000, 'x'));
+  EXPECT_THAT(input_error_of([&] { open_input(folder / "v.mp4", {}); }),
+              HasSubstr("was not closed, as where the power failed: its index (moov) is missing"));
+}
+
 TEST(Video, LeavesOutTimesOutOfOrder) {
   const TemporaryFolder folder;
   make_video(folder / "v.avi", 11);

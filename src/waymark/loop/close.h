@@ -11,26 +11,26 @@
 
 namespace waymark {
 
-/// The loop of a revisit within a sub-map.
-inline LoopEdge as_loop(const Revisit& revisit) {
-  return {revisit.match, revisit.query, revisit.query_from_match};
+/// The loop of a candidate within a sub-map.
+inline LoopEdge as_loop(const LoopCandidate& candidate) {
+  return {candidate.match, candidate.query, candidate.query_from_match};
 }
 
-/// Closes a loop within a sub-map: moves keyframes as spread_drift() says, notes the loop edge, and
-/// makes one of what query, match and their neighbours hold for different landmarks. What is left
-/// of the error is for a global bundle adjustment.
+/// Closes a loop within a sub-map: moves keyframes as optimize_loop() says, notes the loop edge,
+/// and makes one of what query, match and their neighbours hold for different landmarks. What is
+/// left of the error is for a global bundle adjustment.
 void close_loop(Map& map,
-                const Revisit& revisit,
+                const LoopCandidate& candidate,
                 const MapCorrection& correction,
                 ProjectionMatcher& matcher,
                 DirtyLandmarks& dirty);
 
 /// Joins two sub-maps, which must both be metric or both not: the younger moves by one similarity
 /// to where the older has the place, in its frame and units, and belongs to it from then on. The
-/// revisit is noted as a loop edge, and landmarks are made one as in close_loop().
+/// candidate is noted as a loop edge, and landmarks are made one as in close_loop().
 void join_submaps(Map& map,
                   PlaceIndex& places,
-                  const Revisit& revisit,
+                  const LoopCandidate& candidate,
                   ProjectionMatcher& matcher,
                   DirtyLandmarks& dirty);
 

@@ -3,7 +3,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/loop/close.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -21,7 +21,7 @@ TEST(Overlaps, BecomeNeighboursInTheGraph) {
   const KeyframeId last{kRound};
   ASSERT_EQ(num_shared(scene.map, last, KeyframeId{0}), 0u);
   const std::size_t num_landmarks = scene.map.landmarks().size();
-  ProjectionMatcher matcher(scene.rig);
+  ProjectionMatcher matcher;
   DirtyLandmarks dirty;
   fuse_overlaps(scene.map, matcher, dirty);
   EXPECT_GT(num_shared(scene.map, last, KeyframeId{0}), 100u);
@@ -35,7 +35,7 @@ TEST(Overlaps, LeaveSubmapsApart) {
   scene.start_submap(Sim3());
   for (int step = 0; step < 5; ++step) scene.add_keyframe(step);
   const std::size_t num_landmarks = scene.map.landmarks().size();
-  ProjectionMatcher matcher(scene.rig);
+  ProjectionMatcher matcher;
   DirtyLandmarks dirty;
   fuse_overlaps(scene.map, matcher, dirty);
   EXPECT_EQ(scene.map.landmarks().size(), num_landmarks);

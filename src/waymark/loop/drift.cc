@@ -164,27 +164,27 @@ std::optional<GraphWay> shortest_way(const Map& map,
   return WaySearch(map, to, enough).search(from, all_children);
 }
 
-ImpliedDrift implied_drift(const Map& map, const Revisit& revisit) {
-  const Rigid3& query_from_world = map.keyframes().at(revisit.query).rig_from_world;
-  const Rigid3& match_from_world = map.keyframes().at(revisit.match).rig_from_world;
+ImpliedDrift implied_drift(const Map& map, const LoopCandidate& candidate) {
+  const Rigid3& query_from_world = map.keyframes().at(candidate.query).rig_from_world;
+  const Rigid3& match_from_world = map.keyframes().at(candidate.match).rig_from_world;
   const Sim3 mapped(query_from_world * match_from_world.inverse());
-  const Sim3 drift = mapped * revisit.query_from_match.inverse();
+  const Sim3 drift = mapped * candidate.query_from_match.inverse();
   return {drift.inverse().translation.norm(),
           Eigen::AngleAxisd(drift.rotation).angle(),
           std::log(drift.scale)};
 }
 
-bool is_plausible_loop(const Map& map, const Revisit& revisit, double part) {
-  const ImpliedDrift drift = implied_drift(map, revisit);
+bool is_plausible_loop(const Map& map, const LoopCandidate& candidate, double part) {
+  const ImpliedDrift drift = implied_drift(map, candidate);
   const double log_scale = std::abs(drift.log_scale);
   // What turned or grew by so much at the end did by half of that on average.
   const double per_length = kMaxDriftOfWay + 0.5 * (drift.angle_rad + log_scale);
-  const double for_depth = kMaxDriftOfDepth * median_depth(map, revisit.match);
+  const double for_depth = kMaxDriftOfDepth * median_depth(map, candidate.match);
   const double enough_length = (drift.distance / part - for_depth) / per_length;
   const GraphWay enough{(1.0 + kMargin) * std::max(enough_length, 0.0),
                         std::max(kMaxAngleRad.enough_for(drift.angle_rad / part),
                                  kMaxLogScale.enough_for(log_scale / part))};
-  const std::optional<GraphWay> way = shortest_way(map, revisit.query, revisit.match, enough);
+  const std::optional<GraphWay> way = shortest_way(map, candidate.query, candidate.match, enough);
   if (!way) return false;
   return drift.distance <= part * (per_length * way->length + for_depth) &&
          drift.angle_rad <= part * kMaxAngleRad.after(way->num_steps) &&

@@ -12,7 +12,7 @@
 namespace waymark {
 
 /// Two keyframes that show the same place, of one sub-map (a loop) or of two (a join).
-struct Revisit {
+struct LoopCandidate {
   /// Landmarks that are one and the same thing.
   struct Pair {
     LandmarkId of_query;
@@ -51,10 +51,10 @@ struct ImpliedDrift {
   double angle_rad = 0.0;
   double log_scale = 0.0;
 };
-ImpliedDrift implied_drift(const Map& map, const Revisit& revisit);
+ImpliedDrift implied_drift(const Map& map, const LoopCandidate& candidate);
 
 /// Whether a map can have drifted so far on the way that lies between query and match. Two rooms
 /// that are alike are told apart by this. part: of what is possible, so much is still believed.
-bool is_plausible_loop(const Map& map, const Revisit& revisit, double part = 1.0);
+bool is_plausible_loop(const Map& map, const LoopCandidate& candidate, double part = 1.0);
 
 }  // namespace waymark

@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -28,33 +28,33 @@ TEST(DriftTest, ShortestWayGoesAlongTheGraph) {
 TEST(DriftTest, ImpliedDriftIsTheDrift) {
   LoopScene scene(cloud_all_round(kNumPoints), false, drift_of(0.0, 0.1, 0.2));
   for (int step = 0; step <= kRound; ++step) scene.add_keyframe(step);
-  Revisit revisit;
-  revisit.query = KeyframeId{kRound};
-  revisit.match = KeyframeId{0};
-  revisit.query_from_match = scene.true_motion(kRound, 0);
-  const ImpliedDrift drift = implied_drift(scene.map, revisit);
+  LoopCandidate candidate;
+  candidate.query = KeyframeId{kRound};
+  candidate.match = KeyframeId{0};
+  candidate.query_from_match = scene.true_motion(kRound, 0);
+  const ImpliedDrift drift = implied_drift(scene.map, candidate);
   EXPECT_NEAR(drift.angle_rad, 0.1, 1e-9);
   EXPECT_NEAR(std::abs(drift.log_scale), 0.2, 1e-9);
-  EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
+  EXPECT_TRUE(is_plausible_loop(scene.map, candidate));
 }
 
 TEST(DriftTest, IsPlausibleForItsWayOnly) {
   LoopScene scene(cloud_all_round(kNumPoints), true, Vector7d::Zero());
   for (int step = 0; step <= kRound; ++step) scene.add_keyframe(step);
-  Revisit revisit;
-  revisit.query = KeyframeId{kRound};
-  revisit.match = KeyframeId{0};
-  const double way = shortest_way(scene.map, revisit.query, revisit.match)->length;
-  revisit.query_from_match.translation = {0.03 * way, 0.0, 0.0};
-  EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
-  revisit.query_from_match.translation = {0.08 * way, 0.0, 0.0};
-  EXPECT_FALSE(is_plausible_loop(scene.map, revisit));
-  revisit.match = KeyframeId{kRound - 1};  // A step of 0.6 does not allow what the round does.
-  revisit.query_from_match =
+  LoopCandidate candidate;
+  candidate.query = KeyframeId{kRound};
+  candidate.match = KeyframeId{0};
+  const double way = shortest_way(scene.map, candidate.query, candidate.match)->length;
+  candidate.query_from_match.translation = {0.03 * way, 0.0, 0.0};
+  EXPECT_TRUE(is_plausible_loop(scene.map, candidate));
+  candidate.query_from_match.translation = {0.08 * way, 0.0, 0.0};
+  EXPECT_FALSE(is_plausible_loop(scene.map, candidate));
+  candidate.match = KeyframeId{kRound - 1};  // A step of 0.6 does not allow what the round does.
+  candidate.query_from_match =
       Sim3(LoopScene::true_pose(kRound).inverse() * LoopScene::true_pose(kRound - 1));
-  EXPECT_TRUE(is_plausible_loop(scene.map, revisit));
-  revisit.query_from_match.translation.x() += 0.03 * way;
-  EXPECT_FALSE(is_plausible_loop(scene.map, revisit));
+  EXPECT_TRUE(is_plausible_loop(scene.map, candidate));
+  candidate.query_from_match.translation.x() += 0.03 * way;
+  EXPECT_FALSE(is_plausible_loop(scene.map, candidate));
 }
 
 /// Rounds whose last keyframe sees the place of another again.
@@ -65,15 +65,15 @@ class TurnedLoopTest : public ::testing::Test {
   }
 
   /// As the map has it, but turned and grown by so much.
-  Revisit off_by(KeyframeId match, double angle_rad, double log_scale) const {
-    Revisit revisit;
-    revisit.query = KeyframeId{kNumRounds * kRound};
-    revisit.match = match;
+  LoopCandidate off_by(KeyframeId match, double angle_rad, double log_scale) const {
+    LoopCandidate candidate;
+    candidate.query = KeyframeId{kNumRounds * kRound};
+    candidate.match = match;
     const auto& keyframes = scene_.map.keyframes();
-    revisit.query_from_match = Sim3::exp(drift_of(0.0, angle_rad, log_scale)) *
-                               Sim3(keyframes.at(revisit.query).rig_from_world *
-                                    keyframes.at(match).rig_from_world.inverse());
-    return revisit;
+    candidate.query_from_match = Sim3::exp(drift_of(0.0, angle_rad, log_scale)) *
+                                 Sim3(keyframes.at(candidate.query).rig_from_world *
+                                      keyframes.at(match).rig_from_world.inverse());
+    return candidate;
   }
 
   /// A keyframe from which the way to the last has about so many steps.
@@ -85,7 +85,9 @@ class TurnedLoopTest : public ::testing::Test {
     return id;
   }
 
-  bool is_plausible(const Revisit& revisit) const { return is_plausible_loop(scene_.map, revisit); }
+  bool is_plausible(const LoopCandidate& candidate) const {
+    return is_plausible_loop(scene_.map, candidate);
+  }
 
   static constexpr int kNumRounds = 12;
   LoopScene scene_{cloud_all_round(1000), false, Vector7d::Zero()};

@@ -7,8 +7,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "waymark/loop/test_loop.h"
-#include "waymark/simulate/testing/town_map.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -164,12 +163,12 @@ TEST_F(GlobalMapperTest, UndoesAFalseLoopOnceOthersContradictIt) {
   LoopScene scene = walk({{0, 2 * kRound}});
   GlobalMapper mapper(scene.rig, {}, {}, {.refine = "off"}, 1);
   mapper.take_over(snapshot_of(scene));
-  const auto revisit = [&](int query, int match, int seen_from) {
-    Revisit revisit;
-    revisit.query = KeyframeId{static_cast<std::uint32_t>(query)};
-    revisit.match = KeyframeId{static_cast<std::uint32_t>(match)};
-    revisit.query_from_match = scene.true_motion(query, seen_from);
-    return revisit;
+  const auto candidate = [&](int query, int match, int seen_from) {
+    LoopCandidate candidate;
+    candidate.query = KeyframeId{static_cast<std::uint32_t>(query)};
+    candidate.match = KeyframeId{static_cast<std::uint32_t>(match)};
+    candidate.query_from_match = scene.true_motion(query, seen_from);
+    return candidate;
   };
   const auto error = [&] {
     double worst = 0.0;
@@ -181,12 +180,12 @@ TEST_F(GlobalMapperTest, UndoesAFalseLoopOnceOthersContradictIt) {
   };
   const double error_open = error();
   // Nothing contradicts the first, nor tells it from a second that does.
-  EXPECT_TRUE(mapper.close(revisit(60, 5, 59)));
+  EXPECT_TRUE(mapper.close(candidate(60, 5, 59)));
   ASSERT_GT(error(), 5.0 * error_open);
   std::optional<AdjustmentTask> task = mapper.take_task();
   int num_closed = 0;
   for (const auto& [query, match] : {std::pair(44, 4), {52, 12}, {78, 38}, {66, 26}}) {
-    num_closed += mapper.close(revisit(query, match, match));
+    num_closed += mapper.close(candidate(query, match, match));
   }
   EXPECT_GE(num_closed, 3);
   EXPECT_EQ(mapper.num_loops(), num_closed);
@@ -194,98 +193,12 @@ TEST_F(GlobalMapperTest, UndoesAFalseLoopOnceOthersContradictIt) {
   EXPECT_LT(error(), error_open);
   EXPECT_EQ(mapper.map().broken_invariants(), "");
   // The same again is not believed, and what was adjusted with it in place is not taken in.
-  EXPECT_FALSE(mapper.close(revisit(62, 7, 61)));
+  EXPECT_FALSE(mapper.close(candidate(62, 7, 61)));
   mapper.apply(*task, adjust_globally(*task->map, task->submap));
   EXPECT_LT(error(), error_open);
   mapper.finish();
   EXPECT_LT(error(), error_open);
   EXPECT_EQ(mapper.map().broken_invariants(), "");
-}
-
-/// Two recordings of a town, a sub-map each, and places of the first that the second saw again.
-class TwoRecordings : public ::testing::Test {
- protected:
-  TwoRecordings() {
-    mapper_.take_over(index_map(town_.map));
-    const auto& truth = town_.world_from_rig;
-    for (std::uint32_t query = kNumKeyframes + kMargin; query + kMargin < truth.size(); ++query) {
-      const auto is_far = [&](const Revisit& other) {
-        const Rigid3 apart = truth[query].inverse() * truth[other.query.value];
-        return apart.translation.norm() > 80.0;
-      };
-      if (!std::ranges::all_of(true_ones_, is_far)) continue;
-      for (std::uint32_t match = kMargin; match + kMargin < kNumKeyframes; ++match) {
-        const Rigid3 query_from_match = truth[query].inverse() * truth[match];
-        if (query_from_match.translation.norm() > 10.0) continue;
-        true_ones_.push_back(revisit(query, match, Sim3(query_from_match)));
-        break;
-      }
-    }
-  }
-
-  static Revisit revisit(std::uint32_t query, std::uint32_t match, const Sim3& query_from_match) {
-    Revisit revisit;
-    revisit.query = KeyframeId{query};
-    revisit.match = KeyframeId{match};
-    revisit.query_from_match = query_from_match;
-    return revisit;
-  }
-
-  /// What is farthest from the truth, seen from the first keyframe.
-  double error() const {
-    double worst = 0.0;
-    const auto& keyframes = mapper_.map().keyframes();
-    const Rigid3 first_from_world = keyframes.at(KeyframeId{0}).rig_from_world;
-    keyframes.for_each([&](KeyframeId id, const Keyframe& keyframe) {
-      const Rigid3 first_from_rig = first_from_world * keyframe.rig_from_world.inverse();
-      const Rigid3 truth = town_.world_from_rig[0].inverse() * town_.world_from_rig[id.value];
-      worst = std::max(worst, (first_from_rig.translation - truth.translation).norm());
-    });
-    return worst;
-  }
-
-  static constexpr std::uint32_t kNumKeyframes = 500;
-  static constexpr std::uint32_t kMargin = 20;
-  const TownMap town_ = make_town_map({.num_keyframes = 2 * kNumKeyframes,
-                                       .num_recordings = 2,
-                                       .num_passes = 2.0,
-                                       .is_closed = false});
-  GlobalMapper mapper_{town_.rig, {}, {}, {.refine = "off"}, 1};
-  std::vector<Revisit> true_ones_;
-};
-
-TEST_F(TwoRecordings, AFalseJoinIsUndoneOnceLoopsAtOtherPlacesContradictIt) {
-  ASSERT_GE(true_ones_.size(), 3u);
-  // What is far from each other, taken for the same.
-  const Revisit lie = revisit(true_ones_[0].query.value + 10, true_ones_[2].match.value, Sim3());
-  EXPECT_TRUE(mapper_.close(lie));
-  ASSERT_GT(error(), 40.0);
-  EXPECT_FALSE(mapper_.close(true_ones_[0])) << "one says this, the other that";
-  EXPECT_GT(error(), 40.0);
-  EXPECT_TRUE(mapper_.close(true_ones_[1]));
-  EXPECT_TRUE(mapper_.close(true_ones_[2]));
-  EXPECT_LT(error(), 4.0);
-  const Map& map = mapper_.map();
-  EXPECT_EQ(map.broken_invariants(), "");
-  EXPECT_FALSE(map.has_loop_edge(lie.query));
-  EXPECT_NE(map.keyframes().at(lie.query).parent, lie.match);
-  EXPECT_NE(map.keyframes().at(lie.match).parent, lie.query);
-  EXPECT_EQ(mapper_.num_joins(), 1);
-  EXPECT_FALSE(mapper_.close(lie)) << "it is known for what it is";
-}
-
-TEST_F(TwoRecordings, ATrueJoinStandsAgainstWhatIsSaidAtOnePlaceOnly) {
-  ASSERT_GE(true_ones_.size(), 3u);
-  EXPECT_TRUE(mapper_.close(true_ones_[0]));
-  const double error_joined = error();
-  const std::uint32_t query = true_ones_[2].query.value;
-  const std::uint32_t match = true_ones_[1].match.value;
-  for (const std::uint32_t step : {0u, 5u, 10u}) {
-    EXPECT_FALSE(mapper_.close(revisit(query + step, match + step, Sim3())));
-  }
-  EXPECT_LE(error(), error_joined);
-  EXPECT_TRUE(mapper_.close(true_ones_[1]));
-  EXPECT_LT(error(), 4.0);
 }
 
 TEST_F(GlobalMapperTest, FreesAMapItselfOnceNobodyLooksAtIt) {

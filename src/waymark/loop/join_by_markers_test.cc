@@ -9,7 +9,7 @@
 
 #include "waymark/geometry/alignment.h"
 #include "waymark/loop/merge_maps.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/testing/loop.h"
 #include "waymark/map/parts.h"
 
 namespace waymark {

@@ -22,7 +22,8 @@ MergedMaps merge_maps(const Map& a, const Map& b, std::uint64_t seed) {
     if (id >= a.keyframes().end_id()) of_b.push_back(id);
   });
   if (of_b.empty()) return {both.freeze()};
-  GlobalMapper mapper(both.keyframes().at(of_b.front()).rig, {}, {}, {.refine = "off"}, seed);
+  GlobalMapper mapper(
+      both.keyframes().at(of_b.front()).features->rig, {}, {}, {.refine = "off"}, seed);
   // Only what is indexed is found: b looks for its places in a.
   mapper.take_over(index_map(both.freeze(), of_b.front()));
   for (int pass = 0; pass < kMaxPasses; ++pass) {

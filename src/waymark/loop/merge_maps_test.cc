@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/testing/loop.h"
 #include "waymark/map/testing/random_map.h"
 
 namespace waymark {

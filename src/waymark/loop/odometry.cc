@@ -2,12 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/loop/odometry.h"
 
-#include <utility>
+#include <algorithm>
+#include <numeric>
 
 #include "waymark/loop/drift.h"
-#include "waymark/optimize/place_islands.h"
+#include "waymark/optimize/outlier_edges.h"
 #include "waymark/optimize/pose_graph.h"
-#include "waymark/optimize/switch_edges.h"
 
 namespace waymark {
 namespace {
@@ -22,9 +22,6 @@ constexpr double kStepLogScale = 0.015;
 constexpr double kLoopTranslation = 0.01;
 constexpr double kLoopRotationRad = 0.004;
 constexpr double kLoopLogScale = 0.01;
-
-/// Loops whose ends lie within so many times what is seen there are of one place.
-constexpr double kSamePlaceDepths = 2.0;
 
 constexpr std::uint32_t kNoNode = UINT32_MAX;
 
@@ -44,13 +41,16 @@ class OdometryGraph {
     const KeyframeId root = map.submaps()[submap.value].root;
     if (node_of(root) != kNoNode) graph_.is_fixed[node_of(root)] = 1;
     is_placed_.assign(ids_.size(), 0);
+    part_.resize(ids_.size());
+    std::iota(part_.begin(), part_.end(), 0u);
     for (std::uint32_t node = 0; node < ids_.size(); ++node) {
       place(node);
       add_step(node);
     }
   }
 
-  /// Whether both ends are there.
+  /// Whether both ends are there. The first that ties what odometry does not is how sub-maps were
+  /// joined: the part moves there, and nothing can contradict that.
   bool add_loop(const LoopEdge& loop, bool is_robust) {
     if (node_of(loop.from) == kNoNode || node_of(loop.to) == kNoNode) return false;
     PoseGraphEdge edge;
@@ -60,21 +60,14 @@ class OdometryGraph {
     edge.sigma_translation = kLoopTranslation * noted(loop.to).depth;
     edge.sigma_rotation_rad = kLoopRotationRad;
     edge.sigma_log_scale = kLoopLogScale;
-    edge.is_robust = is_robust;
+    const bool is_join = part_of(edge.from) != part_of(edge.to);
+    if (is_join) join(edge);
+    edge.is_robust = is_robust && !is_join;
     graph_.edges.push_back(edge);
     return true;
   }
 
   PoseGraph& graph() { return graph_; }
-
-  /// Puts sub-maps that loops joined, whose odometry nothing else ties, to where most of them say.
-  /// Loops are the edges from first_loop on.
-  IslandTies place_joined(std::size_t first_loop, std::vector<std::size_t> believed) {
-    return place_islands(
-        graph_,
-        first_loop,
-        {.same_place = kSamePlaceDepths / kLoopTranslation, .believed = std::move(believed)});
-  }
 
   /// Of the keyframes that are still there.
   MapCorrection correction() const {
@@ -139,12 +132,36 @@ class OdometryGraph {
     edge.sigma_rotation_rad = kStepRotationRad;
     edge.sigma_log_scale = kStepLogScale;
     graph_.edges.push_back(edge);
+    part_[part_of(edge.from)] = part_of(edge.to);
+  }
+
+  std::uint32_t part_of(std::uint32_t node) {
+    while (part_[node] != node) node = part_[node] = part_[part_[node]];
+    return node;
+  }
+
+  /// Moves the part of one end, that without the root, to where the edge has it.
+  void join(const PoseGraphEdge& edge) {
+    std::vector<Sim3>& nodes = graph_.node_from_world;
+    const auto root = std::ranges::find(graph_.is_fixed, std::uint8_t{1});
+    const bool stays_to =
+        root != graph_.is_fixed.end() &&
+        part_of(static_cast<std::uint32_t>(root - graph_.is_fixed.begin())) == part_of(edge.to);
+    const std::uint32_t end = stays_to ? edge.from : edge.to;
+    const Sim3 moved = stays_to ? edge.to_from_from.inverse() * nodes[edge.to]
+                                : edge.to_from_from * nodes[edge.from];
+    const Sim3 old_world_from_new_world = nodes[end].inverse() * moved;
+    for (std::uint32_t node = 0; node < nodes.size(); ++node) {
+      if (part_of(node) == part_of(end)) nodes[node] = nodes[node] * old_world_from_new_world;
+    }
+    part_[part_of(edge.from)] = part_of(edge.to);
   }
 
   const Map& map_;
   std::vector<std::uint32_t> node_of_keyframe_;
   std::vector<KeyframeId> ids_;  // Ascending, one per node.
   std::vector<std::uint8_t> is_placed_;
+  std::vector<std::uint32_t> part_;  // Per node: towards the node that stands for its part.
   PoseGraph graph_;
 };
 
@@ -188,16 +205,13 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
   OdometryGraph graph(map, submap);
   const std::size_t num_steps = graph.graph().edges.size();
   std::vector<std::size_t> is_there;  // The loops that have edges, in their order.
-  SwitchOptions options;
+  OutlierEdgeOptions options;
   for (std::size_t i = 0; i < loops.size(); ++i) {
     if (!graph.add_loop(loops[i], true)) continue;
     if (i < num_believed) options.believed.push_back(num_steps + is_there.size());
     is_there.push_back(i);
   }
-  IslandTies ties = graph.place_joined(num_steps, std::move(options.believed));
-  options.believed = std::move(ties.believed);
-  options.left_out = std::move(ties.contradicting);
-  const std::vector<std::uint8_t> edge_is_on = switch_edges(graph.graph(), options);
+  const std::vector<std::uint8_t> edge_is_on = reject_outlier_edges(graph.graph(), options);
   std::vector<std::uint8_t> is_on(loops.size(), 1);
   for (std::size_t k = 0; k < is_there.size(); ++k) is_on[is_there[k]] = edge_is_on[num_steps + k];
   return is_on;
@@ -205,9 +219,7 @@ std::vector<std::uint8_t> choose_loops(const Map& map,
 
 MapCorrection place_by_odometry(const Map& map, SubmapId submap, std::span<const LoopEdge> loops) {
   OdometryGraph graph(map, submap);
-  const std::size_t num_steps = graph.graph().edges.size();
   for (const LoopEdge& loop : loops) graph.add_loop(loop, false);
-  graph.place_joined(num_steps, {});
   optimize_pose_graph(graph.graph(), {});
   return graph.correction();
 }

@@ -23,7 +23,8 @@ void note_odometry(Map& map, KeyframeId first = KeyframeId{0});
 LoopEdge as_measured(const Map& map, const LoopEdge& loop);
 
 /// Which loops of a sub-map agree with each other and with the odometry, 1 or 0 per loop: see
-/// switch_edges(), and place_islands() for what loops joined. All keyframes must be noted.
+/// reject_outlier_edges(). The loops that joined sub-maps, whose odometry nothing else ties, do.
+/// All keyframes must be noted.
 /// \param loops         as Map::measured_loop_edges() gives them; of other sub-maps: 1.
 /// \param num_believed  the first so many were believed before.
 std::vector<std::uint8_t> choose_loops(const Map& map,

@@ -5,8 +5,8 @@
 #include <gtest/gtest.h>
 
 #include "waymark/loop/close.h"
-#include "waymark/loop/spread_drift.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/loop_pose_graph.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -48,7 +48,7 @@ TEST_P(OdometryTest, TellsAFalseLoopByTheOthers) {
 
 TEST_P(OdometryTest, StillTellsItOnceTheMapIsBent) {
   const LoopEdge lie = false_loop(30, 84);
-  apply_correction(scene_.map, spread_drift(scene_.map, lie).correction);
+  apply_correction(scene_.map, optimize_loop(scene_.map, lie).correction);
   scene_.map.add_loop_edge({lie.from, lie.to, lie.to_from_from});
   const double error_bent = error_of(scene_);
   note_odometry(scene_.map);
@@ -66,7 +66,7 @@ TEST_P(OdometryTest, WithoutLoopsKeyframesGoBackToWhereTheyWere) {
   std::vector<Rigid3> before;
   scene_.map.keyframes().for_each(
       [&](KeyframeId, const Keyframe& keyframe) { before.push_back(keyframe.rig_from_world); });
-  apply_correction(scene_.map, spread_drift(scene_.map, false_loop(30, 84)).correction);
+  apply_correction(scene_.map, optimize_loop(scene_.map, false_loop(30, 84)).correction);
   apply_correction(scene_.map, place_by_odometry(scene_.map, kSubmap, {}));
   for (std::uint32_t i = 0; i < before.size(); ++i) {
     const Keyframe& keyframe = scene_.map.keyframes().at(KeyframeId{i});

@@ -78,30 +78,6 @@ void split(Map& map, LandmarkId id, const Motions& motions, DirtyLandmarks& dirt
   }
 }
 
-bool is_below(const Map& map, KeyframeId id, KeyframeId top) {
-  while (id.is_valid() && id != top) id = map.keyframes().at(id).parent;
-  return id == top;
-}
-
-/// What a join hung into the spanning tree, if it was one, hangs by the first of the loops that tie
-/// it, too.
-void rehang_joined(Map& map, const LoopEdge& join, std::span<const LoopEdge> loops) {
-  const auto hangs = [&](KeyframeId child, KeyframeId parent) {
-    return map.keyframes().at(child).parent == parent;
-  };
-  if (!hangs(join.to, join.from) && !hangs(join.from, join.to)) return;
-  const KeyframeId top = hangs(join.to, join.from) ? join.to : join.from;
-  for (const LoopEdge& loop : loops) {
-    const Keyframe* from = map.keyframes().find(loop.from);
-    if (!from || !map.keyframes().contains(loop.to)) continue;
-    if (from->submap != map.keyframes().at(top).submap) continue;
-    const bool is_from_below = is_below(map, loop.from, top);
-    if (is_from_below == is_below(map, loop.to, top)) continue;
-    map.rehang(top, is_from_below ? loop.from : loop.to, is_from_below ? loop.to : loop.from);
-    return;
-  }
-}
-
 }  // namespace
 
 void undo_loops(Map& map,
@@ -109,13 +85,12 @@ void undo_loops(Map& map,
                 std::span<const std::uint8_t> is_on,
                 std::span<const LoopEdge> also,
                 DirtyLandmarks& dirty) {
-  std::vector<LoopEdge> undone, kept;
+  std::vector<LoopEdge> kept;
   for (std::size_t i = 0; i < is_on.size(); ++i) {
-    (is_on[i] ? kept : undone).push_back(map.measured_loop_edges()[i]);
+    if (is_on[i]) kept.push_back(map.measured_loop_edges()[i]);
   }
   kept.insert(kept.end(), also.begin(), also.end());
   map.drop_loop_edges(is_on);
-  for (const LoopEdge& edge : undone) rehang_joined(map, edge, kept);
   const Motions motions(map);
   apply_correction(map, place_by_odometry(map, submap, kept));
   std::vector<LandmarkId> landmarks;

@@ -13,7 +13,6 @@ namespace waymark {
 /// Takes back loops of a sub-map that turned out to be false: without their edges, keyframes go to
 /// where odometry and the other loops put them, and landmarks that this tears apart are split:
 /// observations that do not see the landmark any more see one of their own, where they had it.
-/// What a false loop had joined hangs by another one in the spanning tree then, if one ties it.
 /// All keyframes must be noted, see note_odometry().
 /// \param is_on  1 or 0 per loop edge of the map.
 /// \param also   further loops that are believed, as Map::measured_loop_edges() would give them.

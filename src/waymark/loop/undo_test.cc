@@ -6,8 +6,9 @@
 
 #include "waymark/image/hamming.h"
 #include "waymark/loop/close.h"
-#include "waymark/loop/spread_drift.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/loop_pose_graph.h"
+#include "waymark/loop/odometry.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -20,8 +21,8 @@ std::size_t num_observations(const Map& map) {
 }
 
 /// The last keyframe taken for what it looks like: the place nine stretches before.
-Revisit twin_of_last(const Map& map) {
-  Revisit lie;
+LoopCandidate twin_of_last(const Map& map) {
+  LoopCandidate lie;
   lie.query = KeyframeId{map.keyframes().end_id().value - 1};
   lie.match = KeyframeId{lie.query.value - 9 * kRound / 10};
   const Keyframe& query = map.keyframes().at(lie.query);
@@ -50,11 +51,11 @@ TEST(UndoLoops, TakesBackPosesAndMerges) {
     const double residual = median_residual_px(map);
     const std::size_t num_before = num_observations(map);
     note_odometry(map);
-    const Revisit lie = twin_of_last(map);
+    const LoopCandidate lie = twin_of_last(map);
     ASSERT_GT(lie.pairs.size(), 30u);
-    ProjectionMatcher matcher(scene.rig);
+    ProjectionMatcher matcher;
     DirtyLandmarks dirty;
-    close_loop(map, lie, spread_drift(map, as_loop(lie)).correction, matcher, dirty);
+    close_loop(map, lie, optimize_loop(map, as_loop(lie)).correction, matcher, dirty);
     const std::size_t num_merged = map.landmarks().size();
     const LandmarkId end_before = map.landmarks().end_id();
     const std::vector<std::uint8_t> none = {0};

@@ -6,10 +6,10 @@
 
 #include <algorithm>
 
-#include "waymark/loop/beside.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/spatial_neighbours.h"
+#include "waymark/loop/testing/loop.h"
 
 namespace waymark {
 namespace {
@@ -17,28 +17,29 @@ namespace {
 struct Walk {
   int num_found = 0;
   int first_step = -1;
-  std::optional<Revisit> first;
+  std::optional<LoopCandidate> first;
 };
 
 /// Adds keyframes for the steps and looks for loops at each.
-Walk walk(LoopScene& scene, RevisitVerifier& verifier, int from_step, int to_step) {
+Walk walk(LoopScene& scene, LoopVerifier& verifier, int from_step, int to_step) {
   Walk result;
   for (int step = from_step; step < to_step; ++step) {
     const KeyframeId id = scene.add_keyframe(step);
-    const std::optional<Revisit> revisit = verifier.verify_alike(scene.map, scene.places, id);
-    if (!revisit) continue;
+    const std::optional<LoopCandidate> candidate =
+        verifier.verify_alike(scene.map, scene.places, id);
+    if (!candidate) continue;
     if (++result.num_found > 1) continue;
     result.first_step = step;
-    result.first = revisit;
+    result.first = candidate;
   }
   return result;
 }
 
-void expect_true(const LoopScene& scene, const Revisit& revisit) {
-  const int query_step = scene.steps[revisit.query.value];
-  const int match_step = scene.steps[revisit.match.value];
+void expect_true(const LoopScene& scene, const LoopCandidate& candidate) {
+  const int query_step = scene.steps[candidate.query.value];
+  const int match_step = scene.steps[candidate.match.value];
   const Sim3 truth = scene.true_motion(query_step, match_step);
-  const Sim3 error = revisit.query_from_match * truth.inverse();
+  const Sim3 error = candidate.query_from_match * truth.inverse();
   // Lengths are in the units of the query, in which things are some 5 away. Landmarks drift while
   // they are seen.
   EXPECT_LT(error.translation.norm(), 0.1);
@@ -48,7 +49,7 @@ void expect_true(const LoopScene& scene, const Revisit& revisit) {
 
 TEST(VerifyAlikeTest, FindsTheWayBackDespiteDriftOfTheScale) {
   LoopScene scene(cloud_all_round(kNumPoints), false, drift_of(0.5, 0.1, std::log(1.3)));
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   const Walk result = walk(scene, verifier, 0, kRound + 4);
   ASSERT_TRUE(result.first);
   EXPECT_GE(result.first_step, kRound - 6) << "earlier no place is seen again";
@@ -60,7 +61,7 @@ TEST(VerifyAlikeTest, FindsTheWayBackDespiteDriftOfTheScale) {
 
 TEST(VerifyAlikeTest, KeepsTheScaleOfMetricMaps) {
   LoopScene scene(cloud_all_round(kNumPoints), true, drift_of(0.3, 0.05, 0.0));
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   const Walk result = walk(scene, verifier, 0, kRound + 3);
   ASSERT_TRUE(result.first);
   EXPECT_EQ(result.first->query_from_match.scale, 1.0);
@@ -69,11 +70,11 @@ TEST(VerifyAlikeTest, KeepsTheScaleOfMetricMaps) {
 
 TEST(VerifyAlikeTest, NamesLandmarksThatAreTheSame) {
   LoopScene scene(cloud_all_round(kNumPoints), false, Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   const Walk result = walk(scene, verifier, 0, kRound + 2);
   ASSERT_TRUE(result.first);
   int num_wrong = 0;
-  for (const Revisit::Pair& pair : result.first->pairs) {
+  for (const LoopCandidate::Pair& pair : result.first->pairs) {
     const Eigen::Vector3d& a = scene.map.landmarks().at(pair.of_query).position_in_world;
     const Eigen::Vector3d& b = scene.map.landmarks().at(pair.of_match).position_in_world;
     num_wrong += (a - b).norm() > 1e-9;  // Without drift they coincide.
@@ -83,25 +84,25 @@ TEST(VerifyAlikeTest, NamesLandmarksThatAreTheSame) {
 
 TEST(VerifyAlikeTest, RefusesATwinAsTheMapCannotHaveDriftedSoFar) {
   LoopScene scene(cloud_with_twins(kNumPoints), false, drift_of(0.1, 0.02, 0.02));
-  RevisitVerifier verifier(scene.rig, 1);
-  EvidenceCollector collector(scene.rig, 1);
+  LoopVerifier verifier(1);
+  CandidateScorer scorer(1);
   const Walk result = walk(scene, verifier, 0, kRound - 5);
   EXPECT_EQ(result.num_found, 0) << "no place was seen again, but half a round was seen twice";
   // By its looks and geometry it would have been one.
   const KeyframeId query{kRound / 2 + 3};
   const std::vector<KeyframeId> candidates = find_alike(scene.map, scene.places, query);
   ASSERT_FALSE(candidates.empty());
-  const auto evidence = collector.collect(scene.map, query, candidates.front());
-  ASSERT_TRUE(evidence);
-  EXPECT_GE(evidence->revisit.num_inliers, 100u);
-  EXPECT_GE(evidence->in_query.share(), 0.5);
-  EXPECT_FALSE(is_plausible_loop(scene.map, evidence->revisit));
-  EXPECT_NEAR(implied_drift(scene.map, evidence->revisit).distance, 2.0 * LoopScene::kRadius, 0.5);
+  const auto scored = scorer.score(scene.map, query, candidates.front());
+  ASSERT_TRUE(scored);
+  EXPECT_GE(scored->candidate.num_inliers, 100u);
+  EXPECT_GE(scored->in_query.share(), 0.5);
+  EXPECT_FALSE(is_plausible_loop(scene.map, scored->candidate));
+  EXPECT_NEAR(implied_drift(scene.map, scored->candidate).distance, 2.0 * LoopScene::kRadius, 0.5);
 }
 
 TEST(VerifyAlikeTest, FindsThePlaceInAnotherSubmapOfAnotherScale) {
   LoopScene scene(cloud_all_round(kNumPoints), false, Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   EXPECT_EQ(walk(scene, verifier, 0, 12).num_found, 0);
   Vector7d other_frame;
   other_frame << 3.0, 1.0, -2.0, 0.3, -0.5, 0.2, std::log(0.4);
@@ -116,7 +117,7 @@ TEST(VerifyAlikeTest, FindsThePlaceInAnotherSubmapOfAnotherScale) {
 
 TEST(VerifyAlikeTest, WantsConfirmationOfAnotherSubmap) {
   LoopScene scene(cloud_all_round(kNumPoints), false, Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   EXPECT_EQ(walk(scene, verifier, 0, 12).num_found, 0);
   scene.start_submap(Sim3());
   // The first keyframe of a sub-map has no neighbour that could confirm.
@@ -126,7 +127,7 @@ TEST(VerifyAlikeTest, WantsConfirmationOfAnotherSubmap) {
 
 TEST(VerifyAlikeTest, JoinsNothingAtAPlaceThatIsThereTwice) {
   LoopScene scene(cloud_with_twins(kNumPoints), false, Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   walk(scene, verifier, 0, 30);  // The second ten are like the first, in another place.
   scene.start_submap(Sim3());
   EXPECT_EQ(walk(scene, verifier, 2, 8).num_found, 0);
@@ -134,7 +135,7 @@ TEST(VerifyAlikeTest, JoinsNothingAtAPlaceThatIsThereTwice) {
 
 TEST(VerifyAlikeTest, JoinsAtAPlaceThatAnotherOneFaintlyResembles) {
   LoopScene scene(cloud_with_faint_twins(kNumPoints), true, Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   walk(scene, verifier, 0, 12);
   scene.start_submap(Sim3());
   EXPECT_EQ(walk(scene, verifier, 18, 30).num_found, 0) << "a fifth of what is there is the same";
@@ -161,7 +162,7 @@ TEST(FindAlikeTest, LeavesRoomForOtherSubmapsWhereMuchOfItsOwnLooksAlike) {
 
 TEST(VerifyAlikeTest, FindsThePlaceAmongEqualStretchesThatTheMapIsNearTo) {
   LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, drift_of(0.05, 0.01, 0.0));
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   const Walk result = walk(scene, verifier, 0, kRound + 4);
   ASSERT_TRUE(result.first);
   EXPECT_GE(result.first_step, kRound - 6);
@@ -172,7 +173,7 @@ TEST(VerifyAlikeTest, ClosesNoLoopAmongEqualStretchesIfTheMapMayLieAtAny) {
   // Stretches of 2.5 at a way of 25: were they not equal, the map might have drifted so far.
   const Vector7d drift = drift_of(0.9, 0.1, 0.0);
   LoopScene scene(cloud_of_equal_stretches(kNumPoints, 10), true, drift);
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   EXPECT_EQ(walk(scene, verifier, 0, kRound + 4).num_found, 0);
   LoopScene unequal(cloud_all_round(kNumPoints), true, drift);
   EXPECT_GT(walk(unequal, verifier, 0, kRound + 4).num_found, 0);
@@ -180,16 +181,16 @@ TEST(VerifyAlikeTest, ClosesNoLoopAmongEqualStretchesIfTheMapMayLieAtAny) {
 
 TEST(VerifyAlikeTest, SeesNothingWhereNothingIsSeenAgain) {
   LoopScene scene(cloud_all_round(kNumPoints), false, drift_of(0.5, 0.1, 0.1));
-  RevisitVerifier verifier(scene.rig, 1);
+  LoopVerifier verifier(1);
   EXPECT_EQ(walk(scene, verifier, 0, kRound - 8).num_found, 0);
 }
 
 /// As the mapper looks for what a closure brought together.
-std::optional<Revisit> find_beside_of(RevisitVerifier& verifier,
-                                      const LoopScene& scene,
-                                      KeyframeId query) {
-  const auto beside = find_beside(scene.map, query, {5, 0.8, 0.7});
-  return verifier.verify_beside(scene.map, query, beside);
+std::optional<LoopCandidate> verify_neighbours_of(LoopVerifier& verifier,
+                                                  const LoopScene& scene,
+                                                  KeyframeId query) {
+  const auto beside = find_spatial_neighbours(scene.map, query, {5, 0.8, 0.7});
+  return verifier.verify_spatial_neighbours(scene.map, query, beside);
 }
 
 /// A walk past its beginning, none of whose landmarks it knows again.
@@ -199,14 +200,14 @@ LoopScene walk_round(bool is_metric, const Vector7d& drift) {
   return scene;
 }
 
-class VerifyBesideTest : public ::testing::TestWithParam<bool> {};
+class VerifySpatialNeighboursTest : public ::testing::TestWithParam<bool> {};
 
-TEST_P(VerifyBesideTest, FindsWhatLiesBesideThePlace) {
+TEST_P(VerifySpatialNeighboursTest, FindsWhatLiesBesideThePlace) {
   const bool is_metric = GetParam();
   const double log_scale = is_metric ? 0.0 : 0.05;
   const LoopScene scene = walk_round(is_metric, drift_of(0.1, 0.01, log_scale));
-  RevisitVerifier verifier(scene.rig, 1);
-  const auto link = find_beside_of(verifier, scene, KeyframeId{kRound});
+  LoopVerifier verifier(1);
+  const auto link = verify_neighbours_of(verifier, scene, KeyframeId{kRound});
   ASSERT_TRUE(link);
   EXPECT_LT(link->match.value, 3u);
   EXPECT_GT(link->num_inliers, 100u);
@@ -219,37 +220,47 @@ TEST_P(VerifyBesideTest, FindsWhatLiesBesideThePlace) {
   EXPECT_NEAR(std::log(link->query_from_match.scale), log_scale, 0.01);
 }
 
-TEST_P(VerifyBesideTest, HasNothingToSayOfWhatIsKnown) {
+TEST_P(VerifySpatialNeighboursTest, HasNothingToSayOfWhatIsKnown) {
   const LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
-  RevisitVerifier verifier(scene.rig, 1);
-  EXPECT_FALSE(find_beside_of(verifier, scene, KeyframeId{kRound / 2}));
+  LoopVerifier verifier(1);
+  EXPECT_FALSE(verify_neighbours_of(verifier, scene, KeyframeId{kRound / 2}));
 }
 
-TEST_P(VerifyBesideTest, RefusesAPlaceThatLooksDifferent) {
+TEST_P(VerifySpatialNeighboursTest, RefusesAPlaceThatLooksDifferent) {
   LoopScene scene(cloud_all_round(kNumPoints), GetParam(), Vector7d::Zero());
   for (int step = 0; step < kRound / 2; ++step) scene.add_keyframe(step);
   PointCloud other = scatter_in({-11.0, -2.5, -11.0}, {11.0, 2.5, 11.0}, kNumPoints, 4.5, 77);
   scene.cloud = std::move(other);
   for (int step = kRound / 2; step <= kRound; ++step) scene.add_keyframe(step);
-  RevisitVerifier verifier(scene.rig, 1);
-  EXPECT_FALSE(find_beside_of(verifier, scene, KeyframeId{kRound}));
+  LoopVerifier verifier(1);
+  EXPECT_FALSE(verify_neighbours_of(verifier, scene, KeyframeId{kRound}));
 }
 
-TEST_P(VerifyBesideTest, LeavesKeyframesOfOtherRigsAlone) {
-  const LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
-  RevisitVerifier verifier(make_test_rig(1), 1);
-  EXPECT_FALSE(find_beside_of(verifier, scene, KeyframeId{kRound}));
+/// As if another rig had made a keyframe.
+void set_rig(KeyframeId id, std::shared_ptr<const Rig> rig, Map& map) {
+  auto features = std::make_shared<Features>(*map.keyframes().at(id).features);
+  features->rig = std::move(rig);
+  map.recompute_keyframe(id, std::move(features));
 }
 
-TEST_P(VerifyBesideTest, KnowsTheSameRigOfAnotherSession) {
-  const LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
-  RevisitVerifier verifier(std::make_shared<const Rig>(*scene.rig), 1);
-  EXPECT_TRUE(find_beside_of(verifier, scene, KeyframeId{kRound}));
+TEST_P(VerifySpatialNeighboursTest, LeavesKeyframesOfOtherRigsAlone) {
+  LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
+  set_rig(KeyframeId{kRound}, make_test_rig(1), scene.map);
+  LoopVerifier verifier(1);
+  EXPECT_FALSE(verify_neighbours_of(verifier, scene, KeyframeId{kRound}));
 }
 
-INSTANTIATE_TEST_SUITE_P(Maps, VerifyBesideTest, ::testing::Bool(), [](const auto& info) {
-  return info.param ? "metric" : "mono";
-});
+TEST_P(VerifySpatialNeighboursTest, KnowsTheSameRigOfAnotherSession) {
+  LoopScene scene = walk_round(GetParam(), Vector7d::Zero());
+  set_rig(KeyframeId{kRound}, std::make_shared<const Rig>(*scene.rig), scene.map);
+  LoopVerifier verifier(1);
+  EXPECT_TRUE(verify_neighbours_of(verifier, scene, KeyframeId{kRound}));
+}
+
+INSTANTIATE_TEST_SUITE_P(Maps,
+                         VerifySpatialNeighboursTest,
+                         ::testing::Bool(),
+                         [](const auto& info) { return info.param ? "metric" : "mono"; });
 
 }  // namespace
 }  // namespace waymark

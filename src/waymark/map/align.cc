@@ -50,7 +50,7 @@ Map put_into_metres(Map map, SubmapId submap, const Sim3& new_from_old) {
 }
 
 Eigen::Vector3d camera_position(const Keyframe& keyframe) {
-  return (keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world).origin_in_source();
+  return (keyframe.rig().cameras[0].cam_from_rig * keyframe.rig_from_world).origin_in_source();
 }
 
 namespace {

@@ -27,6 +27,7 @@ class MapAlign : public ::testing::Test {
     rig->cameras.push_back({nullptr, Rigid3({1.0, 0.0, 0.0, 0.0}, {0.1, 0.0, 0.3})});
     rig_ = rig;
     auto features = std::make_shared<Features>();
+    features->rig = rig_;
     features->keypoints.resize(2);
     features->num_primary = 2;
     features->partner.assign(2, kNoFeature);
@@ -44,7 +45,6 @@ class MapAlign : public ::testing::Test {
       keyframe.submap = submap;
       keyframe.parent = parent;
       keyframe.timestamp_ns = std::int64_t{1'000'000'000} * i;
-      keyframe.rig = rig_;
       keyframe.features = features_;
       const Rigid3 world_from_rig = Rigid3::exp(
           (Vector6d() << 0.3 * i, 0.02 * i * i, 0.1 * i, 0.05 * i, 0.0, 0.1).finished());

@@ -13,6 +13,7 @@ class CorrectionTest : public ::testing::Test {
  protected:
   void SetUp() override {
     auto features = std::make_shared<Features>();
+    features->rig = std::make_shared<Rig>();
     features->keypoints.resize(2);
     features->num_primary = 2;
     features->partner.assign(2, kNoFeature);
@@ -21,7 +22,6 @@ class CorrectionTest : public ::testing::Test {
       Keyframe keyframe;
       keyframe.submap = submap;
       if (i > 0) keyframe.parent = KeyframeId{static_cast<std::uint32_t>(i - 1)};
-      keyframe.rig = std::make_shared<Rig>();
       keyframe.features = features;
       keyframe.rig_from_world.translation = {-static_cast<double>(i), 0.0, 0.0};
       const KeyframeId id = map_.add_keyframe(keyframe);

@@ -127,7 +127,8 @@ SubmapId Map::add_submap(bool is_metric) {
 }
 
 KeyframeId Map::add_keyframe(Keyframe keyframe) {
-  WAYMARK_CHECK(keyframe.features && keyframe.rig && keyframe.submap.value < submaps_.size());
+  WAYMARK_CHECK(keyframe.features && keyframe.features->rig &&
+                keyframe.submap.value < submaps_.size());
   WAYMARK_CHECK(!keyframe.parent.is_valid() || keyframes_.find(keyframe.parent));
   keyframe.features = kept(std::move(keyframe.features));
   keyframe.landmarks.assign(keyframe.features->size(), LandmarkId{});
@@ -157,7 +158,9 @@ void Map::observe(KeyframeId keyframe, std::uint32_t feature, LandmarkId landmar
     }
   }
   keyframes_.edit(keyframe).landmarks[feature] = landmark;
-  auto& observations = landmarks_.edit(landmark).observations;
+  Landmark& observed = landmarks_.edit(landmark);
+  auto& observations = observed.observations;
+  if (observations.empty()) observed.reference = keyframe;
   const Observation observation{keyframe, feature};
   observations.insert(std::lower_bound(observations.begin(), observations.end(), observation),
                       observation);
@@ -228,13 +231,10 @@ void Map::move_keyframe(KeyframeId id, const Rigid3& rig_from_world) {
   keyframes_.edit(id).rig_from_world = rig_from_world;
 }
 
-void Map::measure_keyframe(KeyframeId id,
-                           std::shared_ptr<const Rig> rig,
-                           std::shared_ptr<const Features> features) {
-  WAYMARK_CHECK(rig && features && features->size() == keyframes_.at(id).features->size());
-  Keyframe& keyframe = keyframes_.edit(id);
-  keyframe.rig = std::move(rig);
-  keyframe.features = kept(std::move(features));
+void Map::recompute_keyframe(KeyframeId id, std::shared_ptr<const Features> features) {
+  WAYMARK_CHECK(features && features->rig);
+  WAYMARK_CHECK(features->size() == keyframes_.at(id).features->size());
+  keyframes_.edit(id).features = kept(std::move(features));
 }
 
 std::shared_ptr<const Features> Map::kept(std::shared_ptr<const Features> features) const {
@@ -262,27 +262,15 @@ void Map::drop_loop_edges(std::span<const std::uint8_t> is_kept) {
   std::erase_if(loop_edges_, [&](const LoopEdge&) { return is_kept[index++] == 0; });
 }
 
-KeyframeId Map::turn_around(KeyframeId child, KeyframeId top, KeyframeId parent) {
-  KeyframeId new_parent = parent;
-  for (KeyframeId id = child;;) {
-    const KeyframeId old_parent = std::exchange(keyframes_.edit(id).parent, new_parent);
-    if (id == top || !old_parent.is_valid()) return id;
-    new_parent = id;
-    id = old_parent;
-  }
-}
-
-void Map::rehang(KeyframeId top, KeyframeId child, KeyframeId parent) {
-  WAYMARK_CHECK(keyframes_.at(child).submap == keyframes_.at(parent).submap);
-  const KeyframeId end = turn_around(child, top, parent);
-  WAYMARK_CHECK(end == top);
-}
-
 void Map::join_submaps(KeyframeId child, KeyframeId parent) {
   const SubmapId from = keyframes_.at(child).submap;
   const SubmapId into = keyframes_.at(parent).submap;
   WAYMARK_CHECK(from != into && submaps_[from.value].is_metric == submaps_[into.value].is_metric);
-  turn_around(child, submaps_[from.value].root, parent);
+  KeyframeId above = parent;
+  for (KeyframeId id = child; id.is_valid();) {
+    const KeyframeId old_parent = std::exchange(keyframes_.edit(id).parent, above);
+    above = std::exchange(id, old_parent);
+  }
   std::vector<KeyframeId> keyframes;
   keyframes_.for_each([&](KeyframeId id, const Keyframe& keyframe) {
     if (keyframe.submap == from) keyframes.push_back(id);

@@ -34,12 +34,14 @@ struct Keyframe {
   /// Product of the scale corrections applied to this keyframe's surroundings; poses stored
   /// relative to it are rescaled by how much it changed since.
   double applied_scale = 1.0;
-  std::shared_ptr<const Rig> rig;            ///< The cameras that saw it; never null.
   std::shared_ptr<const Features> features;  ///< Never null.
   RigMotion motion;                          ///< At its time, as far as it is known.
   std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
   /// Markers that it sees; null where there are none or none were looked for.
   std::shared_ptr<const MarkerSightings> markers = nullptr;
+
+  /// The cameras that measured its features.
+  const Rig& rig() const { return *features->rig; }
 };
 
 /// A square marker that is known in the map, by where it lies to a keyframe: it moves with that.
@@ -283,7 +285,7 @@ class Map {
   LandmarkId add_landmark(SubmapId submap,
                           const Eigen::Vector3d& position_in_world,
                           KeyframeId reference);
-  /// Associates a free feature with a landmark.
+  /// Associates a free feature with a landmark. Who sees one that nobody sees is its reference.
   void observe(KeyframeId keyframe, std::uint32_t feature, LandmarkId landmark);
   /// Removes one association. The landmark stays, even without observations.
   void forget(KeyframeId keyframe, std::uint32_t feature);
@@ -297,10 +299,8 @@ class Map {
   void erase_keyframe(KeyframeId id);
   /// Sets the pose of a keyframe; the landmarks stay where they are.
   void move_keyframe(KeyframeId id, const Rigid3& rig_from_world);
-  /// Takes the features of a keyframe as measured by a rig that is calibrated otherwise.
-  void measure_keyframe(KeyframeId id,
-                        std::shared_ptr<const Rig> rig,
-                        std::shared_ptr<const Features> features);
+  /// Takes the same features of a keyframe as a rig measures them that is calibrated otherwise.
+  void recompute_keyframe(KeyframeId id, std::shared_ptr<const Features> features);
   /// Notes how the rig moved at a keyframe; its features stay as they are.
   void set_motion(KeyframeId id, const RigMotion& motion) { keyframes_.edit(id).motion = motion; }
   /// Sets the markers that a keyframe sees; null: none.
@@ -320,9 +320,6 @@ class Map {
   /// What belongs to one sub-map belongs to another from now on, and nothing moves: `child` of the
   /// first becomes its root and hangs below `parent` of the second.
   void join_submaps(KeyframeId child, KeyframeId parent);
-  /// What hangs below `top` in the spanning tree, with itself, hangs by `child`, one of these,
-  /// below `parent` from now on, which is of the same sub-map and none of these.
-  void rehang(KeyframeId top, KeyframeId child, KeyframeId parent);
   /// Sets the position of a landmark, in the frame of its sub-map.
   void move_landmark(LandmarkId id, const Eigen::Vector3d& position_in_world);
   /// Sets what a landmark looks like.
@@ -338,9 +335,6 @@ class Map {
  private:
   /// Drops what was merged so long ago that nobody asks any more.
   void forget_old_merges();
-  /// Hangs a keyframe below another one: the way from it up to `top` turns around. Returns the end
-  /// of that way.
-  KeyframeId turn_around(KeyframeId child, KeyframeId top, KeyframeId parent);
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
   std::shared_ptr<const Features> kept(std::shared_ptr<const Features> features) const;
   /// From scratch; what is associated but not there is passed over.

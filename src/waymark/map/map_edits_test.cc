@@ -80,7 +80,6 @@ enum class Edit {
   kAddLoopEdge,
   kDropLoopEdges,
   kNoteOdometry,
-  kRehang,
   kJoinSubmaps,
   kMoveLandmark,
   kSetAppearance,
@@ -175,8 +174,6 @@ class RandomEditor {
         return map.add_loop_edge({a, b, Sim3(random_pose())}), true;
       case Edit::kDropLoopEdges:
         return drop_loop_edges();
-      case Edit::kRehang:
-        return rehang(a, b);
       case Edit::kNoteOdometry:
         if (map.odometry().contains(a)) return false;
         return map.note_odometry(a, {KeyframeId{a.value - 1}, Sim3(random_pose())}), true;
@@ -184,24 +181,6 @@ class RandomEditor {
         if (is_one_part) return false;
         return map.join_submaps(a, b), true;
     }
-  }
-
-  bool rehang(KeyframeId child, KeyframeId parent) {
-    if (map.keyframes().at(child).submap != map.keyframes().at(parent).submap) return false;
-    std::vector<KeyframeId> above_parent;
-    for (KeyframeId id = parent; id.is_valid(); id = map.keyframes().at(id).parent) {
-      above_parent.push_back(id);
-    }
-    // The highest above the child that is not above the parent as well.
-    KeyframeId top;
-    for (KeyframeId id = child; std::ranges::count(above_parent, id) == 0;
-         id = map.keyframes().at(id).parent) {
-      top = id;
-    }
-    if (!top.is_valid()) return false;
-    map.rehang(top, child, parent);
-    EXPECT_EQ(map.keyframes().at(child).parent, parent);
-    return true;
   }
 
   bool drop_loop_edges() {
@@ -236,6 +215,7 @@ class RandomEditor {
 
   void add_keyframe(SubmapId submap, KeyframeId parent = {}) {
     auto features = std::make_shared<Features>();
+    features->rig = rig_;
     features->keypoints.resize(kNumFeatures);
     features->num_primary = kNumFeatures;
     Keyframe keyframe;
@@ -243,7 +223,6 @@ class RandomEditor {
     keyframe.submap = submap;
     keyframe.parent = parent;
     keyframe.rig_from_world = random_pose();
-    keyframe.rig = rig_;
     keyframe.features = features;
     map.add_keyframe(keyframe);
   }

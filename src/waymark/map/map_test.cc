@@ -9,12 +9,12 @@ namespace {
 
 Keyframe make_keyframe(std::size_t num_features, SubmapId submap, KeyframeId parent) {
   auto features = std::make_shared<Features>();
+  features->rig = std::make_shared<Rig>();
   features->keypoints.resize(num_features);
   features->num_primary = num_features;
   Keyframe keyframe;
   keyframe.submap = submap;
   keyframe.parent = parent;
-  keyframe.rig = std::make_shared<Rig>();
   keyframe.features = features;
   return keyframe;
 }

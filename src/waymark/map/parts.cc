@@ -46,7 +46,8 @@ Shift shift_behind(const MapParts& parts) {
 class RigPool {
  public:
   explicit RigPool(const MapParts& parts) {
-    for (const MapParts::StoredKeyframe& stored : parts.keyframes) share(stored.keyframe.rig);
+    for (const MapParts::StoredKeyframe& stored : parts.keyframes)
+      share(stored.keyframe.features->rig);
   }
 
   std::shared_ptr<const Rig> share(const std::shared_ptr<const Rig>& rig) {
@@ -85,7 +86,11 @@ void append_keyframes(const Map& map, const Shift& shift, MapParts& parts) {
     keyframe.frame = shift(keyframe.frame);
     keyframe.submap = shift(keyframe.submap);
     keyframe.parent = shift(keyframe.parent);
-    keyframe.rig = rigs.share(keyframe.rig);
+    if (auto rig = rigs.share(keyframe.features->rig); rig != keyframe.features->rig) {
+      auto features = std::make_shared<Features>(*keyframe.features);
+      features->rig = std::move(rig);
+      keyframe.features = std::move(features);
+    }
     for (LandmarkId& landmark : keyframe.landmarks) landmark = shift(landmark);
     parts.keyframes.push_back({shift(id), std::move(keyframe)});
   });
@@ -139,7 +144,7 @@ Map Map::restore(MapParts parts) {
   map.landmarks_.skip_to(parts.end_landmark);
   for (MapParts::StoredKeyframe& stored : parts.keyframes) {
     Keyframe& keyframe = stored.keyframe;
-    WAYMARK_CHECK(keyframe.features && keyframe.rig);
+    WAYMARK_CHECK(keyframe.features && keyframe.features->rig);
     for (std::uint32_t feature = 0; feature < keyframe.landmarks.size(); ++feature) {
       const LandmarkId landmark = keyframe.landmarks[feature];
       if (!map.landmarks_.contains(landmark)) continue;

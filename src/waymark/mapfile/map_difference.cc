@@ -11,7 +11,7 @@ bool is_same(const Rigid3& a, const Rigid3& b) {
 
 /// Whether what a file holds of a keyframe beside its features is the same.
 bool has_same_state(const Keyframe& a, const Keyframe& b) {
-  return a.rig == b.rig && a.submap == b.submap && a.parent == b.parent &&
+  return a.submap == b.submap && a.parent == b.parent &&
          is_same(a.rig_from_world, b.rig_from_world) && a.applied_scale == b.applied_scale &&
          a.landmarks == b.landmarks;
 }

@@ -107,8 +107,9 @@ void check_partner(const MapRecord& record, const Features& features, std::size_
 
 }  // namespace
 
-std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig) {
+std::shared_ptr<const Features> read_features(MapRecord& record, std::shared_ptr<const Rig> rig) {
   auto features = std::make_shared<Features>();
+  features->rig = std::move(rig);
   features->keypoints = read_keypoints(record);
   const std::size_t count = features->size();
   features->descriptors = array_of<Descriptor>(record, "descriptor", std::nullopt);
@@ -128,12 +129,14 @@ std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig)
   features->inverse_range_sigma =
       array_of<float>(record, "inverse_range_sigma", num_primary, kNotNegative);
   for (std::size_t i = 0; i < count; ++i) {
-    check_keypoint(record, rig, *features, i);
+    check_keypoint(record, *features->rig, *features, i);
     check_partner(record, *features, i);
     if (i < num_primary) check_range(record, *features, i);
   }
-  if (lacks_precision(*features) && rig.cameras.size() == 2) measure_stereo_ranges(rig, *features);
-  const Camera& camera = *rig.cameras[0].camera;
+  if (lacks_precision(*features) && features->rig->cameras.size() == 2) {
+    measure_stereo_ranges(*features->rig, *features);
+  }
+  const Camera& camera = *features->rig->cameras[0].camera;
   features->grid =
       FeatureGrid(camera.width_px(),
                   camera.height_px(),

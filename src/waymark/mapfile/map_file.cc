@@ -4,9 +4,8 @@
 
 #include <fmt/format.h>
 
-#include <fstream>
-
 #include "waymark/base/check.h"
+#include "waymark/base/regular_file.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_reader.h"
 #include "waymark/mapfile/map_record_stream.h"
@@ -92,17 +91,7 @@ void read_journal(std::istream& stream,
 }
 
 std::ifstream open_map(const std::filesystem::path& path) {
-  std::error_code error;
-  const std::filesystem::file_status status = std::filesystem::status(path, error);
-  if (!std::filesystem::exists(status)) {
-    throw InputError(path.string(), "missing, expected a map file");
-  }
-  if (!std::filesystem::is_regular_file(status)) {
-    throw InputError(path.string(), "is no regular file, expected a map file");
-  }
-  std::ifstream stream(path, std::ios::binary);
-  if (!stream) throw InputError(path.string(), "cannot be read, expected a map file");
-  return stream;
+  return open_regular_file(path, "a map file");
 }
 
 /// Everything but how the parts of the map fit together. The journal may be null.

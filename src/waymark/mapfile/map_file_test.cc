@@ -45,11 +45,11 @@ void expect_same(const Keyframe& a, const Keyframe& b) {
   EXPECT_EQ(a.rig_from_world.matrix(), b.rig_from_world.matrix());
   EXPECT_EQ(a.applied_scale, b.applied_scale);
   EXPECT_EQ(a.landmarks, b.landmarks);
-  ASSERT_EQ(a.rig->cameras.size(), b.rig->cameras.size());
-  for (std::size_t i = 0; i < a.rig->cameras.size(); ++i) {
-    EXPECT_TRUE(a.rig->cameras[i].description->is_same(*b.rig->cameras[i].description));
-    EXPECT_EQ(a.rig->cameras[i].cam_from_rig.matrix(), b.rig->cameras[i].cam_from_rig.matrix());
-    EXPECT_EQ(a.rig->cameras[i].camera->model(), b.rig->cameras[i].camera->model());
+  ASSERT_EQ(a.rig().cameras.size(), b.rig().cameras.size());
+  for (std::size_t i = 0; i < a.rig().cameras.size(); ++i) {
+    EXPECT_TRUE(a.rig().cameras[i].description->is_same(*b.rig().cameras[i].description));
+    EXPECT_EQ(a.rig().cameras[i].cam_from_rig.matrix(), b.rig().cameras[i].cam_from_rig.matrix());
+    EXPECT_EQ(a.rig().cameras[i].camera->model(), b.rig().cameras[i].camera->model());
   }
 }
 
@@ -234,19 +234,20 @@ TEST(MapFile, KeepsCamerasOfRegisteredModels) {
   Map map;
   Keyframe keyframe;
   keyframe.submap = map.add_submap(false);
-  keyframe.rig = std::make_shared<const Rig>(make_rig(chain, registry));
-  keyframe.features = std::make_shared<const Features>();
+  auto features = std::make_shared<Features>();
+  features->rig = std::make_shared<const Rig>(make_rig(chain, registry));
+  keyframe.features = features;
   map.add_keyframe(keyframe);
   StoredMap stored;
   stored.map = map.freeze();
   const TemporaryFolder folder;
   save_map(folder / "mine.wmap", stored);
   const StoredMap loaded = load_map(folder / "mine.wmap", registry);
-  EXPECT_EQ(loaded.map->keyframes().at(KeyframeId{0}).rig->cameras[0].description->intrinsics,
+  EXPECT_EQ(loaded.map->keyframes().at(KeyframeId{0}).rig().cameras[0].description->intrinsics,
             std::vector<double>{123.0});
   // Without the model the map is kept as it is.
   const StoredMap kept = load_map(folder / "mine.wmap");
-  const Camera& camera = *kept.map->keyframes().at(KeyframeId{0}).rig->cameras[0].camera;
+  const Camera& camera = *kept.map->keyframes().at(KeyframeId{0}).rig().cameras[0].camera;
   EXPECT_FALSE(camera.can_project());
   EXPECT_THAT(input_error_of([&] { camera.unproject({}, {}, {}); }),
               HasSubstr("mine.wmap: camera 0: camera_model is mine, expected one of"));
@@ -262,8 +263,9 @@ TEST(MapFile, RefusesCamerasWithoutDescription) {
   keyframe.submap = map.add_submap(false);
   auto rig = std::make_shared<Rig>();
   rig->cameras.push_back({nullptr, Rigid3()});
-  keyframe.rig = rig;
-  keyframe.features = std::make_shared<const Features>();
+  auto features = std::make_shared<Features>();
+  features->rig = rig;
+  keyframe.features = features;
   map.add_keyframe(keyframe);
   StoredMap stored;
   stored.map = map.freeze();

@@ -211,31 +211,32 @@ void MapReader::read_keyframe(MapRecord& record) {
   Keyframe& keyframe = stored.keyframe;
   keyframe.frame = FrameId{static_cast<std::uint32_t>(record.whole("frame", UINT32_MAX))};
   keyframe.timestamp_ns = record.signed_whole("timestamp_ns");
+  keyframe.features = read_features(record, read_rig(record));
   read_state(record, keyframe);
-  keyframe.features = read_features(record, *keyframe.rig);
-  read_landmarks_of(record, keyframe);
-  keyframe.markers = read_markers(record, *keyframe.rig);
+  keyframe.markers = read_markers(record, keyframe.rig());
   put(record, parts_.keyframes, std::move(stored));
 }
 
 void MapReader::read_keyframe_state(MapRecord& record) {
   const auto at = find_row(parts_.keyframes, KeyframeId{static_cast<std::uint32_t>(id_)});
   if (at == parts_.keyframes.end()) record.fail("expected the id of a keyframe");
-  const std::size_t num_cameras = at->keyframe.rig->cameras.size();
-  read_state(record, at->keyframe);
-  if (at->keyframe.rig->cameras.size() < num_cameras) {
-    record.fail("has a rig of fewer cameras, expected those that its features are of");
+  if (read_rig(record) != at->keyframe.features->rig) {
+    record.fail("has another rig, expected the one that its features are of");
   }
-  read_landmarks_of(record, at->keyframe);
+  read_state(record, at->keyframe);
+}
+
+std::shared_ptr<const Rig> MapReader::read_rig(MapRecord& record) const {
+  return rigs_[record.whole("rig", rigs_.size() - 1)];
 }
 
 /// What the mapper may change.
 void MapReader::read_state(MapRecord& record, Keyframe& keyframe) {
-  keyframe.rig = rigs_[record.whole("rig", rigs_.size() - 1)];
   keyframe.submap = record.id<SubmapId>("submap", parts_.submaps.size());
   keyframe.parent = record.id<KeyframeId>("parent", parts_.end_keyframe.value);
   keyframe.rig_from_world = record.transform("rig_from_world");
   keyframe.applied_scale = record.number("applied_scale", kScaleRange);
+  read_landmarks_of(record, keyframe);
 }
 
 std::vector<LandmarkId> MapReader::read_landmark_ids(MapRecord& record, LandmarkId& last) const {
@@ -334,10 +335,11 @@ void MapReader::read_image(MapRecord& record) {
   auto jpeg = std::make_shared<const std::string>(record.bytes("jpeg"));
   const std::optional<ImageSize> size = size_in_header(*jpeg);
   if (size && is_too_large(*size)) {
-    record.fail(fmt::format("jpeg is {}x{} px, expected at most {} megapixels",
+    record.fail(fmt::format("jpeg is {}x{} px, expected at most {} megapixels and {} px a side",
                             size->width_px,
                             size->height_px,
-                            kMaxMegapixels));
+                            kMaxMegapixels,
+                            kMaxSidePx));
   }
   stored_.images.insert_or_assign(keyframe, std::move(jpeg));
 }

@@ -14,7 +14,7 @@
 namespace waymark {
 
 /// Reads the features of a keyframe that the rig made. Throws InputError for what cannot be.
-std::shared_ptr<const Features> read_features(MapRecord& record, const Rig& rig);
+std::shared_ptr<const Features> read_features(MapRecord& record, std::shared_ptr<const Rig> rig);
 
 /// Reads the markers that a keyframe of a rig sees; null where it has none. Throws InputError for
 /// what cannot be.
@@ -48,6 +48,7 @@ class MapReader {
   void read_submap(MapRecord& record);
   void read_keyframe(MapRecord& record);
   void read_keyframe_state(MapRecord& record);
+  std::shared_ptr<const Rig> read_rig(MapRecord& record) const;
   void read_state(MapRecord& record, Keyframe& keyframe);
   void read_landmarks(MapRecord& record);
   void read_erased_landmarks(MapRecord& record);

@@ -178,7 +178,7 @@ void write_camera(MapRecordWriter& writer,
 
 /// What the mapper may change in a keyframe.
 void add_state(MapRecordWriter& writer, const Keyframe& keyframe, const RigTable& rigs) {
-  writer.add("rig", rigs.index_of(*keyframe.rig));
+  writer.add("rig", rigs.index_of(keyframe.rig()));
   writer.add_id("submap", keyframe.submap);
   writer.add_id("parent", keyframe.parent);
   writer.add_transform("rig_from_world", keyframe.rig_from_world);
@@ -197,10 +197,10 @@ bool RigTable::contains(const Rig& rig) const {
 void RigTable::add(const Map& map) {
   const Rig* last = nullptr;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    if (keyframe.rig.get() == last) return;
-    last = keyframe.rig.get();
+    if (&keyframe.rig() == last) return;
+    last = &keyframe.rig();
     check_cameras(*last);
-    if (!contains(*last)) rigs_.push_back(keyframe.rig);
+    if (!contains(*last)) rigs_.push_back(keyframe.features->rig);
   });
 }
 

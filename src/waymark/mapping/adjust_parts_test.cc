@@ -7,7 +7,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {

@@ -51,7 +51,7 @@ Appearance describe_landmark(const Map& map, LandmarkId id) {
     const Keyframe& keyframe = map.keyframes().at(observation.keyframe);
     const Features& features = *keyframe.features;
     if (observation.feature >= features.num_primary) continue;
-    const Rigid3 cam_from_world = keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+    const Rigid3 cam_from_world = keyframe.rig().cameras[0].cam_from_rig * keyframe.rig_from_world;
     const Eigen::Vector3d to_camera =
         cam_from_world.origin_in_source() - landmark.position_in_world;
     const double distance = to_camera.norm();

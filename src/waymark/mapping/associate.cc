@@ -10,7 +10,7 @@ std::optional<double> squared_residual(const Keyframe& keyframe,
                                        std::uint32_t feature,
                                        const Eigen::Vector3d& point_in_world) {
   const Features& features = *keyframe.features;
-  const RigCamera& camera = keyframe.rig->cameras[features.keypoints[feature].camera];
+  const RigCamera& camera = keyframe.rig().cameras[features.keypoints[feature].camera];
   const Eigen::Vector3d predicted =
       (camera.cam_from_rig * (keyframe.rig_from_world * point_in_world)).normalized();
   const Eigen::Vector3d measured = features.bearings[feature].cast<double>();
@@ -28,7 +28,7 @@ bool agrees(const Keyframe& keyframe,
 
 int add_landmarks_from_range(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
   const std::shared_ptr<const Features> features = map.keyframes().at(id).features;
-  const std::shared_ptr<const Rig> rig = map.keyframes().at(id).rig;
+  const std::shared_ptr<const Rig> rig = map.keyframes().at(id).features->rig;
   const SubmapId submap = map.keyframes().at(id).submap;
   const Rigid3 world_from_cam =
       (rig->cameras[0].cam_from_rig * map.keyframes().at(id).rig_from_world).inverse();

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/image/range_precision.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {

@@ -29,7 +29,7 @@ Measurement measurement_of(const Keyframe& keyframe,
                            const Eigen::Vector3d& point_in_world) {
   Measurement measured = keyframe.features->measurement(feature);
   if (!(measured.inverse_range_sigma > 0.0f)) return measured;
-  const Rigid3& cam_from_rig = keyframe.rig->cameras[measured.camera].cam_from_rig;
+  const Rigid3& cam_from_rig = keyframe.rig().cameras[measured.camera].cam_from_rig;
   const InverseRangePoint seen = in_inverse_range(cam_from_rig * (rig_from_world * point_in_world));
   const double off = range_residual(seen, measured.inverse_range, measured.inverse_range_sigma);
   if (std::abs(off) > kMaxRangeSigmas) measured.inverse_range_sigma = 0.0f;
@@ -121,7 +121,7 @@ WindowProblem make_problem(const Map& map,
     const auto* const moved = start ? start->find(id) : nullptr;
     problem.rig_from_world.push_back(moved ? moved->rig_from_world
                                            : map.keyframes().at(id).rig_from_world);
-    problem.rigs.push_back(map.keyframes().at(id).rig.get());
+    problem.rigs.push_back(map.keyframes().at(id).features->rig.get());
     problem.is_pose_fixed.push_back(index_of(window.moving, id) == window.moving.size());
   }
   for (LandmarkId id : window.landmarks) {

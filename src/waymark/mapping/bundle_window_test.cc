@@ -7,7 +7,7 @@
 #include <algorithm>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -181,7 +181,7 @@ TEST_P(BundleWindowTest, LeavesOutRangesOfSomethingElse) {
   Keyframe keyframe = scene_.map.keyframes().at(last());
   auto features = std::make_shared<Features>(*keyframe.features);
   for (std::uint32_t i = 0; i < features->num_primary; i += 3) features->range_m[i] *= 0.5f;
-  scene_.map.measure_keyframe(last(), keyframe.rig, features);
+  scene_.map.recompute_keyframe(last(), features);
   adjust_window(scene_.map, choose_window(scene_.map, last(), 4), {}, dirty_);
   EXPECT_LT(place_error(), 0.003);
 }

@@ -17,7 +17,8 @@ namespace {
 /// The intrinsics act linearly in an adjustment: it is repeated until they move no more.
 constexpr int kMaxPasses = 15;
 /// An estimate so many standard deviations from what was given is no chance: of exact calibrations
-/// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5 (docs/decisions.md).
+/// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5
+/// (docs/decisions/calibrate.md).
 constexpr double kMinSigmas = 7.0;
 /// Parts of a way with fewer keyframes share most of what they see, err alike, and scatter by less
 /// than they err, in the ratio of the numbers.
@@ -312,7 +313,7 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   if (largest_change(trial, known, is_free) < kMinChange) return std::nullopt;
   problem.rig_from_world = adjusted.rig_from_world;
   problem.points = adjusted.points;
-  measure_anew(map, observed, *known.rig, *trial.rig, problem);
+  recompute(map, observed, *known.rig, trial.rig, problem);
   KnownCalibration found = known;
   found.rig = std::move(trial.rig);
   found.change = std::move(trial.change);

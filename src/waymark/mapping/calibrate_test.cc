@@ -6,7 +6,7 @@
 
 #include "waymark/map/parts.h"
 #include "waymark/mapping/global_adjustment.h"
-#include "waymark/mapping/test_calibration.h"
+#include "waymark/mapping/testing/calibration.h"
 
 namespace waymark {
 namespace {

@@ -86,23 +86,23 @@ void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem) {
   }
 }
 
-void measure_anew(const Map& map,
-                  std::span<const Observation> observed,
-                  const Rig& before,
-                  const Rig& rig,
-                  BundleProblem& problem) {
+void recompute(const Map& map,
+               std::span<const Observation> observed,
+               const Rig& before,
+               const std::shared_ptr<const Rig>& rig,
+               BundleProblem& problem) {
   std::map<KeyframeId, std::shared_ptr<const Features>> features;
   for (std::size_t i = 0; i < observed.size(); ++i) {
     BundleObservation& observation = problem.observations[i];
     if (problem.rigs[observation.pose] != &before) continue;
     std::shared_ptr<const Features>& anew = features[observed[i].keyframe];
     const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
-    if (!anew) anew = measure_anew(*keyframe.features, rig, keyframe.motion);
+    if (!anew) anew = recompute(*keyframe.features, rig, keyframe.motion);
     const bool has_range = observation.inverse_range_sigma > 0.0f;
     static_cast<Measurement&>(observation) = anew->measurement(observed[i].feature);
     if (!has_range) observation.inverse_range_sigma = 0.0f;
   }
-  use_rig(before, rig, problem);
+  use_rig(before, *rig, problem);
 }
 
 }  // namespace waymark

@@ -50,10 +50,10 @@ void use_rig(const Rig& before, const Rig& rig, BundleProblem& problem);
 
 /// The observations of a problem, `observed` in the map, as a rig calibrated otherwise makes them.
 /// Ranges that the problem leaves out stay left out.
-void measure_anew(const Map& map,
-                  std::span<const Observation> observed,
-                  const Rig& before,
-                  const Rig& rig,
-                  BundleProblem& problem);
+void recompute(const Map& map,
+               std::span<const Observation> observed,
+               const Rig& before,
+               const std::shared_ptr<const Rig>& rig,
+               BundleProblem& problem);
 
 }  // namespace waymark

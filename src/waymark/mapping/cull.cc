@@ -9,7 +9,7 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kProbationKeyframes = 3;
+constexpr std::size_t kRecentKeyframes = 3;
 constexpr double kMinFoundRatio = 0.25;
 /// A keyframe is redundant when this part of its landmarks is seen by that many others.
 constexpr double kRedundantRatio = 0.92;
@@ -55,7 +55,7 @@ bool is_redundant(const Map& map, KeyframeId id) {
 
 }  // namespace
 
-void Probation::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dirty) {
+void RecentLandmarks::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dirty) {
   std::erase_if(entries_, [&](const Entry& entry) {
     const Landmark* landmark = map.landmarks().find(entry.landmark);
     if (!landmark) return true;
@@ -65,7 +65,7 @@ void Probation::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dir
       dirty.erase(entry.landmark);
       return true;
     }
-    return age >= kProbationKeyframes;
+    return age >= kRecentKeyframes;
   });
 }
 

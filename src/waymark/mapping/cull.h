@@ -10,8 +10,8 @@
 
 namespace waymark {
 
-/// Landmarks on probation: made recently and not yet confirmed by later frames.
-class Probation {
+/// Landmarks that were made recently and not yet confirmed by later frames.
+class RecentLandmarks {
  public:
   void add(LandmarkId landmark, std::size_t keyframe_count) {
     entries_.push_back({landmark, keyframe_count});

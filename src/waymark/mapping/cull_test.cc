@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -17,6 +17,7 @@ class Cull : public ::testing::Test {
 
   Cull() {
     auto features = std::make_shared<Features>();
+    features->rig = rig_;
     features->num_primary = kNumFeatures;
     features->keypoints.resize(kNumFeatures);
     features->descriptors.resize(kNumFeatures);
@@ -33,7 +34,6 @@ class Cull : public ::testing::Test {
       keyframe.submap = submap;
       keyframe.rig_from_world.translation.x() = -0.1 * k;
       if (k > 0) keyframe.parent = KeyframeId{k - 1};
-      keyframe.rig = rig_;
       keyframe.features = features;
       map_.add_keyframe(std::move(keyframe));
     }
@@ -87,12 +87,12 @@ TEST_F(Cull, KeepsKeyframesThatSeeWhatFewOthersSee) {
 
 TEST_F(Cull, ProbationErasesWhatIsRarelyFound) {
   for (std::uint32_t k = 0; k < 4; ++k) observe_all(k);
-  Probation probation;
-  probation.add(landmarks_[0], 4);
-  probation.add(landmarks_[1], 4);
+  RecentLandmarks recent_landmarks;
+  recent_landmarks.add(landmarks_[0], 4);
+  recent_landmarks.add(landmarks_[1], 4);
   map_.count_sightings(landmarks_[0], 20, 4);
   map_.count_sightings(landmarks_[1], 20, 5);
-  probation.review(map_, 5, dirty_);
+  recent_landmarks.review(map_, 5, dirty_);
   EXPECT_FALSE(map_.landmarks().contains(landmarks_[0]));
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[1]));
   EXPECT_EQ(map_.broken_invariants(), "");
@@ -101,23 +101,23 @@ TEST_F(Cull, ProbationErasesWhatIsRarelyFound) {
 TEST_F(Cull, ProbationErasesWhatTooFewKeyframesSawInTime) {
   for (std::uint32_t k = 0; k < 3; ++k) map_.observe(KeyframeId{k}, 0, landmarks_[0]);
   for (std::uint32_t k = 0; k < 2; ++k) map_.observe(KeyframeId{k}, 1, landmarks_[1]);
-  Probation probation;
-  probation.add(landmarks_[0], 1);
-  probation.add(landmarks_[1], 1);
-  probation.review(map_, 2, dirty_);
+  RecentLandmarks recent_landmarks;
+  recent_landmarks.add(landmarks_[0], 1);
+  recent_landmarks.add(landmarks_[1], 1);
+  recent_landmarks.review(map_, 2, dirty_);
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[1])) << "too early to tell";
-  probation.review(map_, 3, dirty_);
+  recent_landmarks.review(map_, 3, dirty_);
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[0]));
   EXPECT_FALSE(map_.landmarks().contains(landmarks_[1]));
 }
 
 TEST_F(Cull, ProbationEndsForThoseThatStoodTheTest) {
   for (std::uint32_t k = 0; k < 3; ++k) map_.observe(KeyframeId{k}, 0, landmarks_[0]);
-  Probation probation;
-  probation.add(landmarks_[0], 1);
-  probation.review(map_, 4, dirty_);
+  RecentLandmarks recent_landmarks;
+  recent_landmarks.add(landmarks_[0], 1);
+  recent_landmarks.review(map_, 4, dirty_);
   map_.count_sightings(landmarks_[0], 100, 0);
-  probation.review(map_, 5, dirty_);
+  recent_landmarks.review(map_, 5, dirty_);
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[0]));
 }
 

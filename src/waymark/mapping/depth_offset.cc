@@ -13,7 +13,7 @@
 namespace waymark {
 namespace {
 
-/// As for other numbers of a calibration: see docs/decisions.md.
+/// As for other numbers of a calibration: see docs/decisions/calibrate.md.
 constexpr double kMinOffsetSigmas = 7.0;
 constexpr double kMinOffsetChange = 2.0;
 constexpr int kNumPasses = 3;
@@ -102,7 +102,7 @@ std::optional<KnownCalibration> find_depth_offset(const Map& map,
   found.depth_offset_sigma = sigma;
   problem.rig_from_world = adjusted.rig_from_world;
   problem.points = adjusted.points;
-  measure_anew(map, observed, *known.rig, *found.rig, problem);
+  recompute(map, observed, *known.rig, found.rig, problem);
   return found;
 }
 

@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/mapping/global_adjustment.h"
-#include "waymark/mapping/test_calibration.h"
+#include "waymark/mapping/testing/calibration.h"
 
 namespace waymark {
 namespace {

@@ -62,8 +62,8 @@ void fuse_into(Map& map,
                DirtyLandmarks& dirty) {
   const LandmarkSet landmarks = seen_only_by(map, sources, target);
   const std::shared_ptr<const Features> features = map.keyframes().at(target).features;
-  matcher.look_with(map.keyframes().at(target).rig);
-  const ProjectionMatches& matches = matcher.match(landmarks,
+  const ProjectionMatches& matches = matcher.match(*features->rig,
+                                                   landmarks,
                                                    *features,
                                                    {},
                                                    map.keyframes().at(target).rig_from_world,

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -12,7 +12,7 @@ namespace {
 /// Three keyframes with associations, of which tests take some away or apart.
 class FuseTest : public ::testing::Test {
  protected:
-  FuseTest() : scene_(1, cloud_ahead(), {.seed = 9}, false), matcher_(scene_.rig) {
+  FuseTest() : scene_(1, cloud_ahead(), {.seed = 9}, false) {
     for (const double x : {0.0, 0.2, 0.4}) newest_ = scene_.add_keyframe(pose_at(x));
   }
 

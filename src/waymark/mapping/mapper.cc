@@ -11,7 +11,6 @@
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"
-#include "waymark/mapping/seen_through.h"
 #include "waymark/mapping/triangulate.h"
 #include "waymark/mapping/triangulate_edges.h"
 #include "waymark/marker/detect.h"
@@ -35,8 +34,7 @@ Mapper::Mapper(std::shared_ptr<const Rig> rig,
                const CalibrationSettings& calibration)
     : settings_(settings),
       is_calibrating_(calibration.is_refined() && CalibrationParameters(*rig).size() > 0),
-      calibration_(KnownCalibration::as_given(rig, calibration.refine == "on")),
-      projection_(std::move(rig)) {
+      calibration_(KnownCalibration::as_given(std::move(rig), calibration.refine == "on")) {
   calibration_.min_keyframes = kMinCalibrationKeyframes;
 }
 
@@ -47,7 +45,7 @@ void Mapper::keep_features_in(std::shared_ptr<std::pmr::memory_resource> memory)
   map_.keyframes().for_each([&](KeyframeId id, const Keyframe&) { ids.push_back(id); });
   for (const KeyframeId id : ids) {
     const Keyframe& keyframe = map_.keyframes().at(id);
-    map_.measure_keyframe(id, keyframe.rig, keyframe.features);
+    map_.recompute_keyframe(id, keyframe.features);
   }
 }
 
@@ -60,16 +58,13 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
     keyframe.timestamp_ns = initial.timestamp_ns;
     keyframe.submap = submap;
     keyframe.rig_from_world = initial.rig_from_world;
-    keyframe.rig = calibration_.rig;
-    keyframe.features = measured(initial.features, message.rig);
-    keyframe.motion = initial.features->motion;
-    keyframe.markers = measured(initial.markers, message.rig);
+    set_measurements(initial.features, initial.markers, keyframe);
     if (!ids.empty()) keyframe.parent = ids.back();
     ids.push_back(map_.add_keyframe(std::move(keyframe)));
   }
   for (const InitialLandmark& initial : message.landmarks) {
     const LandmarkId id = map_.add_landmark(submap, initial.position_in_world, ids.back());
-    for (std::size_t k = 0; k < ids.size(); ++k) {
+    for (std::size_t k = ids.size(); k-- > 0;) {  // The reference first.
       if (initial.features[k] != kNoFeature) {
         map_.observe(ids[k], initial.features[k], id);
       }
@@ -82,13 +77,13 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
 
 Mapper::Changes Mapper::add(const NewKeyframe& message) {
   const KeyframeId id = insert(message);
-  probation_.review(map_, id.value, dirty_);
+  recent_landmarks_.review(map_, id.value, dirty_);
   const LandmarkId first_new = map_.landmarks().end_id();
   add_landmarks_from_range(map_, id, dirty_);
   triangulate_with_neighbours(map_, id, epipolar_, dirty_);
   triangulate_edges(map_, id, dirty_);
   for (std::uint32_t value = first_new.value; value < map_.landmarks().end_id().value; ++value) {
-    probation_.add(LandmarkId{value}, id.value);
+    recent_landmarks_.add(LandmarkId{value}, id.value);
   }
   refresh_appearances();
   fuse_with_neighbours(map_, id, projection_, dirty_);
@@ -109,7 +104,7 @@ void Mapper::look_for_readout(KeyframeId newest) {
   const SubmapId submap = map_.keyframes().at(newest).submap;
   const auto found = waymark::look_for_readout(map_, whole_submap(map_, submap), calibration_);
   if (!found) return;
-  look_with(*found);
+  set_calibration(*found);
   apply(adjust_globally(map_, submap));
 }
 
@@ -128,10 +123,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
   keyframe.applied_scale = map_.keyframes().at(keyframe.parent).applied_scale;
   keyframe.rig_from_world = map_.rig_from_world(
       message.pose.reference, message.pose.rig_from_reference, message.pose.reference_scale);
-  keyframe.rig = calibration_.rig;
-  keyframe.features = measured(message.features, message.rig);
-  keyframe.motion = message.features->motion;
-  keyframe.markers = measured(message.markers, message.rig);
+  set_measurements(message.features, message.markers, keyframe);
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
   for (std::uint32_t i = 0; i < message.features->num_primary; ++i) {
     const LandmarkId landmark = map_.resolve(message.landmarks[i]);
@@ -145,30 +137,25 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
   return id;
 }
 
-/// Features as the calibration of now measures them.
-std::shared_ptr<const Features> Mapper::measured(const std::shared_ptr<const Features>& features,
-                                                 const std::shared_ptr<const Rig>& rig) const {
-  if (!rig || rig == calibration_.rig) return features;
-  return measure_anew(*features, *calibration_.rig, features->motion);
+void Mapper::set_measurements(const std::shared_ptr<const Features>& features,
+                              const std::shared_ptr<const MarkerSightings>& markers,
+                              Keyframe& keyframe) const {
+  keyframe.motion = features->motion;
+  const bool is_up_to_date = features->rig == calibration_.rig;
+  keyframe.features =
+      is_up_to_date ? features : recompute(*features, calibration_.rig, features->motion);
+  keyframe.markers = is_up_to_date ? markers : recompute(markers, *calibration_.rig);
 }
 
-std::shared_ptr<const MarkerSightings> Mapper::measured(
-    const std::shared_ptr<const MarkerSightings>& markers,
-    const std::shared_ptr<const Rig>& rig) const {
-  if (!rig || rig == calibration_.rig) return markers;
-  return measure_anew(markers, *calibration_.rig);
-}
-
-void Mapper::look_with(const KnownCalibration& calibration) {
+void Mapper::set_calibration(const KnownCalibration& calibration) {
   std::vector<KeyframeId> seen_so;
   map_.keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
-    if (keyframe.rig == calibration_.rig) seen_so.push_back(id);
+    if (keyframe.features->rig == calibration_.rig) seen_so.push_back(id);
   });
   for (const KeyframeId id : seen_so) {
     const Keyframe& keyframe = map_.keyframes().at(id);
-    map_.measure_keyframe(
-        id, calibration.rig, measure_anew(*keyframe.features, *calibration.rig, keyframe.motion));
-    map_.set_sightings(id, measure_anew(map_.keyframes().at(id).markers, *calibration.rig));
+    map_.recompute_keyframe(id, recompute(*keyframe.features, calibration.rig, keyframe.motion));
+    map_.set_sightings(id, recompute(map_.keyframes().at(id).markers, *calibration.rig));
     for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
       if (landmark.is_valid()) dirty_.insert(landmark);
     }
@@ -180,16 +167,12 @@ void Mapper::set_motion(KeyframeId id, const RigMotion& motion) {
   map_.set_motion(id, motion);
   const Keyframe& keyframe = map_.keyframes().at(id);
   // That of a global shutter matters only once the shutter turns out to be none.
-  if (keyframe.rig->cameras[0].readout_s == 0.0) return;
-  map_.measure_keyframe(id, keyframe.rig, moved(keyframe.features, *keyframe.rig, motion));
-}
-
-void Mapper::drop_seen_through() {
-  for (LandmarkId id : find_seen_through(map_)) map_.erase_landmark(id);
+  if (keyframe.rig().cameras[0].readout_s == 0.0) return;
+  map_.recompute_keyframe(id, moved(keyframe.features, motion));
 }
 
 void Mapper::apply(const GlobalAdjustment& adjustment) {
-  if (adjustment.calibration) look_with(*adjustment.calibration);
+  if (adjustment.calibration) set_calibration(*adjustment.calibration);
   apply_adjustment(map_, adjustment, dirty_);
   refresh_appearances();
 }

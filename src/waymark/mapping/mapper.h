@@ -42,8 +42,6 @@ class Mapper {
   void set_motion(KeyframeId id, const RigMotion& motion);
   /// Takes in what adjusting a whole sub-map gave.
   void apply(const GlobalAdjustment& adjustment);
-  /// Erases the landmarks on what is gone; see find_seen_through().
-  void drop_seen_through();
 
   /// For what reaches beyond the surroundings of the newest keyframe: change(map, dirty), which
   /// says what landmarks look different after it.
@@ -62,13 +60,12 @@ class Mapper {
 
  private:
   KeyframeId insert(const NewKeyframe& message);
-  std::shared_ptr<const Features> measured(const std::shared_ptr<const Features>& features,
-                                           const std::shared_ptr<const Rig>& rig) const;
-  std::shared_ptr<const MarkerSightings> measured(
-      const std::shared_ptr<const MarkerSightings>& markers,
-      const std::shared_ptr<const Rig>& rig) const;
+  /// Puts in what was measured, by the calibration of now.
+  void set_measurements(const std::shared_ptr<const Features>& features,
+                        const std::shared_ptr<const MarkerSightings>& markers,
+                        Keyframe& keyframe) const;
   void look_for_readout(KeyframeId newest);
-  void look_with(const KnownCalibration& calibration);
+  void set_calibration(const KnownCalibration& calibration);
   void refresh_appearances();
 
   const MappingSettings settings_;
@@ -77,7 +74,7 @@ class Mapper {
   std::shared_ptr<std::pmr::memory_resource> feature_memory_;  ///< Null: where they come from.
   Map map_;
   DirtyLandmarks dirty_;
-  Probation probation_;
+  RecentLandmarks recent_landmarks_;
   ProjectionMatcher projection_;
   EpipolarMatcher epipolar_;
 };

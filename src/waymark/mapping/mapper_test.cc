@@ -7,10 +7,10 @@
 #include <cmath>
 
 #include "waymark/geometry/alignment.h"
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 #include "waymark/optimize/bundle.h"
 #include "waymark/simulate/motion.h"
-#include "waymark/track/tracker.h"
+#include "waymark/track/testing/tracked.h"
 #include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
@@ -61,22 +61,22 @@ Session run(const Setup& setup) {
   const PointNoise noise = make_noise(setup);
   TrackingSettings settings;
   settings.keyframe_parallax_px = 30.0;  // Several keyframes in a short walk.
-  Tracker tracker(rig, setup.has_range, settings, 1);
+  Tracker tracker(setup.has_range, settings, 1);
   Mapper mapper(rig, MappingSettings{});
   std::vector<std::pair<std::uint32_t, std::shared_ptr<const Map>>> published;
   std::shared_ptr<const Map> visible = std::make_shared<const Map>();
   Session session;
-  TrajectoryMemory memory(rig);
+  TrajectoryMemory memory;
   for (std::uint32_t i = 0; i < kNumFrames; ++i) {
     while (!published.empty() && published.front().first <= i) {
       visible = published.front().second;
       published.erase(published.begin());
     }
-    const PointObservation seen = observe(cloud, *rig, truth(static_cast<int>(i)), noise, i);
-    StageTimes times;
+    const PointObservation seen = observe(cloud, rig, truth(static_cast<int>(i)), noise, i);
     const Frame frame{FrameId{i}, 50'000'000 * std::int64_t{i}, seen.features};
-    TrackOutcome outcome =
-        tracker.track(frame, {visible, std::make_shared<const PlaceIndex>()}, times);
+    Tracked outcome;
+    outcome.message =
+        tracker.track(frame, {visible, std::make_shared<const PlaceIndex>()}, outcome);
     memory.add(frame, outcome, *visible);
     if (outcome.num_inliers > 0 && !outcome.covariance.isZero()) {
       session.position_variances.push_back(outcome.covariance.topLeftCorner<3, 3>().trace());
@@ -90,7 +90,7 @@ Session run(const Setup& setup) {
   mapper.refine_globally(false);
   session.broken.push_back(mapper.map().broken_invariants());
   session.map = mapper.freeze();
-  memory.settle(*session.map);
+  memory.settle(*rig, *session.map);
   for (const TrajectoryMemory::Entry& entry : memory.entries()) {
     session.states.push_back(entry.state);
     session.poses.push_back(entry.pose());
@@ -155,7 +155,9 @@ double announced_error(const Session& session) {
 
 /// All sightings of all landmarks by a part of the frames, as only the simulator knows them, at the
 /// true poses and points.
-BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
+BundleProblem perfect_problem(const Setup& setup,
+                              const std::shared_ptr<const Rig>& rig,
+                              int every) {
   const PointCloud cloud = make_cloud();
   BundleProblem problem;
   std::vector<std::vector<BundleObservation>> sightings(cloud.landmarks.size());
@@ -170,7 +172,7 @@ BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
     }
     problem.is_pose_fixed.push_back(problem.rig_from_world.empty());
     problem.rig_from_world.push_back(truth(i).inverse());
-    problem.rigs.push_back(&rig);
+    problem.rigs.push_back(rig.get());
   }
   for (std::size_t landmark = 0; landmark < sightings.size(); ++landmark) {
     if (sightings[landmark].size() < 2) continue;
@@ -188,7 +190,7 @@ BundleProblem perfect_problem(const Setup& setup, const Rig& rig, int every) {
 double least_error(const Setup& setup) {
   constexpr int kEvery = 4;
   const auto rig = make_test_rig(setup.num_cameras);
-  BundleProblem problem = perfect_problem(setup, *rig, kEvery);
+  BundleProblem problem = perfect_problem(setup, rig, kEvery);
   adjust_bundle(problem, {.num_rounds = 1});
   std::vector<Vector3d> estimated, expected;
   for (std::size_t i = 0; i < problem.rig_from_world.size(); ++i) {

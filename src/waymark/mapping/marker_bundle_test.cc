@@ -21,7 +21,8 @@ class MarkerBundleTest : public ::testing::Test {
  protected:
   MarkerBundleTest() {
     const SubmapId submap = map_.add_submap(false);
-    const auto rig = std::make_shared<const Rig>(Rig{.cameras = {RigCamera{}}});
+    auto features = std::make_shared<Features>();
+    features->rig = std::make_shared<const Rig>(Rig{.cameras = {RigCamera{}}});
     for (int k = 0; k < 6; ++k) {
       const Eigen::Quaterniond turn(Eigen::AngleAxisd(0.1 * (k - 3), Eigen::Vector3d::UnitY()));
       const Rigid3 truth(turn, {0.3 * (3 - k), 0.02 * k, 0.0});
@@ -30,8 +31,7 @@ class MarkerBundleTest : public ::testing::Test {
       keyframe.timestamp_ns = k;
       keyframe.submap = submap;
       keyframe.rig_from_world = {truth.rotation, kWrongScale * truth.translation};
-      keyframe.rig = rig;
-      keyframe.features = std::make_shared<const Features>();
+      keyframe.features = features;
       if (k > 0) keyframe.parent = KeyframeId{static_cast<std::uint32_t>(k - 1)};
       keyframe.markers = std::make_shared<const MarkerSightings>(MarkerSightings{
           testing::make_sighting(4, truth * hung_, kSide, 0.05, static_cast<std::uint64_t>(k))});
@@ -44,7 +44,7 @@ class MarkerBundleTest : public ::testing::Test {
     BundleProblem problem;
     for (const KeyframeId id : keyframes_) {
       problem.rig_from_world.push_back(map_.keyframes().at(id).rig_from_world);
-      problem.rigs.push_back(map_.keyframes().at(id).rig.get());
+      problem.rigs.push_back(map_.keyframes().at(id).features->rig.get());
       problem.is_pose_fixed.push_back(id == keyframes_.front());
     }
     return problem;

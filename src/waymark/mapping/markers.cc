@@ -18,7 +18,7 @@ std::map<int, std::vector<MarkerView>> list_views(const Map& map, SubmapId subma
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     if (keyframe.submap != submap || !keyframe.markers) return;
     for (const MarkerSighting& sighting : *keyframe.markers) {
-      const Rigid3& cam_from_rig = keyframe.rig->cameras[sighting.camera].cam_from_rig;
+      const Rigid3& cam_from_rig = keyframe.rig().cameras[sighting.camera].cam_from_rig;
       views[sighting.id].push_back(
           {cam_from_rig * keyframe.rig_from_world, keyframe.timestamp_ns, &sighting});
     }

@@ -15,11 +15,11 @@
 namespace waymark {
 namespace {
 
-/// As for other numbers of a calibration: see docs/decisions.md.
+/// As for other numbers of a calibration: see docs/decisions/calibrate.md.
 constexpr double kMinReadoutSigmas = 7.0;
 constexpr double kMinReadoutChange = 2.0;
 /// Where none was given, shorter ones and those from the bottom up are taken for other errors:
-/// rectified images of cars on the road look like -7 ms (docs/decisions.md).
+/// rectified images of cars on the road look like -7 ms (docs/decisions/calibrate.md).
 constexpr double kMinReadoutS = 7.5e-3;
 /// No camera needs longer for its rows.
 constexpr double kMaxReadoutS = 0.1;

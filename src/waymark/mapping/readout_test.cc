@@ -7,7 +7,7 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/mapping/global_adjustment.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -38,10 +38,10 @@ class ReadoutTest : public ::testing::Test {
       motion.turn_rad_s = {0.3f * (k % 3 - 1.0f), 0.5f * (k % 4 - 1.5f), 0.2f * (k % 5 - 2.0f)};
       // To bend an image is to correct it for a shutter that rolls upwards.
       const auto bent =
-          moved(scene.map.keyframes().at(id).features, *make_rolling(-readout_s), motion);
+          recompute(*scene.map.keyframes().at(id).features, make_rolling(-readout_s), motion);
       Features seen = *bent;
       seen.readout_s = {};
-      scene.map.measure_keyframe(id, told, measure_anew(seen, *told, motion));
+      scene.map.recompute_keyframe(id, recompute(seen, told, motion));
       scene.map.set_motion(id, motion);
     }
     const KnownCalibration known = KnownCalibration::as_given(told);

@@ -41,7 +41,7 @@ std::optional<Eigen::Vector3d> triangulate_match(const Keyframe& a,
                                       b_from_a.inverse(),
                                       kMinParallaxRad);
   if (!point_in_a) return std::nullopt;
-  const Rigid3 world_from_a = (a.rig->cameras[0].cam_from_rig * a.rig_from_world).inverse();
+  const Rigid3 world_from_a = (a.rig().cameras[0].cam_from_rig * a.rig_from_world).inverse();
   const Eigen::Vector3d point = world_from_a * *point_in_a;
   if (!point.allFinite() || !agrees(a, match.a, point) || !agrees(b, match.b, point)) {
     return std::nullopt;
@@ -60,8 +60,8 @@ std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
   for (KeyframeId neighbour : strongest_neighbours(map, id, kMaxTriangulationNeighbours)) {
     const Keyframe a = map.keyframes().at(id);
     const Keyframe b = map.keyframes().at(neighbour);
-    const Rigid3 b_from_a = (b.rig->cameras[0].cam_from_rig * b.rig_from_world) *
-                            (a.rig->cameras[0].cam_from_rig * a.rig_from_world).inverse();
+    const Rigid3 b_from_a = (b.rig().cameras[0].cam_from_rig * b.rig_from_world) *
+                            (a.rig().cameras[0].cam_from_rig * a.rig_from_world).inverse();
     if (b_from_a.translation.norm() < kMinBaselineRatio * distance) continue;
     const auto matches = matcher.match(*a.features,
                                        taken_features(a),

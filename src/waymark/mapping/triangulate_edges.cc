@@ -55,7 +55,7 @@ std::vector<SeenEdge> free_edges(const Keyframe& keyframe) {
 }
 
 Rigid3 camera_pose(const Keyframe& keyframe) {
-  return keyframe.rig->cameras[0].cam_from_rig * keyframe.rig_from_world;
+  return keyframe.rig().cameras[0].cam_from_rig * keyframe.rig_from_world;
 }
 
 /// Where a point may be, by a neighbour.

@@ -8,7 +8,7 @@
 #include <numbers>
 
 #include "waymark/image/feature_geometry.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -41,6 +41,7 @@ class TriangulateEdges : public ::testing::Test {
 
   void add_keyframe(const Rigid3& world_from_rig) {
     auto features = std::make_shared<Features>();
+    features->rig = rig_;
     const Rigid3 rig_from_world = world_from_rig.inverse();
     features->keypoints.push_back(seen(rig_from_world, {0.0, 0.0, 4.0}, 0.0f));
     for (const UprightLine& line : lines_) {
@@ -61,7 +62,6 @@ class TriangulateEdges : public ::testing::Test {
     keyframe.submap = submap_;
     keyframe.rig_from_world = rig_from_world;
     if (newest_.is_valid()) keyframe.parent = newest_;
-    keyframe.rig = rig_;
     keyframe.features = features;
     newest_ = map_.add_keyframe(std::move(keyframe));
   }

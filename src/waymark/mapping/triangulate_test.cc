@@ -6,7 +6,7 @@
 
 #include <cmath>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {

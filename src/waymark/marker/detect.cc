@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "waymark/camera/tangent.h"
+#include "waymark/image/opencv_image.h"
 #include "waymark/marker/outline.h"
 #include "waymark/marker/pattern_fit.h"
 
@@ -104,15 +105,9 @@ MarkerSightings MarkerDetector::detect(ImageView image,
                                        std::uint8_t camera_index) const {
   MarkerSightings sightings;
   if (image.width_px < 8 || image.height_px < 8) return sightings;
-  // OpenCV wants a pointer to non-const values, but does not write to them.
-  const cv::Mat mat(image.height_px,
-                    image.width_px,
-                    CV_8UC1,
-                    const_cast<std::uint8_t*>(image.data),
-                    static_cast<std::size_t>(image.stride));
   std::vector<std::vector<cv::Point2f>> outlines;
   std::vector<int> ids;
-  cv::aruco::detectMarkers(mat,
+  cv::aruco::detectMarkers(mat_of(image),
                            cv::aruco::getPredefinedDictionary(family_.opencv_dictionary()),
                            outlines,
                            ids,
@@ -154,7 +149,7 @@ MarkerSightings MarkerDetector::confirm(ImageView image,
   return sightings;
 }
 
-std::shared_ptr<const MarkerSightings> measure_anew(
+std::shared_ptr<const MarkerSightings> recompute(
     const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig) {
   if (!sightings) return nullptr;
   auto anew = std::make_shared<MarkerSightings>();

@@ -51,7 +51,7 @@ class MarkerDetector {
 
 /// The same sightings as a rig that is calibrated otherwise measures their pixels, without those
 /// that it has no bearings of; null as it was.
-std::shared_ptr<const MarkerSightings> measure_anew(
+std::shared_ptr<const MarkerSightings> recompute(
     const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig);
 
 }  // namespace waymark

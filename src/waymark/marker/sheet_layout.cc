@@ -14,6 +14,9 @@
 namespace waymark {
 namespace {
 
+constexpr double kSheetMarginMm = 8.0;  ///< That printers leave white.
+constexpr double kRulerMm = 100.0;
+constexpr double kLineMm = 0.2;
 constexpr double kCaptionMm = 9.0;  ///< Below a marker.
 constexpr double kFooterMm = 14.0;  ///< With the ruler.
 
@@ -51,42 +54,55 @@ Grid grid_for(const MarkerFamily& family, double size_m, const Paper& paper) {
                   paper.height_mm));
 }
 
-std::vector<SheetBox> white_boxes(const MarkerFamily& family, int id, const SheetBox& black) {
+/// The black square and, on it, what is white; modules beside each other are one box.
+void add_marker(const MarkerFamily& family, int id, const SheetBox& black, SheetPage& page) {
   const int count = family.side_modules();
   const double module_mm = black.width_mm / count;
   const std::vector<std::uint8_t> modules = family.modules(id);
-  std::vector<SheetBox> boxes;
+  page.boxes.push_back(black);
   for (int row = 0; row < count; ++row) {
     for (int column = 0; column < count;) {
       int end = column;
       while (end < count && modules[static_cast<std::size_t>(row * count + end)]) ++end;
       if (end > column) {
-        boxes.push_back({black.x_mm + column * module_mm,
-                         black.y_mm + row * module_mm,
-                         (end - column) * module_mm,
-                         module_mm});
+        page.boxes.push_back({black.x_mm + column * module_mm,
+                              black.y_mm + row * module_mm,
+                              (end - column) * module_mm,
+                              module_mm,
+                              true});
       }
       column = end + 1;
     }
   }
-  return boxes;
 }
 
-SheetPage lay_out_page(const MarkerFamily& family, const Grid& grid, std::span<const int> ids) {
+void add_ruler(const Paper& paper, SheetPage& page) {
+  const double y_mm = paper.height_mm - kSheetMarginMm - 4.0;
+  page.boxes.push_back({kSheetMarginMm, y_mm - 0.5 * kLineMm, kRulerMm, kLineMm});
+  for (int tick = 0; tick <= 10; ++tick) {
+    const double x_mm = kSheetMarginMm + 0.1 * tick * kRulerMm;
+    page.boxes.push_back({x_mm - 0.5 * kLineMm, y_mm - 2.0, kLineMm, 2.0});
+  }
+  page.texts.push_back(
+      {kSheetMarginMm + kRulerMm + 3.0, y_mm, "100 mm: print at 100 %, measure the black squares"});
+}
+
+SheetPage lay_out_page(const MarkerFamily& family,
+                       const Grid& grid,
+                       std::span<const int> ids,
+                       const Paper& paper) {
   SheetPage page;
   for (std::size_t i = 0; i < ids.size(); ++i) {
     const int column = static_cast<int>(i) % grid.columns;
     const int row = static_cast<int>(i) / grid.columns;
-    const SheetBox black = {grid.first_mm + column * grid.column_mm(),
-                            grid.first_mm + row * grid.row_mm(),
-                            grid.size_mm,
-                            grid.size_mm};
-    page.push_back({ids[i],
-                    black,
-                    white_boxes(family, ids[i], black),
-                    fmt::format("{} {}, {:.1f} mm", family.name(), ids[i], grid.size_mm),
-                    black.y_mm + grid.size_mm + 0.5 * grid.quiet_mm + 3.6});
+    const double x_mm = grid.first_mm + column * grid.column_mm();
+    const double y_mm = grid.first_mm + row * grid.row_mm();
+    add_marker(family, ids[i], {x_mm, y_mm, grid.size_mm, grid.size_mm}, page);
+    page.texts.push_back({x_mm,
+                          y_mm + grid.size_mm + 0.5 * grid.quiet_mm + 3.6,
+                          fmt::format("{} {}, {:.1f} mm", family.name(), ids[i], grid.size_mm)});
   }
+  add_ruler(paper, page);
   return page;
 }
 
@@ -107,7 +123,7 @@ std::vector<SheetPage> lay_out_sheets(const MarkerFamily& family,
   std::vector<SheetPage> pages;
   for (std::size_t first = 0; first < ids.size(); first += per_page) {
     const std::size_t count = std::min(per_page, ids.size() - first);
-    pages.push_back(lay_out_page(family, grid, ids.subspan(first, count)));
+    pages.push_back(lay_out_page(family, grid, ids.subspan(first, count), paper));
   }
   return pages;
 }

@@ -30,9 +30,9 @@ TEST(SheetTest, WhatDoesNotFitGoesToFurtherPages) {
   const std::vector<int> ids = {0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12};
   const auto pages = marker_sheets(MarkerFamily("tag36h11"), 0.05, ids);
   ASSERT_EQ(pages.size(), 2u);
-  EXPECT_THAT(pages[0], HasSubstr("marker-8\""));
-  EXPECT_THAT(pages[0], Not(HasSubstr("marker-12\"")));
-  EXPECT_THAT(pages[1], HasSubstr("marker-12\""));
+  EXPECT_THAT(pages[0], HasSubstr("tag36h11 8,"));
+  EXPECT_THAT(pages[0], Not(HasSubstr("tag36h11 12,")));
+  EXPECT_THAT(pages[1], HasSubstr("tag36h11 12,"));
 }
 
 TEST(SheetTest, APdfHasAllPagesAndItsTableSaysWhereItsObjectsBegin) {

@@ -9,7 +9,7 @@
 #include <numeric>
 #include <set>
 
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -17,7 +17,7 @@ namespace {
 class AppearanceTest : public ::testing::Test {
  protected:
   PointObservation see(const Rigid3& world_from_rig, std::uint64_t frame) const {
-    return observe(cloud_, *rig_, world_from_rig, PointNoise(), frame);
+    return observe(cloud_, rig_, world_from_rig, PointNoise(), frame);
   }
 
   std::span<const FeatureMatch> match_all(const Features& a, const Features& b) {

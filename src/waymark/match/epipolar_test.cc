@@ -8,7 +8,7 @@
 #include <map>
 #include <numbers>
 
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -28,8 +28,8 @@ class Epipolar : public ::testing::TestWithParam<Vector3d> {
     PointNoise noise;
     noise.max_features = 3000;
     b_from_a_ = a_from_b.inverse();
-    a_ = observe(cloud_, *rig_, Rigid3(), noise, 0);
-    b_ = observe(cloud_, *rig_, a_from_b, noise, 1);
+    a_ = observe(cloud_, rig_, Rigid3(), noise, 0);
+    b_ = observe(cloud_, rig_, a_from_b, noise, 1);
   }
 
   /// Angle between the rays to a landmark, in pixels of the coarser feature's level.

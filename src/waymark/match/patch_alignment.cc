@@ -11,6 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/sample.h"
+#include "waymark/image/small_image.h"
 #include "waymark/match/correlation.h"
 
 namespace waymark {
@@ -52,13 +53,13 @@ bool has_contrast(const Correlation& pairs, double min_variance) {
 
 }  // namespace
 
-PatchAligner::PatchAligner(std::shared_ptr<const Camera> camera, double factor)
-    : camera_(std::move(camera)), factor_(factor) {}
-
-void PatchAligner::build_levels() {
-  double factor = factor_;
+void PatchAligner::build_levels(const std::shared_ptr<const Camera>& camera) {
+  if (camera_ == camera) return;
+  camera_ = camera;
+  levels_.clear();
+  double factor = detail_factor(camera->width_px(), camera->height_px());
   for (std::size_t i = 0; i < kNumPatchLevels; ++i, factor *= 0.5) {
-    levels_.push_back(ScaledCamera::resized(camera_, factor));
+    levels_.emplace_back(camera_, factor);
   }
 }
 
@@ -272,14 +273,15 @@ void PatchAligner::choose_alike(PatchAlignment& alignment) const {
   std::ranges::sort(alignment.alike);
 }
 
-PatchAlignment PatchAligner::align(const Image& a,
+PatchAlignment PatchAligner::align(const std::shared_ptr<const Camera>& camera,
+                                   const Image& a,
                                    std::span<const Eigen::Vector3d> points_in_a,
                                    const Image& b,
                                    const Rigid3& initial_b_from_a) {
   PatchAlignment alignment;
   alignment.b_from_a = initial_b_from_a;
   information_.setZero();
-  if (levels_.empty()) build_levels();
+  build_levels(camera);
   a_.assign(1, a);
   b_.assign(1, b);
   while (a_.size() < kNumPatchLevels) {

@@ -25,7 +25,7 @@ struct PatchAlignment {
   /// Indices of points whose own patch is alike in both, spread over the image, ascending.
   std::vector<std::uint32_t> alike;
 
-  /// Whether it tells where the camera is; see docs/decisions.md.
+  /// Whether it tells where the camera is; see docs/decisions/track.md.
   bool is_certain() const { return alike.size() >= 15 && correlation >= 0.7 && pixel_sigma <= 0.3; }
 };
 
@@ -36,11 +36,10 @@ struct PatchAlignment {
 /// point.
 class PatchAligner {
  public:
-  /// camera: what all images are of, in full size; they are handed in reduced by the factor.
-  PatchAligner(std::shared_ptr<const Camera> camera, double factor);
-
+  /// camera: what both images are of, in full size; they are handed in reduced by detail_factor().
   /// points_in_a: in the camera's frame when it saw image a, in metres (map units in mono).
-  PatchAlignment align(const Image& a,
+  PatchAlignment align(const std::shared_ptr<const Camera>& camera,
+                       const Image& a,
                        std::span<const Eigen::Vector3d> points_in_a,
                        const Image& b,
                        const Rigid3& initial_b_from_a);
@@ -62,7 +61,7 @@ class PatchAligner {
     std::vector<float> greys;         ///< Less the patch's mean.
   };
 
-  void build_levels();
+  void build_levels(const std::shared_ptr<const Camera>& camera);
   /// Fills candidates_.
   void choose_candidates(std::span<const Eigen::Vector3d> points_in_a);
   /// Fills patches_ and points_.
@@ -79,9 +78,8 @@ class PatchAligner {
   void judge(PatchAlignment& alignment);
   void choose_alike(PatchAlignment& alignment) const;
 
-  std::shared_ptr<const Camera> camera_;
-  double factor_;
-  std::vector<ScaledCamera> levels_;  ///< Fine to coarse; made when first used.
+  std::shared_ptr<const Camera> camera_;  ///< Of the levels.
+  std::vector<ScaledCamera> levels_;      ///< Fine to coarse.
   std::vector<Image> a_, b_;
   std::vector<std::uint32_t> candidates_;  ///< Of the points that image a shows, ascending.
   Patches patches_;

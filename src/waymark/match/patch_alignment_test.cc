@@ -21,7 +21,6 @@ namespace waymark {
 namespace {
 
 constexpr int kSizePx = 480;
-constexpr double kFactor = 0.5;
 
 /// Each pixel the mean over so many to its right, as a camera that turns smears them.
 Image blurred_along(const Image& image, int num_px) {
@@ -44,11 +43,11 @@ class PatchAlignmentTest : public ::testing::TestWithParam<std::string> {
   PatchAlignmentTest()
       : camera_(
             CameraRegistry::with_builtin_models().make_camera(named_camera(GetParam(), kSizePx))),
-        renderer_(make_world("room", 3), camera_),
-        aligner_(camera_, kFactor) {}
+        renderer_(make_world("room", 3), camera_) {}
 
   Image look(const Rigid3& world_from_cam) {
-    return reduce(renderer_.image(world_from_cam, pool_).view(), kFactor);
+    const Image image = renderer_.image(world_from_cam, pool_);
+    return reduce(image.view(), detail_factor(image.width_px, image.height_px));
   }
 
   std::vector<Eigen::Vector3d> points(const Rigid3& world_from_cam) {
@@ -81,7 +80,7 @@ TEST_P(PatchAlignmentTest, FindsTheMotionInBlurredAndDarkerImages) {
   Image after = look(here_ * motion);
   for (std::uint8_t& grey : after.values) grey = static_cast<std::uint8_t>(10 + grey / 2);
   after = blurred_along(after, 5);
-  const PatchAlignment found = aligner_.align(before, points(here_), after, {});
+  const PatchAlignment found = aligner_.align(camera_, before, points(here_), after, {});
   EXPECT_TRUE(found.is_certain()) << found.correlation << " " << found.pixel_sigma;
   const Rigid3 error = found.b_from_a * motion;
   EXPECT_LT(error.translation.norm(), 0.01);
@@ -90,7 +89,8 @@ TEST_P(PatchAlignmentTest, FindsTheMotionInBlurredAndDarkerImages) {
 
 TEST_P(PatchAlignmentTest, IsNotCertainOfAnotherPlace) {
   const Rigid3 elsewhere = pose_of({{2.5, 2.0, 1.5}, 190.0, -6.0, 0.0});
-  EXPECT_FALSE(aligner_.align(look(here_), points(here_), look(elsewhere), {}).is_certain());
+  EXPECT_FALSE(
+      aligner_.align(camera_, look(here_), points(here_), look(elsewhere), {}).is_certain());
 }
 
 TEST_P(PatchAlignmentTest, IsNotCertainWhereThereIsNothingToSee) {
@@ -99,8 +99,8 @@ TEST_P(PatchAlignmentTest, IsNotCertainWhereThereIsNothingToSee) {
   for (Image* blank : {&before, &after}) {
     for (std::uint8_t& grey : blank->values) grey = static_cast<std::uint8_t>(80 + rng.below(5));
   }
-  EXPECT_FALSE(aligner_.align(before, points(here_), after, {}).is_certain());
-  EXPECT_FALSE(aligner_.align(look(here_), {}, look(here_), {}).is_certain());
+  EXPECT_FALSE(aligner_.align(camera_, before, points(here_), after, {}).is_certain());
+  EXPECT_FALSE(aligner_.align(camera_, look(here_), {}, look(here_), {}).is_certain());
 }
 
 INSTANTIATE_TEST_SUITE_P(

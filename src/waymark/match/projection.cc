@@ -28,20 +28,21 @@ constexpr double kUnitsPerPx = 256.0;
 
 }  // namespace
 
-ProjectionMatcher::ProjectionMatcher(std::shared_ptr<const Rig> rig) { look_with(rig); }
-
-void ProjectionMatcher::look_with(const std::shared_ptr<const Rig>& rig) {
-  const auto at =
-      std::find_if(views_.begin(), views_.end(), [&](const View& view) { return view.rig == rig; });
-  current_view_ = static_cast<std::size_t>(at - views_.begin());
-  if (at == views_.end()) views_.push_back({rig, PixelAngles(*rig->cameras.at(0).camera)});
+void ProjectionMatcher::set_view(const Rig& rig) {
+  const RigCamera& camera = rig.cameras.at(0);
+  auto at = std::ranges::find(views_, camera.camera, &View::camera);
+  if (at == views_.end()) at = views_.insert(at, {camera.camera, PixelAngles(*camera.camera)});
+  view_ = &*at;
+  cam_from_rig_ = camera.cam_from_rig;
 }
 
-const ProjectionMatches& ProjectionMatcher::match(const LandmarkSet& landmarks,
+const ProjectionMatches& ProjectionMatcher::match(const Rig& rig,
+                                                  const LandmarkSet& landmarks,
                                                   const Features& features,
                                                   std::span<const std::uint8_t> is_taken,
                                                   const Rigid3& rig_from_world,
                                                   const ProjectionOptions& options) {
+  set_view(rig);
   project(landmarks, rig_from_world, options.min_direction_cos);
   matches_.features.assign(landmarks.size(), kNoFeature);
   matches_.num_matches = 0;
@@ -64,8 +65,7 @@ void ProjectionMatcher::project(const LandmarkSet& landmarks,
                                 const Rigid3& rig_from_world,
                                 double min_direction_cos) {
   const std::size_t count = landmarks.size();
-  const RigCamera& camera = view().rig->cameras[0];
-  const Rigid3 cam_from_world = camera.cam_from_rig * rig_from_world;
+  const Rigid3 cam_from_world = cam_from_rig_ * rig_from_world;
   const Eigen::Matrix3d rotation = cam_from_world.rotation_matrix();
   const Eigen::Vector3d centre = cam_from_world.origin_in_source();
   points_in_cam_.resize(count);
@@ -74,7 +74,7 @@ void ProjectionMatcher::project(const LandmarkSet& landmarks,
   for (std::size_t i = 0; i < count; ++i) {
     points_in_cam_[i] = rotation * landmarks.positions_in_world[i] + cam_from_world.translation;
   }
-  camera.camera->project(points_in_cam_, pixels_, matches_.is_visible);
+  view_->camera->project(points_in_cam_, pixels_, matches_.is_visible);
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Vector3d to_camera = centre - landmarks.positions_in_world[i];
     matches_.is_visible[i] &=
@@ -87,8 +87,7 @@ void ProjectionMatcher::project_edges(const LandmarkSet& landmarks,
                                       const Rigid3& rig_from_world) {
   edges_.clear();
   beside_in_cam_.clear();
-  const RigCamera& camera = view().rig->cameras[0];
-  const Eigen::Matrix3d cam_from_world = (camera.cam_from_rig * rig_from_world).rotation_matrix();
+  const Eigen::Matrix3d cam_from_world = (cam_from_rig_ * rig_from_world).rotation_matrix();
   for (std::uint32_t i = 0; i < landmarks.size(); ++i) {
     if (landmarks.across[i].isZero()) continue;
     matches_.is_visible[i] &= features.num_edges > 0;
@@ -101,7 +100,7 @@ void ProjectionMatcher::project_edges(const LandmarkSet& landmarks,
   beside_px_.resize(edges_.size());
   is_beside_visible_.resize(edges_.size());
   across_px_.resize(landmarks.size());
-  camera.camera->project(beside_in_cam_, beside_px_, is_beside_visible_);
+  view_->camera->project(beside_in_cam_, beside_px_, is_beside_visible_);
   for (std::size_t k = 0; k < edges_.size(); ++k) {
     across_px_[edges_[k]] = (beside_px_[k] - pixels_[edges_[k]]).normalized();
     matches_.is_visible[edges_[k]] &= is_beside_visible_[k];
@@ -115,7 +114,7 @@ void ProjectionMatcher::match_edge(std::size_t landmark,
                                    double radius_px) {
   const Eigen::Vector2d pixel = pixels_[landmark];
   const double size_rad = landmarks.sizes_m[landmark] / points_in_cam_[landmark].norm();
-  const double scale = std::max(1.0, size_rad / view().pixel_angles.at(pixel));
+  const double scale = std::max(1.0, size_rad / view_->pixel_angles.at(pixel));
   const double radius = radius_px * scale;
   const double along = kAlongEdgePx * scale;
   double least_cost = std::numeric_limits<double>::infinity();
@@ -152,9 +151,9 @@ void ProjectionMatcher::find_candidates(std::size_t landmark,
   candidates_.clear();
   const Eigen::Vector2d pixel = pixels_[landmark];
   const double size_rad = landmarks.sizes_m[landmark] / points_in_cam_[landmark].norm();
-  const double scale = std::max(1.0, size_rad / view().pixel_angles.at(pixel));
+  const double scale = std::max(1.0, size_rad / view_->pixel_angles.at(pixel));
   const double radius = radius_px * scale;
-  const double stretch = view().pixel_angles.column_stretch(pixel);
+  const double stretch = view_->pixel_angles.column_stretch(pixel);
   const auto consider = [&](std::uint32_t feature) {
     const Keypoint& keypoint = features.keypoints[feature];
     const double dx = features.grid.column_distance_px(keypoint.x_px, pixel.x()) / stretch;

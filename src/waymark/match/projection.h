@@ -35,15 +35,11 @@ struct ProjectionMatches {
 /// buffers.
 class ProjectionMatcher {
  public:
-  /// rig: the one that sees the frames.
-  explicit ProjectionMatcher(std::shared_ptr<const Rig> rig);
-
-  /// From now on the frames are of this rig.
-  void look_with(const std::shared_ptr<const Rig>& rig);
-
-  /// One feature serves one landmark: the more similar one. Features with is_taken set (may be
-  /// empty) are left alone. The result stays valid until the next call.
-  const ProjectionMatches& match(const LandmarkSet& landmarks,
+  /// rig: the one that sees the frame. One feature serves one landmark: the more similar one.
+  /// Features with is_taken set (may be empty) are left alone. The result stays valid until the
+  /// next call.
+  const ProjectionMatches& match(const Rig& rig,
+                                 const LandmarkSet& landmarks,
                                  const Features& features,
                                  std::span<const std::uint8_t> is_taken,
                                  const Rigid3& rig_from_world,
@@ -74,14 +70,15 @@ class ProjectionMatcher {
               const ProjectionOptions& options);
 
   struct View {
-    std::shared_ptr<const Rig> rig;
+    std::shared_ptr<const Camera> camera;
     PixelAngles pixel_angles;
   };
 
-  const View& view() const { return views_[current_view_]; }
+  void set_view(const Rig& rig);
 
-  std::vector<View> views_;  ///< One per rig used so far: there are few, but they alternate.
-  std::size_t current_view_ = 0;
+  std::vector<View> views_;  ///< One per camera seen so far: there are few, but they alternate.
+  Rigid3 cam_from_rig_;
+  const View* view_ = nullptr;  ///< Of these, the one that sees the frame.
   ProjectionMatches matches_;
   std::vector<Eigen::Vector3d> points_in_cam_;
   std::vector<Eigen::Vector2d> pixels_;

@@ -7,7 +7,7 @@
 #include <set>
 
 #include "waymark/image/feature_geometry.h"
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -20,7 +20,7 @@ class Projection : public ::testing::Test {
     PointNoise noise;
     noise.max_features = 3000;
     noise.outlier_share = 0.1;
-    seen_ = observe(cloud_, *rig_, world_from_rig_, noise, 1);
+    seen_ = observe(cloud_, rig_, world_from_rig_, noise, 1);
   }
 
   int num_true_features() const {
@@ -36,12 +36,12 @@ class Projection : public ::testing::Test {
   const Rigid3 world_from_rig_ = make_test_pose({0.2, -0.1, -0.4}, {0.05, -0.1, 0.2});
   const LandmarkSet landmarks_ = true_landmarks(cloud_, world_from_rig_.translation);
   PointObservation seen_;
-  ProjectionMatcher matcher_{rig_};
+  ProjectionMatcher matcher_;
 };
 
 TEST_F(Projection, FindsLandmarksAtTheTruePose) {
   const auto& matches =
-      matcher_.match(landmarks_, *seen_.features, {}, world_from_rig_.inverse(), {});
+      matcher_.match(*rig_, landmarks_, *seen_.features, {}, world_from_rig_.inverse(), {});
   int num_right = 0;
   int num_wrong = 0;
   std::set<std::uint32_t> used;
@@ -61,7 +61,7 @@ TEST_F(Projection, LeavesTakenFeaturesAlone) {
   std::vector<std::uint8_t> is_taken(seen_.features->num_primary);
   for (std::size_t i = 0; i < is_taken.size(); i += 2) is_taken[i] = 1;
   const auto& matches =
-      matcher_.match(landmarks_, *seen_.features, is_taken, world_from_rig_.inverse(), {});
+      matcher_.match(*rig_, landmarks_, *seen_.features, is_taken, world_from_rig_.inverse(), {});
   EXPECT_GT(matches.num_matches, 80u);
   for (const std::uint32_t feature : matches.features) {
     if (feature != kNoFeature) {
@@ -85,7 +85,8 @@ TEST_F(Projection, OneFeatureServesTheMoreSimilarOfTwoLandmarks) {
       if (!is_better) landmark.appearance.descriptor[0] ^= 0xff;
       twins.add(LandmarkId{is_better ? 1u : 0u}, landmark);
     }
-    const auto& matches = matcher_.match(twins, *seen_.features, {}, world_from_rig_.inverse(), {});
+    const auto& matches =
+        matcher_.match(*rig_, twins, *seen_.features, {}, world_from_rig_.inverse(), {});
     EXPECT_EQ(matches.num_matches, 1u);
     EXPECT_EQ(matches.features[is_better_first ? 0 : 1], feature);
     EXPECT_EQ(matches.features[is_better_first ? 1 : 0], kNoFeature);
@@ -95,7 +96,8 @@ TEST_F(Projection, OneFeatureServesTheMoreSimilarOfTwoLandmarks) {
 TEST_F(Projection, DoesNotLookForWhatIsKnownFromTheOtherSideOnly) {
   LandmarkSet behind = landmarks_;
   for (Vector3d& direction : behind.directions) direction = -direction;
-  const auto& matches = matcher_.match(behind, *seen_.features, {}, world_from_rig_.inverse(), {});
+  const auto& matches =
+      matcher_.match(*rig_, behind, *seen_.features, {}, world_from_rig_.inverse(), {});
   EXPECT_EQ(matches.num_matches, 0u);
   for (const std::uint8_t is_visible : matches.is_visible) EXPECT_FALSE(is_visible);
 }
@@ -103,13 +105,15 @@ TEST_F(Projection, DoesNotLookForWhatIsKnownFromTheOtherSideOnly) {
 TEST_F(Projection, DoesNotMatchOtherSizes) {
   LandmarkSet large = landmarks_;
   for (double& size_m : large.sizes_m) size_m *= 2.5;
-  const auto& matches = matcher_.match(large, *seen_.features, {}, world_from_rig_.inverse(), {});
+  const auto& matches =
+      matcher_.match(*rig_, large, *seen_.features, {}, world_from_rig_.inverse(), {});
   EXPECT_LT(static_cast<double>(matches.num_matches), 0.02 * num_true_features());
 }
 
 TEST_F(Projection, FindsNothingWhereThePoseIsFarOff) {
   const Rigid3 turned = make_test_pose(Vector3d::Zero(), {0.0, 0.3, 0.0}) * world_from_rig_;
-  const auto& matches = matcher_.match(landmarks_, *seen_.features, {}, turned.inverse(), {});
+  const auto& matches =
+      matcher_.match(*rig_, landmarks_, *seen_.features, {}, turned.inverse(), {});
   EXPECT_LT(static_cast<double>(matches.num_matches), 0.02 * num_true_features());
 }
 
@@ -139,7 +143,8 @@ TEST_F(Projection, FindsEdgesAcrossThem) {
                                            {.x_px = 322.5f, .y_px = 244.0f},
                                            {.x_px = 325.5f, .y_px = 239.0f}});
   // Darker on its right, too far along it, and farther across.
-  const auto& matches = matcher_.match(edge_landmark(), features, {}, Rigid3(), {.radius_px = 8.0});
+  const auto& matches =
+      matcher_.match(*rig_, edge_landmark(), features, {}, Rigid3(), {.radius_px = 8.0});
   EXPECT_EQ(matches.features, std::vector{2u});
 }
 
@@ -163,10 +168,10 @@ TEST_F(Projection, KeepsEdgesAndCornersApart) {
   Features features = edge_features(*rig_, {{.x_px = 320.0f, .y_px = 239.0f}});
   LandmarkSet corner = edge_landmark();
   corner.across[0].setZero();
-  EXPECT_EQ(matcher_.match(corner, features, {}, Rigid3(), {}).num_matches, 0u);
-  EXPECT_EQ(matcher_.match(edge_landmark(), features, {}, Rigid3(), {}).num_matches, 1u);
+  EXPECT_EQ(matcher_.match(*rig_, corner, features, {}, Rigid3(), {}).num_matches, 0u);
+  EXPECT_EQ(matcher_.match(*rig_, edge_landmark(), features, {}, Rigid3(), {}).num_matches, 1u);
   features.num_edges = 0;
-  const auto& matches = matcher_.match(edge_landmark(), features, {}, Rigid3(), {});
+  const auto& matches = matcher_.match(*rig_, edge_landmark(), features, {}, Rigid3(), {});
   EXPECT_EQ(matches.num_matches, 0u);
   EXPECT_FALSE(matches.is_visible[0]);  // What has no edges does not say that it should be there.
 }

@@ -13,7 +13,7 @@
 #include "waymark/match/appearance.h"
 #include "waymark/match/epipolar.h"
 #include "waymark/match/projection.h"
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -26,7 +26,7 @@ class WholeSphere : public ::testing::Test {
   PointObservation see(const Rigid3& world_from_rig, std::uint64_t frame) const {
     PointNoise noise;
     noise.max_features = 3000;
-    return observe(cloud_, *rig_, world_from_rig, noise, frame);
+    return observe(cloud_, rig_, world_from_rig, noise, frame);
   }
 
   static std::shared_ptr<const Rig> make_rig() {
@@ -62,11 +62,11 @@ TEST_F(WholeSphere, ProjectionFindsLandmarksAroundThePoles) {
   const PointObservation seen = see(Rigid3(), 0);
   const LandmarkSet landmarks = true_landmarks(cloud_, Eigen::Vector3d::Zero());
   // 10 pixels of turn about each axis.
-  ProjectionMatcher matcher(rig_);
+  ProjectionMatcher matcher;
   for (const Eigen::Vector3d& axis : {Eigen::Vector3d(1, 0, 0), {0, 1, 0}, {0, 0, 1}}) {
     const Rigid3 guess = make_test_pose(Eigen::Vector3d::Zero(), 10.0 * kRadPerPx * axis);
     const auto& matches =
-        matcher.match(landmarks, *seen.features, {}, guess.inverse(), {.radius_px = 15.0});
+        matcher.match(*rig_, landmarks, *seen.features, {}, guess.inverse(), {.radius_px = 15.0});
     int num_polar = 0, num_found = 0;
     for (std::size_t i = 0; i < seen.features->num_primary; ++i) {
       const std::uint32_t landmark = seen.landmark_of_feature[i];

@@ -79,7 +79,6 @@ std::optional<double> measured_noise_px(const JudgedObservations& judged) {
 /// Options of a round: the loss as narrow as the noise allows.
 BundleOptions narrowed(const BundleOptions& options, const JudgedObservations& judged) {
   BundleOptions result = options;
-  if (!options.follows_noise) return result;
   if (const auto noise_px = measured_noise_px(judged)) {
     result.huber_px = std::min(kHuberSigmas * std::max(*noise_px, kMinNoisePx), options.huber_px);
   }

@@ -90,8 +90,6 @@ struct BundleOptions {
   /// Residual length where the loss turns linear, at most: each round takes twice the noise that
   /// its residuals show, if that is less.
   double huber_px = 2.0;
-  /// Off where the costs of two problems are compared: then the loss is as wide as stated.
-  bool follows_noise = true;
   double range_huber = 1.0;  ///< The same for residuals of ranges, in sigmas.
   double gate_px = 2.45;     ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
   /// A round ends early when an iteration lowers the cost by less than this part of it.

@@ -26,15 +26,13 @@ std::size_t busiest_camera(const Rig& rig, const PoseObservations& observations)
   return static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
 }
 
-CameraSightings sightings_of(std::size_t camera,
-                             const PoseObservations& observations,
-                             double noise_px) {
+CameraSightings sightings_of(std::size_t camera, const PoseObservations& observations) {
   CameraSightings sightings;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     if (observations.camera[i] != camera) continue;
     // Pixels per radian; the root of the mean square over the directions where they differ.
     const double resolution = observations.level_pixel_from_bearing[i].norm() / std::sqrt(2.0);
-    const double sigma_rad = noise_px / resolution;
+    const double sigma_rad = 1.0 / resolution;
     const Eigen::Vector3d bearing = observations.bearing[i].cast<double>();
     const bool is_finite = bearing.allFinite() && observations.point_in_world[i].allFinite();
     if (!is_finite || !(sigma_rad > 0.0) || !std::isfinite(sigma_rad)) continue;
@@ -49,16 +47,15 @@ CameraSightings sightings_of(std::size_t camera,
 
 std::optional<PoseEstimate> locate(const Rig& rig,
                                    const PoseObservations& observations,
-                                   const PoseOptions& options,
                                    const RansacOptions& ransac_options,
                                    PoseWorkspace& workspace) {
   const std::size_t camera = busiest_camera(rig, observations);
   if (camera >= rig.cameras.size()) return std::nullopt;
-  const CameraSightings sightings = sightings_of(camera, observations, options.noise_px);
+  const CameraSightings sightings = sightings_of(camera, observations);
   const auto consensus = ransac(AbsolutePoseEstimator(sightings.view()), ransac_options);
   if (!consensus) return std::nullopt;
   const Rigid3 rig_from_world = rig.cameras[camera].cam_from_rig.inverse() * consensus->model;
-  return optimize_pose(rig, observations, rig_from_world, options, workspace);
+  return optimize_pose(rig, observations, rig_from_world, workspace);
 }
 
 }  // namespace waymark

@@ -6,7 +6,7 @@
 
 #include <limits>
 
-#include "waymark/optimize/test_scene.h"
+#include "waymark/optimize/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -27,8 +27,7 @@ void mismatch(PoseScene& scene, double share, Rng& rng) {
 }
 
 std::optional<PoseEstimate> run(const PoseScene& scene, PoseWorkspace& workspace) {
-  return locate(
-      scene.rig, scene.observations, {}, {.seed = 3, .min_inlier_ratio = 0.15}, workspace);
+  return locate(scene.rig, scene.observations, {.seed = 3, .min_inlier_ratio = 0.15}, workspace);
 }
 
 TEST(Locate, FindsThePoseWithoutAPredictionAmongWrongMatches) {

@@ -18,6 +18,9 @@ using Arrays = PoseWorkspace::Arrays;
 
 /// Fewer do not determine a pose.
 constexpr std::size_t kMinObservations = 3;
+/// A component of a residual is assumed to have a standard deviation of 1 px, see pose.h. An inlier
+/// has a squared residual below the 95 % quantile of chi-square with 2 degrees of freedom.
+constexpr double kGate = 5.991;
 /// Scales of the losses in units of the noise: of the last Geman-McClure stage, and of Huber's
 /// loss, which leaves most inliers untouched.
 constexpr double kFinalScale = 2.5;
@@ -50,8 +53,8 @@ NormalEquations<6> unpack(const PoseSums& sums) {
 /// The state of one call.
 class PoseSolver {
  public:
-  PoseSolver(const Rig& rig, const Rigid3& initial, double noise_px, Arrays& arrays)
-      : rig_(rig), rig_from_world_(initial), noise_px_(noise_px), arrays_(arrays) {}
+  PoseSolver(const Rig& rig, const Rigid3& initial, Arrays& arrays)
+      : rig_(rig), rig_from_world_(initial), arrays_(arrays) {}
 
   const Rigid3& rig_from_world() const { return rig_from_world_; }
   int num_iterations() const { return num_iterations_; }
@@ -73,8 +76,7 @@ class PoseSolver {
   /// Returns the equations at the pose reached.
   NormalEquations<6> minimize(const PoseRobust& robust, int max_iterations, double negligible) {
     const auto at = [&](const Rigid3& pose) { return linearize(pose, robust); };
-    const double negligible_px2 = negligible * noise_px_ * noise_px_;
-    return minimize_over_pose(rig_from_world_, at, max_iterations, negligible_px2, num_iterations_);
+    return minimize_over_pose(rig_from_world_, at, max_iterations, negligible, num_iterations_);
   }
 
   /// The part of the Hessian at the pose reached that the bearings contribute.
@@ -92,9 +94,9 @@ class PoseSolver {
   /// Variance of the residuals of ranges: that which makes the inverse of their part of the Hessian
   /// the covariance that they show, weighed as they are (White 1980). The assumed one counts as
   /// kNoisePriorStrength ranges.
-  double measure_range_variance(const PoseRobust& robust, double assumed_variance) const {
+  double measure_range_variance(const PoseRobust& robust) const {
     double sum_of_weights = kNoisePriorStrength;
-    double sum = kNoisePriorStrength * assumed_variance;
+    double sum = kNoisePriorStrength;
     const auto& fields = arrays_.fields;
     for (const PoseSegment& segment : arrays_.segments) {
       const Rigid3 cam_from_world = rig_.cameras[segment.camera].cam_from_rig * rig_from_world_;
@@ -124,13 +126,12 @@ class PoseSolver {
   /// noise.
   void anneal() {
     compute_residuals();
-    const double final_scale = kFinalScale * noise_px_;
-    double scale = std::max(final_scale, median_residual());
-    while (scale > final_scale) {
+    double scale = std::max(kFinalScale, median_residual());
+    while (scale > kFinalScale) {
       minimize({PoseLoss::kGemanMcClure, scale}, kIterationsPerStage, kCoarseDecrease);
       scale *= kAnnealing;
     }
-    minimize({PoseLoss::kGemanMcClure, final_scale}, kIterationsPerRound, kCoarseDecrease);
+    minimize({PoseLoss::kGemanMcClure, kFinalScale}, kIterationsPerRound, kCoarseDecrease);
   }
 
  private:
@@ -145,7 +146,6 @@ class PoseSolver {
 
   const Rig& rig_;
   Rigid3 rig_from_world_;
-  double noise_px_;
   Arrays& arrays_;
   int num_iterations_ = 0;
 };
@@ -154,7 +154,7 @@ class PoseSolver {
 /// length s = variance * chi2(2) below the gate, E[s] = 2 * variance - gate * q / (1 - q), q =
 /// exp(-gate / (2 * variance)); solved by fixed-point iteration. The assumed noise counts as
 /// kNoisePriorStrength components.
-double measure_variance(const Arrays& arrays, double gate, double assumed_variance) {
+double measure_variance(const Arrays& arrays) {
   double sum = 0.0;
   double count = 0.0;
   for (std::size_t i = 0; i < arrays.observation.size(); ++i) {
@@ -164,11 +164,10 @@ double measure_variance(const Arrays& arrays, double gate, double assumed_varian
   }
   // The pose absorbs 6 components, as many as the observations have at most.
   const double num_components = std::max(0.0, 2.0 * count - 6.0) + kNoisePriorStrength;
-  const double prior = kNoisePriorStrength * assumed_variance;
-  double variance = (prior + sum) / num_components;
+  double variance = (kNoisePriorStrength + sum) / num_components;
   for (int iteration = 0; iteration < 5; ++iteration) {
-    const double q = std::exp(-gate / (2.0 * std::min(variance, assumed_variance)));
-    variance = (prior + sum + count * gate * q / (1.0 - q)) / num_components;
+    const double q = std::exp(-kGate / (2.0 * std::min(variance, 1.0)));
+    variance = (kNoisePriorStrength + sum + count * kGate * q / (1.0 - q)) / num_components;
   }
   return variance;
 }
@@ -178,29 +177,25 @@ double measure_variance(const Arrays& arrays, double gate, double assumed_varian
 PoseEstimate optimize_pose(const Rig& rig,
                            const PoseObservations& observations,
                            const Rigid3& initial_rig_from_world,
-                           const PoseOptions& options,
                            PoseWorkspace& workspace) {
   Arrays& arrays = workspace.arrays();
-  const double gate = options.gate_chi2 * options.noise_px * options.noise_px;
-  const PoseRobust huber = {PoseLoss::kHuber, kHuberScale * options.noise_px};
-  const std::size_t num_usable =
-      gather_pose_observations(rig, observations, options.noise_px, arrays);
-  PoseSolver solver(rig, initial_rig_from_world, options.noise_px, arrays);
+  const PoseRobust huber = {PoseLoss::kHuber, kHuberScale};
+  const std::size_t num_usable = gather_pose_observations(rig, observations, arrays);
+  PoseSolver solver(rig, initial_rig_from_world, arrays);
   const bool is_determined = num_usable >= kMinObservations;
   if (is_determined) solver.anneal();
 
   Matrix6d hessian = Matrix6d::Zero();
   solver.compute_residuals();
-  PoseClasses classes = classify_pose_observations(observations, gate, arrays);
+  PoseClasses classes = classify_pose_observations(kGate, arrays);
   for (int round = 0; round < kNumRounds && is_determined; ++round) {
     if (round > 0 && classes.num_changed == 0) break;
     hessian = solver.minimize(huber, kIterationsPerRound, kFineDecrease).hessian;
     solver.compute_residuals();
-    classes = classify_pose_observations(observations, gate, arrays);
+    classes = classify_pose_observations(kGate, arrays);
   }
-  const double assumed_variance = options.noise_px * options.noise_px;
-  const double variance = measure_variance(arrays, gate, assumed_variance);
-  const double range_variance = solver.measure_range_variance(huber, assumed_variance);
+  const double variance = measure_variance(arrays);
+  const double range_variance = solver.measure_range_variance(huber);
   const Matrix6d of_bearings = solver.has_ranges() ? solver.bearing_hessian(huber) : hessian;
   const Matrix6d information = of_bearings / variance + (hessian - of_bearings) / range_variance;
   PoseEstimate estimate;
@@ -208,7 +203,6 @@ PoseEstimate optimize_pose(const Rig& rig,
   estimate.is_inlier = arrays.is_inlier;
   estimate.num_inliers = classes.num_inliers;
   estimate.covariance = covariance_from<6>(information);
-  estimate.noise_measured_px = std::sqrt(variance);
   estimate.num_iterations = solver.num_iterations();
   return estimate;
 }

@@ -16,7 +16,7 @@
 namespace waymark {
 
 /// What one frame measures of known points, as parallel arrays that the caller owns and reuses.
-/// inverse_range, inverse_range_sigma and weight may be empty: no ranges, all weights 1.
+/// inverse_range and inverse_range_sigma may be empty: no ranges.
 struct PoseObservations {
   std::vector<Eigen::Vector3d> point_in_world;
   std::vector<Eigen::Vector3f> bearing;             ///< Measured, unit, in the observing camera.
@@ -24,23 +24,11 @@ struct PoseObservations {
   std::vector<std::uint8_t> camera;                 ///< Index in the rig.
   std::vector<float> inverse_range;                 ///< 1/m, measured; see inverse_range_sigma.
   std::vector<float> inverse_range_sigma;           ///< 1/m; 0 where there is no measurement.
-  std::vector<float> weight;                        ///< Factor of the squared residual.
 
   std::size_t size() const { return point_in_world.size(); }
   void clear();
-  /// Adds what was measured of a point; not where there are weights.
+  /// Adds what was measured of a point.
   void add(const Eigen::Vector3d& point, const Measurement& measured);
-  /// Adds one of others, but for its weight; all of them with ranges, or all without.
-  void add(const PoseObservations& other, std::size_t index);
-};
-
-struct PoseOptions {
-  /// Standard deviation that a component of the residual W * (predicted - measured bearing) is
-  /// assumed to have, in pixels of the feature's level.
-  double noise_px = 1.0;
-  /// An observation is an inlier while its squared residual is below gate_chi2 * noise_px^2; the
-  /// default is the 95 % quantile of chi-square with 2 degrees of freedom.
-  double gate_chi2 = 5.991;
 };
 
 /// is_inlier lives in the workspace, until the next call with it.
@@ -49,12 +37,9 @@ struct PoseEstimate {
   std::span<const std::uint8_t> is_inlier;  ///< Per observation, in the order given.
   std::size_t num_inliers = 0;
   /// Of the left perturbation xi in exp(xi) * rig_from_world, with xi = (translation, rotation).
-  /// Scaled by noise_measured_px, the part of the ranges by what their residuals show; large but
+  /// Scaled by the noise that the inliers show, the part of the ranges by theirs; large but
   /// finite where the observations say nothing.
   Matrix6d covariance = Matrix6d::Zero();
-  /// Standard deviation of a residual component as the inliers show it; leans on noise_px when
-  /// there are few of them.
-  double noise_measured_px = 0.0;
   int num_iterations = 0;
 };
 
@@ -77,7 +62,9 @@ class PoseWorkspace {
 /// Pose of a rig from points with known positions, from a prediction that may be several pixels
 /// off and with up to about half of the observations wrong. Minimises
 /// |W * (normalize(cam_from_rig * rig_from_world * point) - bearing)|^2, plus, where there is a
-/// range, ((1 / |point_in_cam| - inverse_range) / inverse_range_sigma)^2 in units of noise_px.
+/// range, ((1 / |point_in_cam| - inverse_range) / inverse_range_sigma)^2. A component of a residual
+/// is assumed to have a standard deviation of 1 px of the feature's level; what passes a gate of
+/// 95 % is an inlier.
 /// The range never decides whether an observation is an inlier; a wrong range is discounted alone.
 /// Levenberg-Marquardt with a Geman-McClure loss whose scale shrinks (graduated non-convexity,
 /// Yang et al. 2020), then least squares with Huber's loss on what passes the gate. Points more
@@ -86,7 +73,6 @@ class PoseWorkspace {
 PoseEstimate optimize_pose(const Rig& rig,
                            const PoseObservations& observations,
                            const Rigid3& initial_rig_from_world,
-                           const PoseOptions& options,
                            PoseWorkspace& workspace);
 
 }  // namespace waymark

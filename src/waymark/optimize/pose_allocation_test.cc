@@ -4,7 +4,7 @@
 
 #include "waymark/image/testing/allocation_count.h"
 #include "waymark/optimize/pose.h"
-#include "waymark/optimize/test_scene.h"
+#include "waymark/optimize/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -16,9 +16,9 @@ TEST(PoseAllocation, NoneAfterWarmUp) {
   const Rigid3 initial =
       Rigid3::exp(testing::random_tangent(rng, 0.05, 0.01)) * scene.rig_from_world;
   PoseWorkspace workspace;
-  optimize_pose(scene.rig, scene.observations, initial, {}, workspace);
+  optimize_pose(scene.rig, scene.observations, initial, workspace);
   const long before = testing::num_allocations();
-  optimize_pose(scene.rig, scene.observations, initial, {}, workspace);
+  optimize_pose(scene.rig, scene.observations, initial, workspace);
   EXPECT_EQ(testing::num_allocations(), before);
 }
 

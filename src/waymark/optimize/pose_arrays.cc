@@ -19,22 +19,14 @@ bool is_usable(const Rig& rig, const PoseObservations& observations, std::size_t
 
 void check_sizes(const PoseObservations& observations) {
   const std::size_t size = observations.size();
-  const auto is_optional = [size](std::size_t other) { return other == 0 || other == size; };
   WAYMARK_CHECK(observations.bearing.size() == size);
   WAYMARK_CHECK(observations.level_pixel_from_bearing.size() == size);
   WAYMARK_CHECK(observations.camera.size() == size);
-  WAYMARK_CHECK(is_optional(observations.inverse_range.size()));
+  WAYMARK_CHECK(observations.inverse_range.empty() || observations.inverse_range.size() == size);
   WAYMARK_CHECK(observations.inverse_range_sigma.size() == observations.inverse_range.size());
-  WAYMARK_CHECK(is_optional(observations.weight.size()));
 }
 
-double weight_of(const PoseObservations& observations, std::size_t i) {
-  if (observations.weight.empty()) return 1.0;
-  const double weight = observations.weight[i];
-  return weight > 0.0 && std::isfinite(weight) ? weight : 0.0;
-}
-
-void append(const PoseObservations& observations, std::size_t i, double noise_px, Arrays& arrays) {
+void append(const PoseObservations& observations, std::size_t i, Arrays& arrays) {
   auto& fields = arrays.fields;
   const auto& point = observations.point_in_world[i];
   const auto& bearing = observations.bearing[i];
@@ -50,11 +42,11 @@ void append(const PoseObservations& observations, std::size_t i, double noise_px
   if (!observations.inverse_range.empty() && observations.inverse_range_sigma[i] > 0.0f &&
       std::isfinite(observations.inverse_range[i])) {
     inverse_range = observations.inverse_range[i];
-    scale = noise_px / observations.inverse_range_sigma[i];
+    scale = 1.0 / observations.inverse_range_sigma[i];
   }
   fields[kInverseRange].push_back(inverse_range);
   fields[kInverseRangeScale].push_back(scale);
-  fields[kWeight].push_back(weight_of(observations, i));
+  fields[kWeight].push_back(1.0);
   arrays.observation.push_back(static_cast<std::uint32_t>(i));
 }
 
@@ -76,16 +68,6 @@ void PoseObservations::add(const Eigen::Vector3d& point, const Measurement& meas
   inverse_range_sigma.push_back(measured.inverse_range_sigma);
 }
 
-void PoseObservations::add(const PoseObservations& other, std::size_t index) {
-  point_in_world.push_back(other.point_in_world[index]);
-  bearing.push_back(other.bearing[index]);
-  level_pixel_from_bearing.push_back(other.level_pixel_from_bearing[index]);
-  camera.push_back(other.camera[index]);
-  if (other.inverse_range.empty()) return;
-  inverse_range.push_back(other.inverse_range[index]);
-  inverse_range_sigma.push_back(other.inverse_range_sigma[index]);
-}
-
 void PoseObservations::clear() {
   point_in_world.clear();
   bearing.clear();
@@ -93,7 +75,6 @@ void PoseObservations::clear() {
   camera.clear();
   inverse_range.clear();
   inverse_range_sigma.clear();
-  weight.clear();
 }
 
 PoseWorkspace::PoseWorkspace() : arrays_(std::make_unique<Arrays>()) {}
@@ -103,7 +84,6 @@ PoseWorkspace& PoseWorkspace::operator=(PoseWorkspace&&) noexcept = default;
 
 std::size_t gather_pose_observations(const Rig& rig,
                                      const PoseObservations& observations,
-                                     double noise_px,
                                      Arrays& arrays) {
   check_sizes(observations);
   for (auto& field : arrays.fields) field.clear();
@@ -115,7 +95,7 @@ std::size_t gather_pose_observations(const Rig& rig,
     PoseSegment segment = {camera, arrays.observation.size(), 0, false};
     for (std::size_t i = 0; i < observations.size(); ++i) {
       if (observations.camera[i] != camera || !is_usable(rig, observations, i)) continue;
-      append(observations, i, noise_px, arrays);
+      append(observations, i, arrays);
       segment.has_ranges |= arrays.fields[kInverseRangeScale].back() > 0.0;
       ++num_usable;
     }
@@ -127,9 +107,7 @@ std::size_t gather_pose_observations(const Rig& rig,
   return num_usable;
 }
 
-PoseClasses classify_pose_observations(const PoseObservations& observations,
-                                       double gate,
-                                       Arrays& arrays) {
+PoseClasses classify_pose_observations(double gate, Arrays& arrays) {
   PoseClasses classes;
   for (std::size_t i = 0; i < arrays.observation.size(); ++i) {
     const std::uint32_t observation = arrays.observation[i];
@@ -137,7 +115,7 @@ PoseClasses classify_pose_observations(const PoseObservations& observations,
     const bool is_inlier = arrays.squared_residual[i] < gate;
     classes.num_changed += arrays.is_inlier[observation] != is_inlier;
     arrays.is_inlier[observation] = is_inlier;
-    arrays.fields[kWeight][i] = is_inlier ? weight_of(observations, observation) : 0.0;
+    arrays.fields[kWeight][i] = is_inlier ? 1.0 : 0.0;
     classes.num_inliers += is_inlier;
   }
   return classes;

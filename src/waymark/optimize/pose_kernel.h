@@ -38,8 +38,8 @@ enum PoseField : std::size_t {
   kW11,
   kW12,
   kInverseRange,
-  kInverseRangeScale,  // 1 / sigma in units of the pixel noise; 0 without a measurement.
-  kWeight,             // 0 takes the observation out.
+  kInverseRangeScale,  // 1 / sigma; 0 without a measurement.
+  kWeight,             // 1, or 0 where the observation is out.
   kNumPoseFields
 };
 
@@ -54,11 +54,9 @@ struct PoseWorkspace::Arrays {
   std::vector<std::uint8_t> is_inlier;  // In the caller's order.
 };
 
-/// Copies what can be used of the observations, by camera. Returns how many these are. noise_px is
-/// the unit of the ranges.
+/// Copies what can be used of the observations, by camera. Returns how many these are.
 std::size_t gather_pose_observations(const Rig& rig,
                                      const PoseObservations& observations,
-                                     double noise_px,
                                      PoseWorkspace::Arrays& arrays);
 
 struct PoseClasses {
@@ -67,9 +65,7 @@ struct PoseClasses {
 };
 
 /// Sets is_inlier where squared_residual is below the gate and gives the others the weight 0.
-PoseClasses classify_pose_observations(const PoseObservations& observations,
-                                       double gate,
-                                       PoseWorkspace::Arrays& arrays);
+PoseClasses classify_pose_observations(double gate, PoseWorkspace::Arrays& arrays);
 
 enum class PoseLoss { kGemanMcClure, kHuber };
 

@@ -7,7 +7,7 @@
 
 #include "waymark/geometry/rigid3.h"
 #include "waymark/optimize/residual.h"
-#include "waymark/optimize/test_scene.h"
+#include "waymark/optimize/testing/scene.h"
 
 namespace waymark {
 namespace {

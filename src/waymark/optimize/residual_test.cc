@@ -6,7 +6,7 @@
 
 #include <limits>
 
-#include "waymark/optimize/test_scene.h"
+#include "waymark/optimize/testing/scene.h"
 
 namespace waymark {
 namespace {

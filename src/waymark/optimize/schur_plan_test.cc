@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "waymark/optimize/schur_solver.h"
-#include "waymark/optimize/test_scene.h"
+#include "waymark/optimize/testing/scene.h"
 
 namespace waymark {
 namespace {

@@ -7,7 +7,7 @@
 #include <map>
 
 #include "waymark/base/check.h"
-#include "waymark/place/test_places.h"
+#include "waymark/place/testing/places.h"
 
 namespace waymark {
 namespace {

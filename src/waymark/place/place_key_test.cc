@@ -5,7 +5,7 @@
 #include <bit>
 
 #include "waymark/place/place_segment.h"
-#include "waymark/place/test_places.h"
+#include "waymark/place/testing/places.h"
 
 namespace waymark {
 namespace {

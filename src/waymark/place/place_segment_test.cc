@@ -8,7 +8,7 @@
 #include <set>
 
 #include "waymark/base/check.h"
-#include "waymark/place/test_places.h"
+#include "waymark/place/testing/places.h"
 
 namespace waymark {
 namespace {

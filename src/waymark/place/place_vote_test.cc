@@ -7,7 +7,7 @@
 #include <cmath>
 
 #include "waymark/place/place_segment.h"
-#include "waymark/place/test_places.h"
+#include "waymark/place/testing/places.h"
 
 namespace waymark {
 namespace {

@@ -37,6 +37,7 @@ constexpr double kJump = 2.0;           ///< In median times between frames.
 // See verdict.cc for what is usual.
 constexpr double kMaxReprojectionPx = 1.2;
 constexpr double kMinMatchesKept = 0.7;
+constexpr double kMaxReprojectionPercent = 0.2;
 
 bool is_dark(const TroubleFigures& seen) {
   return seen.brightness <= kDark && seen.contrast <= kDarkContrast;
@@ -145,6 +146,16 @@ std::string recognise_calibration(const TroubleFigures& seen) {
                      100.0 * seen.too_few_inliers);
 }
 
+std::string recognise_coarse(const TroubleFigures& seen) {
+  if (!seen.quality || !seen.has_started) return "";
+  if (!(seen.quality->reprojection_percent > kMaxReprojectionPercent)) return "";
+  return fmt::format(
+      "the result is poor: the reprojection error of {:.2f} px is {:.2f} % of images as small as "
+      "these",
+      seen.quality->reprojection_px,
+      seen.quality->reprojection_percent);
+}
+
 std::string recognise_fast_motion(const TroubleFigures& seen) {
   if (!is_weak(seen) || has_poor_images(seen) || seen.num_features < kFewFeatures) return "";
   if (seen.is_localized || seen.too_few_matches < 0.3 || !recognise_pair(seen).empty()) return "";
@@ -204,6 +215,10 @@ constexpr std::array kCauses = {
                 "check that it is the calibration of this camera at this size; waymark calibrate "
                 "finds one from the images",
                 "the-calibration-does-not-fit"},
+    AdviceCause{"coarse",
+                recognise_coarse,
+                "images of more pixels; expect a rough and bent map",
+                "the-images-are-coarse"},
     AdviceCause{"jumps",
                 recognise_jumps,
                 "find out why images are missing: a full disk, a slow cable, a cut; move slowly, "

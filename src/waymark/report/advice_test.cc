@@ -134,6 +134,15 @@ TEST(Advice, OfCalibrationsThatDoNotFit) {
   EXPECT_THAT(causes_after(named), IsEmpty());
 }
 
+TEST(Advice, OfCoarseImages) {
+  const auto coarse = [](FrameTable&, RunSummary& summary) {
+    summary.quality->reprojection_px = 0.5;
+    summary.quality->reprojection_percent = 0.32;
+  };
+  EXPECT_THAT(causes_after(coarse), ::testing::ElementsAre("coarse"));
+  EXPECT_THAT(advice_after(coarse)[0].seen, HasSubstr("0.50 px is 0.32 % of images"));
+}
+
 TEST(Advice, OfJumpsInTimeThatDidHarm) {
   const auto jump = [](FrameTable& table, RunSummary&) {
     for (std::uint32_t i = 200; i < 400; ++i) table.frames[i].timestamp_ns += 500'000'000;

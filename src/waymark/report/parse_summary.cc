@@ -104,6 +104,7 @@ TimeStatistics parse_times_of(const std::optional<SummaryObject>& object) {
 RunQuality parse_quality(const SummaryObject& object) {
   RunQuality quality;
   object.take("reprojection_px", quality.reprojection_px);
+  object.take("reprojection_percent", quality.reprojection_percent);
   object.take("matches_kept", quality.matches_kept);
   object.take("length", quality.length);
   object.take("is_metric", quality.is_metric);

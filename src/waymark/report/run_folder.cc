@@ -7,11 +7,14 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <limits>
+#include <map>
 #include <optional>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/report/documentation.h"
 
 namespace waymark {
 namespace {
@@ -86,8 +89,9 @@ Enum named(const RowReader& row, std::size_t at, Enum last) {
     if (to_string(static_cast<Enum>(i)) == text) return static_cast<Enum>(i);
   }
   throw InputError(row.where(),
-                   fmt::format("{} is no state or reason, expected one of docs/results.md",
-                               quote_for_message(text)));
+                   fmt::format("{} is no state or reason, expected one of {}",
+                               quote_for_message(text),
+                               documentation("docs/results.md")));
 }
 
 PictureFigures parse_picture(const RowReader& row, const FrameColumns& columns) {
@@ -102,11 +106,18 @@ PictureFigures parse_picture(const RowReader& row, const FrameColumns& columns) 
           true};
 }
 
+/// Of images that have no times, as if there were one per second.
+std::int64_t in_place_of_time(std::size_t index) {
+  return static_cast<std::int64_t>(index) * 1'000'000'000;
+}
+
 FrameRecord parse_record(const RowReader& row, const FrameColumns& columns) {
   constexpr double kMax = std::numeric_limits<std::int32_t>::max();
   FrameRecord frame;
   frame.index = whole(row, columns, "index", std::numeric_limits<std::uint32_t>::max()).value_or(0);
-  frame.timestamp_ns = row.nanoseconds(*columns.find("timestamp_ns"));
+  const std::size_t time = *columns.find("timestamp_ns");
+  frame.timestamp_ns =
+      row.fields()[time].empty() ? in_place_of_time(frame.index) : row.nanoseconds(time);
   frame.state = named(row, *columns.find("state"), FrameState::kDropped);
   frame.reason = named(row, *columns.find("reason"), FrameReason::kLate);
   frame.num_matches = static_cast<int>(whole(row, columns, "matches", kMax).value_or(0));
@@ -140,7 +151,39 @@ std::vector<StampedPose> read_part(const std::filesystem::path& path) {
   return poses;
 }
 
+/// Of poses.csv, whose names may hold commas: the other fields are counted from the end.
+std::vector<std::vector<StampedPose>> read_named_poses(const std::filesystem::path& path) {
+  constexpr std::size_t kNumAfterName = 8;
+  std::map<std::size_t, std::vector<StampedPose>> parts;
+  const std::string text = read_text_file(path, "poses of images");
+  RowReader row(text, path.string(), ',');
+  row.next();
+  for (std::size_t i = 0; row.next(); ++i) {
+    row.expect_at_least(kNumAfterName + 1, "name,submap,tx,ty,tz,qx,qy,qz,qw");
+    std::array<double, kNumAfterName> v;
+    const std::size_t first = row.fields().size() - kNumAfterName;
+    for (std::size_t k = 0; k < kNumAfterName; ++k) v[k] = row.number(first + k);
+    const Eigen::Quaterniond rotation(v[7], v[4], v[5], v[6]);
+    const Eigen::Vector3d position(v[1], v[2], v[3]);
+    if (!(v[0] >= 0.0 && v[0] <= kMaxParts) || !(std::abs(rotation.norm() - 1.0) < 1e-3) ||
+        !(position.cwiseAbs().maxCoeff() <= kMaxPosition)) {
+      throw InputError(row.where(), "is no pose, expected one of waymark localize");
+    }
+    parts[static_cast<std::size_t>(v[0])].push_back(
+        {in_place_of_time(i), Rigid3(rotation.normalized(), position)});
+  }
+  std::vector<std::vector<StampedPose>> sorted;
+  for (auto& [submap, poses] : parts) sorted.push_back(std::move(poses));
+  std::ranges::stable_sort(sorted, std::ranges::greater(), &std::vector<StampedPose>::size);
+  if (sorted.empty()) sorted.emplace_back();
+  return sorted;
+}
+
 std::vector<std::vector<StampedPose>> read_parts(const std::filesystem::path& folder) {
+  const bool has_names = std::filesystem::exists(folder / "poses.csv");
+  if (has_names && !std::filesystem::exists(folder / "trajectory.txt")) {
+    return read_named_poses(folder / "poses.csv");
+  }
   std::vector<std::vector<StampedPose>> parts = {read_part(folder / "trajectory.txt")};
   for (std::size_t i = 1; i < kMaxParts; ++i) {
     const auto path = folder / fmt::format("trajectory_{}.txt", i);
@@ -177,7 +220,11 @@ FrameTable parse_frames_csv(std::string_view text, const std::string& name) {
   if (!rows.next()) throw InputError(name, fmt::format("is empty, expected {}", kFrameColumns));
   const FrameColumns columns(rows, table);
   while (rows.next()) {
-    rows.expect_exactly(columns.size(), "a field per column");
+    if (columns.find("name")) {  // Which may hold commas, and is the last.
+      rows.expect_at_least(columns.size(), "a field per column");
+    } else {
+      rows.expect_exactly(columns.size(), "a field per column");
+    }
     table.frames.push_back(parse_record(rows, columns));
   }
   return table;

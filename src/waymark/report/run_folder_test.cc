@@ -97,6 +97,7 @@ TEST(RunFolder, SummaryReadsBackAsWritten) {
   EXPECT_EQ(again.mistakes, summary.mistakes);
   EXPECT_EQ(again.stages_ms[0].first, "features");
   EXPECT_EQ(again.stages_ms[0].second.mean, 4.0);
+  EXPECT_EQ(again.quality->reprojection_percent, 0.08);
   EXPECT_EQ(again.quality->matches_kept, 0.9);
   EXPECT_EQ(again.localized, 4u);
   EXPECT_EQ(again.landmarks, 3000u);

@@ -8,9 +8,12 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/base/text.h"
 #include "waymark/evaluate/association.h"
 #include "waymark/report/advice.h"
+#include "waymark/report/documentation.h"
 #include "waymark/report/drawing.h"
+#include "waymark/report/evaluate_files.h"
 #include "waymark/report/page.h"
 #include "waymark/report/report.h"
 #include "waymark/report/timeline.h"
@@ -39,16 +42,14 @@ std::string head_of(const RunFolder& run, const Verdict& verdict) {
   }
   return fmt::format(
              "<h1>{} {}</h1>\n<p>{}</p>\n", escaped(run.name), badge(verdict.grade), escaped(why)) +
-         paragraph(
-             "lead",
-             fmt::format("{} of {} frames have a pose; {} keyframes, {} landmarks, {} loop{}; {}",
-                         counts.tracked,
-                         counts.frames,
-                         run.summary.keyframes,
-                         run.summary.landmarks,
-                         run.summary.loops,
-                         run.summary.loops == 1 ? "" : "s",
-                         run.summary.setup));
+         paragraph("lead",
+                   fmt::format("{} of {} frames have a pose; {}, {}, {}; {}",
+                               counts.tracked,
+                               counts.frames,
+                               count_of(run.summary.keyframes, "keyframe"),
+                               count_of(run.summary.landmarks, "landmark"),
+                               count_of(run.summary.loops, "loop"),
+                               run.summary.setup));
 }
 
 std::string quality_section(const Verdict& verdict) {
@@ -66,13 +67,14 @@ std::string advice_section(const RunFolder& run) {
   std::string body;
   for (const std::string& mistake : run.summary.mistakes.value_or(std::vector<std::string>())) {
     body += "<div class=\"tip\">" + paragraph("", mistake) +
-            paragraph("note", "docs/troubleshooting.md#a-warning-names-a-mistake") + "</div>\n";
+            paragraph("note", documentation("docs/troubleshooting.md#a-warning-names-a-mistake")) +
+            "</div>\n";
   }
   for (const RunAdvice& advice : advise(run.table, run.summary)) {
     body += fmt::format("<div class=\"tip\"><h3>{}</h3>\n<p>Try: {}.</p>\n{}</div>\n",
                         escaped(advice.seen),
                         escaped(advice.remedy),
-                        paragraph("note", advice.see));
+                        paragraph("note", documentation(advice.see)));
   }
   return body.empty() ? "" : section("What to try", body);
 }
@@ -152,11 +154,9 @@ std::string path_section(const RunFolder& run, const Evaluation* compared, const
                   compared ? " Grey: the ground truth." : "",
                   run.points.size()));
   if (run.trajectories.size() > 1) {
-    body += paragraph(
-        "note",
-        fmt::format("The other {} parts of the map have a world of their own each and are "
-                    "not drawn.",
-                    run.trajectories.size() - 1));
+    body += paragraph("note",
+                      fmt::format("Not drawn: {} of the map with a world of its own.",
+                                  count_of(run.trajectories.size() - 1, "other part")));
   }
   return section("Path", body);
 }
@@ -238,18 +238,19 @@ std::string coverage_section(const RunFolder& run) {
   const RunSummary& summary = run.summary;
   if (summary.out_of_order + summary.without_partner > 0) {
     body += paragraph("note",
-                      fmt::format("{} images were out of order and left out, {} had no partner.",
-                                  summary.out_of_order,
+                      fmt::format("Out of order and left out: {}. Without a partner: {}.",
+                                  count_of(summary.out_of_order, "image"),
                                   summary.without_partner));
   }
   if (summary.missing_at_end > 0) {
     body += paragraph("note",
-                      fmt::format("The video ended {} frames before its container says.",
-                                  summary.missing_at_end));
+                      fmt::format("The video ended {} before its container says.",
+                                  count_of(summary.missing_at_end, "frame")));
   }
-  return section(
-      "Coverage and its reasons",
-      body + paragraph("note", "docs/results.md says what each state and reason means."));
+  return section("Coverage and its reasons",
+                 body + paragraph("note",
+                                  documentation("docs/results.md") +
+                                      " says what each state and reason means."));
 }
 
 std::string calibration_section(const RunSummary& summary) {
@@ -336,9 +337,7 @@ std::string length_unit(const RunFolder& run) {
 
 Evaluation evaluate_run(const RunFolder& run, const TruePath& truth) {
   EvaluationOptions options;
-  const bool is_free = run.summary.quality && !run.summary.quality->is_metric;
-  options.alignment =
-      truth.alignment.value_or(is_free ? TrajectoryAlignment::kSim3 : TrajectoryAlignment::kSe3);
+  options.alignment = truth.alignment.value_or(alignment_for(run.summary));
   options.num_frames = run.table.frames.size();
   return evaluate(run.trajectories.front(), truth.poses, options);
 }

@@ -9,6 +9,7 @@
 #include <optional>
 
 #include "waymark/base/median.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
@@ -32,6 +33,9 @@ constexpr Limits kLosses{0.0, 10.0};
 constexpr Limits kInliers{60.0, 30.0};
 /// Reprojection error in px: 0.49 to 0.88 is usual; simulated images have 0.3.
 constexpr Limits kReprojection{1.0, 1.6};
+/// The same in percent of the longer side: 0.03 to 0.14 is usual, also of wide lenses; from 0.2 on,
+/// as in images of 200x150 px, maps are rough and may be bent.
+constexpr double kReprojectionPercent = 0.2;
 /// Matches kept: .82 to .94 is usual.
 constexpr Limits kMatchesKept{0.75, 0.6};
 /// ATE in percent of the path: 0.08 to 0.6 is usual, and 2.2 with the hand, whose path is 0.7 m.
@@ -101,19 +105,24 @@ std::optional<Judgement> judge_inliers(const FrameTable& table) {
 }
 
 std::vector<Judgement> judge_agreement(const RunQuality& quality) {
-  return {{"Reprojection error",
-           grade_of(quality.reprojection_px, kReprojection),
-           fmt::format("{:.2f} px", quality.reprojection_px),
-           fmt::format("how far landmarks are from where they are seen; good up to {:.1f} px, bad "
-                       "above {:.1f} px. It grows with a wrong calibration and with blur",
-                       kReprojection.good,
-                       kReprojection.bad)},
-          {"Matches kept",
-           grade_of(quality.matches_kept, kMatchesKept),
-           fmt::format("{:.0f} %", 100.0 * quality.matches_kept),
-           fmt::format("matches that agree on the pose; good from {:.0f} %, bad below {:.0f} %",
-                       100.0 * kMatchesKept.good,
-                       100.0 * kMatchesKept.bad)}};
+  const bool is_coarse = quality.reprojection_percent > kReprojectionPercent;
+  return {
+      {"Reprojection error",
+       std::max(grade_of(quality.reprojection_px, kReprojection),
+                is_coarse ? Grade::kCheck : Grade::kGood),
+       fmt::format("{:.2f} px, {:.2f} %", quality.reprojection_px, quality.reprojection_percent),
+       fmt::format("how far landmarks are from where they are seen; good up to {:.1f} px and "
+                   "{:.1f} % of the image's longer side, bad above {:.1f} px. It grows with a "
+                   "wrong calibration and with blur; few pixels are a large part of small images",
+                   kReprojection.good,
+                   kReprojectionPercent,
+                   kReprojection.bad)},
+      {"Matches kept",
+       grade_of(quality.matches_kept, kMatchesKept),
+       fmt::format("{:.0f} %", 100.0 * quality.matches_kept),
+       fmt::format("matches that agree on the pose; good from {:.0f} %, bad below {:.0f} %",
+                   100.0 * kMatchesKept.good,
+                   100.0 * kMatchesKept.bad)}};
 }
 
 /// The largest change of a focal length by the images, as a part of it.
@@ -132,7 +141,7 @@ Judgement judge_calibration(const RunSummary& summary) {
   const std::size_t num_mistakes = summary.mistakes ? summary.mistakes->size() : 0;
   Judgement judgement{"Calibration", Grade::kCheck, "", ""};
   if (num_mistakes > 0) {
-    judgement.value = fmt::format("{} warning{}", num_mistakes, num_mistakes == 1 ? "" : "s");
+    judgement.value = count_of(num_mistakes, "warning");
     judgement.why = summary.mistakes->front();
   } else if (summary.calibration && !summary.calibration->is_sure) {
     judgement.value = "estimated, not sure";

@@ -79,6 +79,16 @@ TEST(Verdict, OfResiduals) {
   EXPECT_EQ(verdict.names_of(Grade::kCheck), "Matches kept");
 }
 
+TEST(Verdict, OfImagesThatAreCoarse) {
+  const FrameTable table = good_table();
+  RunSummary summary = good_summary(table);
+  summary.quality->reprojection_px = 0.5;
+  summary.quality->reprojection_percent = 0.32;
+  const Verdict verdict = verdict_of(table, summary);
+  EXPECT_EQ(verdict.grade, Grade::kCheck);
+  EXPECT_EQ(verdict.names_of(Grade::kCheck), "Reprojection error");
+}
+
 TEST(Verdict, OfTheErrorAgainstTheTruth) {
   const FrameTable table = good_table();
   Evaluation truth;

@@ -4,6 +4,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "waymark/calibrate/missing_distortion.h"
 
 namespace waymark {
 namespace {
@@ -42,6 +45,34 @@ double camera_shift(const RigCamera& before, const RigCamera& after) {
   return std::sqrt(sum / count) / camera.width_px();
 }
 
+/// Whether nothing but zeros is said of the distortion of a perspective camera, and not that they
+/// are exact.
+bool is_said_to_be_ideal(const ChainCamera& camera) {
+  const CameraDescription& description = camera.description;
+  const auto is_zero = [](double value) { return value == 0.0; };
+  return description.camera_model == "pinhole" &&
+         (description.distortion_model == "none" || description.distortion_model == "radtan") &&
+         std::ranges::all_of(description.distortion_coeffs, is_zero) &&
+         std::ranges::none_of(camera.sigmas.distortion_coeffs, is_zero);
+}
+
+/// With stereo or depth the map is straight enough to mend the calibration by itself.
+std::optional<ChainCamera> with_missing_distortion(const Session& session) {
+  const InputInfo& info = session.input->info();
+  ChainCamera camera = info.calibration->cameras.front();
+  if (info.setup != Setup::kMono || !session.settings.calibration.is_refined() ||
+      !is_said_to_be_ideal(camera)) {
+    return std::nullopt;
+  }
+  const auto found = find_missing_distortion(match_keyframes(*session.system->map()),
+                                             camera.description,
+                                             *session.system->rig()->cameras[0].camera);
+  if (!found) return std::nullopt;
+  camera.description = *found;
+  camera.sigmas.distortion_coeffs = {0.1, 0.1, 5e-4, 5e-4};
+  return camera;
+}
+
 }  // namespace
 
 double image_shift(const Rig& before, const Rig& after) {
@@ -52,17 +83,24 @@ double image_shift(const Rig& before, const Rig& after) {
   return largest;
 }
 
-std::optional<CameraChain> calibration_for_another_pass(const Session& session) {
+std::optional<AnotherPass> calibration_for_another_pass(const Session& session) {
   const InputInfo& info = session.input->info();
-  const std::shared_ptr<const Rig> rig = session.system->rig();
-  if (info.is_live || session.estimated || image_shift(session.rig, *rig) < kMinShift) {
-    return std::nullopt;
+  if (info.is_live || session.estimated) return std::nullopt;
+  AnotherPass pass{*info.calibration};
+  if (const auto distorted = with_missing_distortion(session)) {
+    pass.calibration.cameras[0] = *distorted;
+    pass.mistake =
+        "calibration: the images contradict a lens without distortion, as the stated zeros say: "
+        "they are taken as unknown";
+  } else {
+    const std::shared_ptr<const Rig> rig = session.system->rig();
+    const auto found =
+        image_shift(session.rig, *rig) < kMinShift ? std::nullopt : chain_of(*rig, {});
+    if (!found) return std::nullopt;
+    pass.calibration.cameras = found->cameras;
   }
-  const std::optional<CameraChain> found = chain_of(*rig, {});
-  if (!found) return std::nullopt;
-  CameraChain chain = *info.calibration;
-  chain.cameras = found->cameras;
-  return chain;
+  pass.calibration = session.input->of_unchanged_images(std::move(pass.calibration));
+  return pass;
 }
 
 std::vector<CalibrationEstimate> join_passes(std::span<const CalibrationEstimate> first,

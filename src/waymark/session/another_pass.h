@@ -4,6 +4,7 @@
 
 #include <optional>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "waymark/camera/calibration.h"
@@ -16,10 +17,17 @@ namespace waymark {
 /// rig have the same direction: root mean square over the image of the camera where it is most.
 double image_shift(const Rig& before, const Rig& after);
 
-/// The calibration to map a session's input once more with, from the start: that which the session
-/// ended with, where the one it began with is another by so much that all that was tracked with it
-/// suffers. Nothing if it is not, or where the input comes but once or at its own time.
-std::optional<CameraChain> calibration_for_another_pass(const Session& session);
+/// What the input of a session is mapped once more with, from the start.
+struct AnotherPass {
+  CameraChain calibration;
+  std::string mistake = {};  ///< What was wrong with the stated one, for people; may be empty.
+};
+
+/// The calibration that the session ended with, where the one it began with is another by so much
+/// that all that was tracked with it suffers; or, of one camera, the stated one with the distortion
+/// that it is said not to have, where the images contradict that: see find_missing_distortion().
+/// Nothing if neither is so, or where the input comes but once or at its own time.
+std::optional<AnotherPass> calibration_for_another_pass(const Session& session);
 
 /// The changes of two passes, the second of which began where the first ended, as of one.
 std::vector<CalibrationEstimate> join_passes(std::span<const CalibrationEstimate> first,

@@ -14,7 +14,7 @@ using ::testing::IsEmpty;
 
 CameraChain small_chain(double focal_px, double turn_rad = 0.0) {
   const CameraDescription camera{
-      "pinhole", {focal_px, focal_px, 31.5, 23.5}, "radtan", {0.0, 0.0, 0.0, 0.0}, 64, 48, ""};
+      "pinhole", {focal_px, focal_px, 319.5, 239.5}, "radtan", {0.0, 0.0, 0.0, 0.0}, 640, 480, ""};
   const Rigid3 beside(so3_exp({0.0, turn_rad, 0.0}), Eigen::Vector3d(-0.1, 0.0, 0.0));
   return {{{camera, Rigid3()}, {camera, beside}}, 5000.0, {}};
 }
@@ -24,32 +24,32 @@ Rig small_rig(double focal_px, double turn_rad = 0.0) {
 }
 
 TEST(ImageShift, IsThatOfTheCameraThatMovesMost) {
-  EXPECT_NEAR(image_shift(small_rig(50.0), small_rig(50.0)), 0.0, 1e-9);
-  // 10 % of the distance from the centre: 23 px, root mean square.
-  EXPECT_NEAR(image_shift(small_rig(55.0), small_rig(49.5)), 0.1 * 23.0 / 64.0, 0.003);
-  // Of the second camera all by 0.5 px, and a little more where that is far off the axis.
-  EXPECT_NEAR(image_shift(small_rig(50.0), small_rig(50.0, 0.01)), 0.6 / 64.0, 0.001);
+  EXPECT_NEAR(image_shift(small_rig(500.0), small_rig(500.0)), 0.0, 1e-9);
+  // 10 % of the distance from the centre: 230 px, root mean square.
+  EXPECT_NEAR(image_shift(small_rig(550.0), small_rig(495.0)), 0.1 * 230.0 / 640.0, 0.003);
+  // Of the second camera all by 5 px, and a little more where that is far off the axis.
+  EXPECT_NEAR(image_shift(small_rig(500.0), small_rig(500.0, 0.01)), 6.0 / 640.0, 0.001);
 }
 
 TEST(AnotherPass, BeginsWithWhatWasFoundInsteadOfWhatWasStated) {
   const testing::TemporaryFolder folder;
-  testing::write_image(folder / "images" / "0.png", 64, 48, 90.0);
+  testing::write_image(folder / "images" / "0.png", 640, 480, 90.0);
   SessionOptions options;
   options.input = folder / "images";
   options.timing = Timing::kInline;
-  CameraChain stated = small_chain(50.0);
+  CameraChain stated = small_chain(500.0);
   stated.cameras.resize(1);
   options.calibration = stated;
   Session session = open_session(options);
   EXPECT_FALSE(calibration_for_another_pass(session)) << "as stated";
-  // As if 51 px had been stated and 50 px found: 2 %, which is mended in passing.
-  session.rig.cameras = {small_rig(51.0).cameras[0]};
+  // As if 510 px had been stated and 500 px found: 2 %, which is mended in passing.
+  session.rig.cameras = {small_rig(510.0).cameras[0]};
   EXPECT_FALSE(calibration_for_another_pass(session));
-  session.rig.cameras = {small_rig(53.0).cameras[0]};
-  const std::optional<CameraChain> found = calibration_for_another_pass(session);
+  session.rig.cameras = {small_rig(530.0).cameras[0]};
+  const std::optional<AnotherPass> found = calibration_for_another_pass(session);
   ASSERT_TRUE(found);
-  EXPECT_EQ(found->cameras[0].description.intrinsics[0], 50.0);
-  EXPECT_EQ(found->depth_factor, 5000.0) << "what is not of the cameras stays";
+  EXPECT_EQ(found->calibration.cameras[0].description.intrinsics[0], 500.0);
+  EXPECT_EQ(found->calibration.depth_factor, 5000.0) << "what is not of the cameras stays";
 }
 
 TEST(JoinPasses, AddsTheChanges) {

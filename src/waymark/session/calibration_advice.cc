@@ -4,7 +4,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <cmath>
 #include <cstddef>
 
@@ -100,48 +99,6 @@ std::optional<std::string> advise_on_times(double interval_ns) {
         interval_ns < 1e3 ? "milliseconds" : "microseconds");
   }
   return std::nullopt;
-}
-
-std::string describe(const FocalCheck& check) {
-  if (check.is_bent()) {
-    return fmt::format(
-        "by the residuals the distortion is wrong, by {:.0f} % (+- {:.0f} %) in the corners",
-        100.0 * std::abs(check.bend),
-        100.0 * check.bend_sigma);
-  }
-  return fmt::format("by the residuals the focal length is {}{:.1f} % (+- {:.1f} %) {} than stated",
-                     check.is_beyond ? "at least " : "",
-                     100.0 * std::abs(check.factor - 1.0),
-                     100.0 * check.sigma,
-                     check.factor < 1.0 ? "shorter" : "longer");
-}
-
-std::optional<std::string> advise_on_residuals(const FocalCheck& check,
-                                               const CameraDescription& camera) {
-  if (check.is_bent()) {
-    const bool has_none = camera.distortion_model == "none";
-    return fmt::format("{}: {}",
-                       describe(check),
-                       has_none ? "are the distortion coefficients missing?"
-                                : "is it the model of the lens (radtan, or equidistant for a "
-                                  "fisheye), and are its coefficients in order?");
-  }
-  if (!check.is_off()) return std::nullopt;
-  if (check.is_beyond || !has_image_plane(camera)) {
-    return describe(check) + ": are focal length and model of the lens right?";
-  }
-  return fmt::format("{}: try {:.0f} px in place of {:g}, or calibrate anew",
-                     describe(check),
-                     check.factor * focal_length_px(camera),
-                     focal_length_px(camera));
-}
-
-std::optional<std::string> advise_on_pictures(const PictureMotion& motion) {
-  if (!motion.is_stabilised()) return std::nullopt;
-  return fmt::format(
-      "the images look stabilised: the picture moves in its frame by about {:.0f} px, which no "
-      "calibration describes; turn stabilisation off",
-      motion.scatter_px);
 }
 
 }  // namespace waymark

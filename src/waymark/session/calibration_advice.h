@@ -7,8 +7,6 @@
 #include <vector>
 
 #include "waymark/camera/camchain.h"
-#include "waymark/mapping/focal_check.h"
-#include "waymark/mapping/picture_motion.h"
 
 namespace waymark {
 
@@ -19,14 +17,5 @@ std::vector<std::string> advise_on_numbers(const CameraChain& chain);
 
 /// The time from one image to the next, in nanoseconds: whether its unit is a likely one.
 std::optional<std::string> advise_on_times(double interval_ns);
-
-/// What residuals say, be it good or bad.
-std::string describe(const FocalCheck& check);
-/// How what residuals say is put right; nothing where it is good. camera: number 0 as calibrated.
-std::optional<std::string> advise_on_residuals(const FocalCheck& check,
-                                               const CameraDescription& camera);
-
-/// Of video that was stabilised; nothing where the pictures hold still.
-std::optional<std::string> advise_on_pictures(const PictureMotion& motion);
 
 }  // namespace waymark

@@ -3,7 +3,6 @@
 #include "waymark/session/calibration_watch.h"
 
 #include "waymark/base/median.h"
-#include "waymark/mapping/picture_motion.h"
 #include "waymark/session/calibration_advice.h"
 
 namespace waymark {
@@ -19,10 +18,11 @@ constexpr std::size_t kNumIntervals = 10;
 }  // namespace
 
 CalibrationWatch::CalibrationWatch(const PreparedInput& input, Listener listener)
-    : listener_(std::move(listener)), units_per_metre_(input.settings.depth.factor) {
+    : listener_(std::move(listener)),
+      rig_(input.rig),
+      units_per_metre_(input.settings.depth.factor) {
   const InputInfo& info = input.input->info();
   if (info.calibration) {
-    camera0_ = info.calibration->cameras.at(0).description;
     for (const std::string& line : advise_on_numbers(*info.calibration)) report(line);
   }
   const Settings& settings = input.settings;
@@ -31,6 +31,10 @@ CalibrationWatch::CalibrationWatch(const PreparedInput& input, Listener listener
                   FrameSettings{settings.features, settings.stereo, settings.depth, settings.view});
   }
   if (info.setup == Setup::kRgbd) depth_.emplace();
+}
+
+void CalibrationWatch::compare_with(std::shared_ptr<const Map> map) {
+  if (depth_) map_depth_.emplace(std::move(map), rig_);
 }
 
 void CalibrationWatch::report(const std::optional<std::string>& mistake) {
@@ -49,9 +53,11 @@ void CalibrationWatch::add_time(std::size_t index, std::int64_t timestamp_ns) {
   if (intervals_ns_.size() == kNumIntervals) decide_on_times();
 }
 
-void CalibrationWatch::add(const FrameImages& images, const System& system) {
+void CalibrationWatch::add(const FrameImages& images,
+                           const TrackingResult& result,
+                           const System& system) {
   const int at = num_fed_++;
-  const Features* features = system.details().features.get();
+  const Features* features = system.result().features.get();
   if (pair_ && features && !images.image1.is_empty() && at % kPairEvery == 0) {
     pair_->add(images, *features);
     if (pair_->num_images() == kNumPairs) decide_on_pair();
@@ -60,15 +66,14 @@ void CalibrationWatch::add(const FrameImages& images, const System& system) {
     depth_->add(images.image0, images.depth);
     if (depth_->num_images() == kNumDepths) decide_on_depth();
   }
-  decide_on_residuals(system);
+  if (map_depth_) map_depth_->add(images, result);
 }
 
-void CalibrationWatch::finish(const System& system) {
+void CalibrationWatch::finish() {
   decide_on_times();
   decide_on_pair();
   decide_on_depth();
-  decide_on_residuals(system);
-  decide_on_pictures(system);
+  if (map_depth_) report(map_depth_->advise(units_per_metre_));
 }
 
 void CalibrationWatch::decide_on_times() {
@@ -88,17 +93,6 @@ void CalibrationWatch::decide_on_depth() {
   report(depth_->advise_on_units(units_per_metre_));
   report(depth_->advise_on_registration());
   depth_.reset();
-}
-
-void CalibrationWatch::decide_on_residuals(const System& system) {
-  const FocalCheck* check = are_residuals_known_ ? nullptr : system.focal_check();
-  if (check == nullptr) return;
-  are_residuals_known_ = true;
-  report(advise_on_residuals(*check, camera0_));
-}
-
-void CalibrationWatch::decide_on_pictures(const System& system) {
-  if (const auto motion = find_picture_motion(*system.map())) report(advise_on_pictures(*motion));
 }
 
 }  // namespace waymark

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "waymark/session/depth_check.h"
+#include "waymark/session/map_depth_check.h"
 #include "waymark/session/pair_check.h"
 #include "waymark/session/session_options.h"
 #include "waymark/system/system.h"
@@ -26,12 +27,15 @@ class CalibrationWatch {
   /// Names what the numbers alone tell.
   CalibrationWatch(const PreparedInput& input, Listener listener);
 
+  /// Of a session that goes on in a map, before its first frame.
+  void compare_with(std::shared_ptr<const Map> map);
+
   /// Of each frame of the input, in order.
   void add_time(std::size_t index, std::int64_t timestamp_ns);
   /// Of each frame that was just fed to the system.
-  void add(const FrameImages& images, const System& system);
-  /// After the last frame; the system is finished.
-  void finish(const System& system);
+  void add(const FrameImages& images, const TrackingResult& result, const System& system);
+  /// After the last frame.
+  void finish();
 
   /// In the order they were found.
   const std::vector<std::string>& mistakes() const { return mistakes_; }
@@ -41,12 +45,10 @@ class CalibrationWatch {
   void decide_on_times();
   void decide_on_pair();
   void decide_on_depth();
-  void decide_on_residuals(const System& system);
-  void decide_on_pictures(const System& system);
 
   Listener listener_;
   std::vector<std::string> mistakes_;
-  CameraDescription camera0_;
+  Rig rig_;
   double units_per_metre_;
   int num_fed_ = 0;
   std::optional<std::pair<std::size_t, std::int64_t>> last_time_;
@@ -54,8 +56,8 @@ class CalibrationWatch {
   // Nothing once they have decided.
   std::optional<PairCheck> pair_;
   std::optional<DepthCheck> depth_;
+  std::optional<MapDepthCheck> map_depth_;
   bool are_times_known_ = false;
-  bool are_residuals_known_ = false;
 };
 
 }  // namespace waymark

@@ -142,18 +142,6 @@ TEST(CalibrationWatch, NamesPairsThatDoNotFit) {
       ElementsAre(HasSubstr("is T_cn_cnm1 in millimetres?")));
 }
 
-TEST(CalibrationWatch, NamesStabilisedPictures) {
-  SequenceSpec spec;
-  spec.chain = mono_chain(watched_camera(0.0));
-  spec.world = "hall";
-  spec.motion = "inspect";
-  spec.num_frames = 90;
-  spec.stabilised_share = 0.05;
-  EXPECT_THAT(mistakes_of(render(spec), spec.chain),
-              ElementsAre(AllOf(HasSubstr("the images look stabilised"),
-                                HasSubstr("turn stabilisation off"))));
-}
-
 TEST(CalibrationWatch, NamesUnitsOfDepth) {
   const std::vector<InputFrame> frames = render(watched_depth(), "room", 3);
   EXPECT_THAT(mistakes_of(frames, watched_depth()), IsEmpty());
@@ -216,22 +204,6 @@ TEST(CalibrationAdvice, NamesUnlikelyNumbers) {
   camera = named_camera("perspective", 480);
   camera.intrinsics[3] -= 100.0;
   EXPECT_THAT(advise_on_numbers(mono_chain(camera)), IsEmpty());
-}
-
-TEST(CalibrationAdvice, SaysWhatToDoAboutResiduals) {
-  CameraDescription camera = named_camera("perspective", 480);
-  FocalCheck check;
-  check.factor = 1.1;
-  check.sigma = 0.001;
-  EXPECT_THAT(advise_on_residuals(check, camera).value_or(""),
-              HasSubstr("try 475 px in place of 432"));
-  check.is_beyond = true;
-  EXPECT_THAT(advise_on_residuals(check, camera).value_or(""), HasSubstr("model of the lens"));
-  check = {.bend = 0.1, .bend_sigma = 0.001};
-  EXPECT_THAT(advise_on_residuals(check, camera).value_or(""), HasSubstr("coefficients in order"));
-  camera.distortion_model = "none";
-  EXPECT_THAT(advise_on_residuals(check, camera).value_or(""), HasSubstr("missing?"));
-  EXPECT_EQ(advise_on_residuals({}, camera), std::nullopt);
 }
 
 }  // namespace

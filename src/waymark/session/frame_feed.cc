@@ -152,12 +152,14 @@ FedFrames feed_all(Input& input,
       const std::shared_ptr<const InputFrame> frame = in_turn.next();
       if (!frame) break;
       add_frame(*frame, feed, frames);
+      if (!frame->name.empty()) frames.table.names.push_back(frame->name);
       if (observer) observer(frames.table.frames.back(), frame->warning);
     }
   } catch (...) {
     if (frames.fed.empty()) throw;
     frames.failure = std::current_exception();
   }
+  frames.table.has_times = frames.table.names.empty() || input.info().has_times;
   return frames;
 }
 

@@ -28,21 +28,19 @@ const cv::Scalar kOfMap(80, 200, 60);  // Blue, green, red.
 const cv::Scalar kOther(60, 200, 230);
 const cv::Scalar kTextColour(255, 255, 255);
 
-/// MPEG-4 takes even sizes only.
+/// With colours at half the size, as all players take them, there are even sizes only.
 int even(int pixels) { return pixels & ~1; }
 
-cv::Mat draw_frame(const FrameImages& images,
-                   const TrackingResult& result,
-                   const FrameDetails& details) {
+cv::Mat draw_frame(const FrameImages& images, const TrackingResult& result) {
   const ImageView& image = images.image0;
   cv::Mat grey(even(image.height_px), even(image.width_px), CV_8UC1);
   for (int y = 0; y < grey.rows; ++y) std::copy_n(image.row(y), grey.cols, grey.ptr(y));
   cv::Mat drawn;
   cv::cvtColor(grey, drawn, cv::COLOR_GRAY2BGR);
-  const std::size_t num_features = details.features ? details.features->num_primary : 0;
+  const std::size_t num_features = result.features ? result.features->num_primary : 0;
   for (std::size_t i = 0; i < num_features; ++i) {
-    const Keypoint& keypoint = details.features->keypoints[i];
-    const bool is_of_map = i < details.landmarks.size() && details.landmarks[i].is_valid();
+    const Keypoint& keypoint = result.features->keypoints[i];
+    const bool is_of_map = i < result.landmarks.size() && result.landmarks[i].is_valid();
     const cv::Point centre(cvRound(keypoint.x_px), cvRound(keypoint.y_px));
     cv::circle(drawn, centre, kRadiusPx, is_of_map ? kOfMap : kOther, 1, cv::LINE_AA);
   }
@@ -88,6 +86,8 @@ class OverlayVideo::Impl {
     writer_.write(frame);
   }
 
+  bool is_h264() const { return is_h264_; }
+
   void finish() {
     if (waiting_ && !writer_.isOpened()) open(kMinFps);
     if (!writer_.isOpened()) return;
@@ -98,13 +98,14 @@ class OverlayVideo::Impl {
   }
 
  private:
+  bool open_as(const char (&codec)[5], double fps) {
+    const int name = cv::VideoWriter::fourcc(codec[0], codec[1], codec[2], codec[3]);
+    return writer_.open(part_.string(), cv::CAP_FFMPEG, name, fps, waiting_->size());
+  }
+
   void open(double fps) {
-    const bool is_open = writer_.open(part_.string(),
-                                      cv::CAP_FFMPEG,
-                                      cv::VideoWriter::fourcc('m', 'p', '4', 'v'),
-                                      fps,
-                                      waiting_->size());
-    if (!is_open) {
+    is_h264_ = open_as("avc1", fps);
+    if (!is_h264_ && !open_as("mp4v", fps)) {
       throw OutputError(path_.string(),
                         "cannot be written as a video, expected OpenCV with ffmpeg");
     }
@@ -116,18 +117,19 @@ class OverlayVideo::Impl {
   cv::VideoWriter writer_;
   std::optional<cv::Mat> waiting_;  ///< The first frame.
   std::int64_t first_ns_ = 0;
+  bool is_h264_ = true;
 };
 
 OverlayVideo::OverlayVideo(const std::filesystem::path& path)
     : impl_(std::make_unique<Impl>(path)) {}
 OverlayVideo::~OverlayVideo() = default;
 
-void OverlayVideo::add(const FrameImages& images,
-                       const TrackingResult& result,
-                       const FrameDetails& details) {
-  impl_->add(draw_frame(images, result, details), images.timestamp_ns);
+void OverlayVideo::add(const FrameImages& images, const TrackingResult& result) {
+  impl_->add(draw_frame(images, result), images.timestamp_ns);
 }
 
 void OverlayVideo::finish() { impl_->finish(); }
+
+bool OverlayVideo::is_h264() const { return impl_->is_h264(); }
 
 }  // namespace waymark

@@ -12,6 +12,7 @@ namespace waymark {
 
 /// A video of what was seen: the images of camera 0 with their features, those of the map and
 /// others in different colours, and the state of the frame. As fast as the first two frames were.
+/// In H.264, which browsers play, where the video library can write it, else in MPEG-4 Part 2.
 class OverlayVideo {
  public:
   /// Throws OutputError where there cannot be such a file.
@@ -21,10 +22,12 @@ class OverlayVideo {
   OverlayVideo& operator=(const OverlayVideo&) = delete;
 
   /// A frame that was just fed, as the system tells of it. Throws OutputError.
-  void add(const FrameImages& images, const TrackingResult& result, const FrameDetails& details);
+  void add(const FrameImages& images, const TrackingResult& result);
   /// Puts the video under its name; without it, or without frames, there is none. Throws
   /// OutputError.
   void finish();
+  /// Whether browsers play it; also without frames.
+  bool is_h264() const;
 
  private:
   class Impl;

@@ -4,26 +4,33 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "waymark/base/text.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/optimize/residual.h"
 
 namespace waymark {
 namespace {
 
-double rms_reprojection_px(const Map& map) {
-  double sum = 0.0;
-  std::size_t count = 0;
+void add_reprojection(const Map& map, RunQuality& quality) {
+  double sum = 0.0, sum_of_parts = 0.0, count = 0.0;
   map.landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
     for (const Observation& seen : landmark.observations) {
       const Keyframe& keyframe = map.keyframes().at(seen.keyframe);
-      sum += squared_residual(keyframe, seen.feature, landmark.position_in_world)
-                 .value_or(kGrossSquaredResidual);
+      const double squared = squared_residual(keyframe, seen.feature, landmark.position_in_world)
+                                 .value_or(kGrossSquaredResidual);
+      const Camera& camera = *keyframe.rig().cameras.at(0).camera;
+      const double side_px = std::max(camera.width_px(), camera.height_px());
+      sum += squared;
+      sum_of_parts += squared / (side_px * side_px);
       ++count;
     }
   });
-  return count == 0 ? 0.0 : std::sqrt(sum / static_cast<double>(count));
+  if (count == 0.0) return;
+  quality.reprojection_px = std::sqrt(sum / count);
+  quality.reprojection_percent = 100.0 * std::sqrt(sum_of_parts / count);
 }
 
 double share_of_matches_kept(std::span<const FrameRecord> frames) {
@@ -55,7 +62,7 @@ RunQuality assess(const Map& map,
                   std::span<const FrameRecord> frames,
                   std::span<const std::vector<StampedPose>> trajectories) {
   RunQuality quality;
-  quality.reprojection_px = rms_reprojection_px(map);
+  add_reprojection(map, quality);
   quality.matches_kept = share_of_matches_kept(frames);
   quality.length = length_of(trajectories);
   quality.is_metric = is_metric(map);
@@ -64,11 +71,10 @@ RunQuality assess(const Map& map,
 
 std::string describe(const RunQuality& quality, std::size_t num_loops) {
   return fmt::format(
-      "reprojection error {:.2f} px, {:.0f} % of the matches kept, {} loop{}, {:.1f} {} long",
+      "reprojection error {:.2f} px, {:.0f} % of the matches kept, {}, {:.1f} {} long",
       quality.reprojection_px,
       100.0 * quality.matches_kept,
-      num_loops,
-      num_loops == 1 ? "" : "s",
+      count_of(num_loops, "loop"),
       quality.length,
       quality.is_metric ? "m" : "map units");
 }

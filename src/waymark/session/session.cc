@@ -111,7 +111,7 @@ std::vector<LoopFrames> list_loops(const System& system, const FedFrames& frames
   std::vector<LoopFrames> loops;
   if (frames.fed.empty()) return loops;
   const Map& map = *system.map();
-  const std::size_t end = std::size_t{system.details().frame.value} + 1;
+  const std::size_t end = std::size_t{system.result().frame_in_map.value} + 1;
   const auto index_of = [&](KeyframeId id) -> std::optional<std::uint32_t> {
     const std::size_t frame = map.keyframes().at(id).frame.value;
     const std::size_t before = end - std::min(end, frames.fed.size());
@@ -157,6 +157,27 @@ void write_ego_mask(const std::filesystem::path& path, const Image& mask) {
   }
 }
 
+/// Or removes that of an earlier run.
+void write_poses(const std::filesystem::path& path, const SessionResults& results) {
+  std::error_code error;
+  if (results.table.names.empty()) {
+    std::filesystem::remove(path, error);
+  } else {
+    write_file_atomically(path, format_poses_csv(results.table, results.trajectories));
+  }
+}
+
+/// Throws InputError for files that results would take the place of.
+void expect_no_results(const std::filesystem::path& folder) {
+  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
+    const std::string name = entry.path().filename().string();
+    if (!is_result_name(name) || !entry.is_regular_file()) continue;
+    throw InputError(
+        folder.string(),
+        "holds " + name + ", which no run left there, expected a new folder or results of a run");
+  }
+}
+
 /// Fills in the trajectories of all sub-maps, and what follows from them.
 void add_trajectories(const Map& map,
                       const std::vector<std::pair<SubmapId, StampedPose>>& poses,
@@ -181,7 +202,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   const auto feed = [&](const FrameImages& frame) {
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
-    if (hooks.watch) hooks.watch->add(frame, system);
+    if (hooks.watch) hooks.watch->add(frame, result, system);
     return result;
   };
   const auto observe = [&](const FrameRecord& record, const std::string& warning) {
@@ -196,8 +217,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   FedFrames frames = feed_all(input, feed, hooks.should_stop, observe, lookahead);
   finish(system, hooks, frames);
   reserve.release();
-  if (hooks.watch) hooks.watch->finish(system);
-  if (!frames.failure) system.drop_seen_through();
+  if (hooks.watch) hooks.watch->finish();
   malloc_trim(0);  // What frames saw is settled and gone: lists of results take its place.
   update_states(system, frames);
 
@@ -206,11 +226,12 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.summary.loop_frames = list_loops(system, frames);
   for (const KeptScale& kept : system.kept_scales()) {
-    results.summary.scales.push_back(
-        {kept.submap.value, kept.before.value, kept.log_sigma, kept.num_landmarks});
+    results.summary.scales.push_back({kept.submap.value, kept.before.value});
   }
   results.table = std::move(frames.table);
-  results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
+  if (results.summary.counts.tracked > 0) {
+    results.summary.quality = assess(*system.map(), results.table.frames, results.trajectories);
+  }
   results.summary.markers = summarize(system.markers());
   results.ego_mask = system.ego_mask();
   results.summary.moves_along = ego_share(results.ego_mask);
@@ -220,18 +241,22 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   return results;
 }
 
-void prepare_results(const std::filesystem::path& folder) {
+bool prepare_results(const std::filesystem::path& folder) {
   make_output_folder(folder);
+  const bool is_earlier_run = holds_results(folder);
+  if (!is_earlier_run) expect_no_results(folder);
   for (const char* name :
        {"trajectory.txt", "keyframes.txt", "points.ply", "summary.json", "frames.csv"}) {
     AtomicFile{folder / name};
     remove_abandoned_parts(folder / name);
   }
+  return is_earlier_run;
 }
 
 void write_results(const std::filesystem::path& folder, const SessionResults& results) {
   save_each(
-      {[&] { write_trajectories(folder, results.trajectories); },
+      {[&] { write_trajectories(folder, results.trajectories, results.table.has_times); },
+       [&] { write_poses(folder / "poses.csv", results); },
        [&] {
          write_trajectory(folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
        },
@@ -288,9 +313,13 @@ SessionResults localize_input(Input& input,
                               Localizer& localizer,
                               ImageOrder order,
                               const std::function<bool()>& should_stop,
-                              const FrameObserver& observer) {
+                              const FrameObserver& observer,
+                              MapDepthCheck* check) {
   const auto locate = [&](const FrameImages& frame) {
-    return order == ImageOrder::kStream ? localizer.track(frame) : localizer.locate(frame);
+    TrackingResult result =
+        order == ImageOrder::kStream ? localizer.track(frame) : localizer.locate(frame);
+    if (check) check->add(frame, result);
+    return result;
   };
   const Map& map = localizer.map();
   SessionResults results = locate_all(input, locate, map, should_stop, observer);

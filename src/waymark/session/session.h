@@ -58,12 +58,13 @@ struct SessionHooks {
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks = {});
 
 /// Makes the folder and tries its files, so that write_results() will not be the first to find out
-/// that they cannot be written. Throws OutputError.
-void prepare_results(const std::filesystem::path& folder);
+/// that they cannot be written: OutputError. Whether results of an earlier run will be replaced;
+/// InputError for files with their names that no run left there.
+bool prepare_results(const std::filesystem::path& folder);
 
 /// Writes trajectory.txt, trajectory_1.txt ..., keyframes.txt, points.ply, frames.csv, summary.json
-/// and, where something moves along, view_mask.png, each whatever becomes of the others; throws
-/// OutputError.
+/// and, where something moves along, view_mask.png, where images have names, poses.csv, each
+/// whatever becomes of the others; throws OutputError.
 void write_results(const std::filesystem::path& folder, const SessionResults& results);
 
 /// "inline", "lockstep", "realtime".
@@ -74,12 +75,13 @@ enum class ImageOrder { kStream, kUnordered };
 
 /// Finds all frames of an input in the map of a localizer until it ends or should_stop() says so.
 /// The trajectories are in the map's frames, keyframes and counts those of the map. setup, timing,
-/// seed and version of the summary are left to the caller.
+/// seed and version of the summary are left to the caller. check: hears of all frames; null: none.
 SessionResults localize_input(Input& input,
                               Localizer& localizer,
                               ImageOrder order,
                               const std::function<bool()>& should_stop,
-                              const FrameObserver& observer);
+                              const FrameObserver& observer,
+                              MapDepthCheck* check = nullptr);
 
 /// Finds a frame in whatever it is looked for.
 using LocateFrame = std::function<TrackingResult(const FrameImages&)>;

@@ -4,23 +4,34 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+#include <span>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
+#include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/camera/pixel_angles.h"
+#include "waymark/camera/resized_camera.h"
 #include "waymark/exchange/config_file.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
 namespace {
 
+constexpr const char* kPlaceholder =
+    "a calibration with a focal length of 1 px or its principal point at 0, 0, a placeholder";
+
 ConfigNode read_configuration(const SessionOptions& options, std::vector<std::string>& notes) {
-  std::vector<ConfigSource> sources;
-  for (const std::filesystem::path& file : options.configs) {
-    sources.push_back(read_config_file(file, notes));
+  constexpr std::size_t kMaxConfigs = 100;
+  if (options.configs.size() > kMaxConfigs) {
+    throw InputError(
+        "--config",
+        fmt::format("is given {} times, expected at most {}", options.configs.size(), kMaxConfigs));
   }
+  std::vector<ConfigSource> sources = read_config_files(options.configs, notes);
   for (const std::string& assignment : options.assignments) {
     sources.push_back(ConfigSource::from_assignment(assignment));
   }
@@ -48,29 +59,78 @@ std::optional<std::string> describe_unused(const Camera& camera, std::size_t ind
       100.0 * part);
 }
 
+/// Whether the calibration of an input has numbers that nobody measured: as of an identity matrix.
+bool has_placeholder(const Input& input) {
+  constexpr double kRounding = 1e-6;
+  const auto is = [](double value, double other) { return std::abs(value - other) < kRounding; };
+  const CameraChain chain = input.of_unchanged_images(*input.info().calibration);
+  return std::ranges::any_of(chain.cameras, [&](const ChainCamera& camera) {
+    if (!has_image_plane(camera.description)) return false;
+    const auto plane = std::span(camera.description.intrinsics).last<kNumPlaneIntrinsics>();
+    return (is(plane[0], 1.0) && is(plane[1], 1.0)) || (is(plane[2], 0.0) && is(plane[3], 0.0));
+  });
+}
+
 /// Calibrates from the images of an input that carries no calibration.
 EstimatedCalibration estimate(const SessionOptions& options, int seed, Input& input) {
+  const std::string lack =
+      input.info().calibration ? fmt::format("has {}", kPlaceholder) : "carries no calibration";
   if (!options.calibrate) {
     throw InputError(options.input.string(),
-                     "carries no calibration, expected its cameras in a file given with -c");
+                     lack + ", expected its cameras in a file given with -c");
   }
   if (input.info().setup == Setup::kStereo) {
     throw InputError(options.input.string(),
-                     "carries no calibration, expected its two cameras in a file given with -c, or "
-                     "--setup mono");
+                     lack + ", expected its two cameras in a file given with -c, or --setup mono");
   }
   CalibrateOptions calibrate_options = *options.calibrate;
   calibrate_options.seed = seed;
   return calibrate(input, calibrate_options);
 }
 
+/// Nothing where none or several of the cameras have images of the input's size.
+std::optional<CameraChain> known_camera(const std::vector<CameraChain>& cameras,
+                                        const InputInfo& info) {
+  std::optional<CameraChain> found;
+  for (const CameraChain& chain : cameras) {
+    const CameraDescription& camera = chain.cameras.front().description;
+    if (camera.width_px != info.width_px || camera.height_px != info.height_px) continue;
+    if (found && !found->cameras.front().description.is_same(camera)) return std::nullopt;
+    found = chain;
+  }
+  return found;
+}
+
+/// Opens the input anew with the calibration that the map knows or its images tell.
+void find_calibration(const SessionOptions& options,
+                      const ConfigNode& config,
+                      PreparedInput& prepared,
+                      std::vector<std::string>& notes) {
+  const InputInfo& info = prepared.input->info();
+  if (info.calibration) {
+    notes.push_back(fmt::format("{}, which is taken as unknown", kPlaceholder));
+  }
+  std::optional<CameraChain> found = known_camera(options.known_cameras, info);
+  if (found) {
+    notes.push_back("no calibration is given: that of the map is taken");
+  } else {
+    prepared.estimated = estimate(options, prepared.settings.seed, *prepared.input);
+    found = prepared.estimated->chain();
+  }
+  found->depth_factor =
+      info.calibration ? info.calibration->depth_factor : read_depth_factor(config);
+  prepared.reading.calibration = prepared.input->of_unchanged_images(*std::move(found));
+  prepared.input.reset();  // A camera is open once at a time.
+  prepared.input = open_input(options.input, prepared.reading);
+}
+
 }  // namespace
 
 std::string describe(const Map& map, const std::filesystem::path& path) {
-  return fmt::format("map {}: {} keyframes, {} landmarks, {}",
+  return fmt::format("map {}: {}, {}, {}",
                      path.string(),
-                     map.keyframes().size(),
-                     map.landmarks().size(),
+                     count_of(map.keyframes().size(), "keyframe"),
+                     count_of(map.landmarks().size(), "landmark"),
                      is_metric(map) ? "in metres" : "scale free");
 }
 
@@ -82,17 +142,15 @@ PreparedInput prepare_input(const SessionOptions& options) {
   if (options.seed) prepared.settings.seed = *options.seed;
 
   InputOptions reading = options.reading;
+  reading.enlarges_small = true;
   reading.calibration = read_camchain(config);
   if (options.calibration) reading.calibration = options.calibration;
   prepared.input = open_input(options.input, reading);
 
-  if (!prepared.input->info().calibration) {
-    prepared.estimated = estimate(options, prepared.settings.seed, *prepared.input);
-    reading.calibration = prepared.estimated->chain();
-    prepared.input.reset();  // A camera is open once at a time.
-    prepared.input = open_input(options.input, reading);
-  }
   prepared.reading = reading;
+  if (!prepared.input->info().calibration || has_placeholder(*prepared.input)) {
+    find_calibration(options, config, prepared, notes);
+  }
   const InputInfo& info = prepared.input->info();
   if (info.calibration->depth_factor) {
     prepared.settings.depth.factor = *info.calibration->depth_factor;

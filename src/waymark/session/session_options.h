@@ -26,8 +26,11 @@ struct SessionOptions {
   InputOptions reading;                        ///< The calibration is filled in.
   Timing timing = Timing::kLockstep;
   std::optional<int> seed;  ///< Overrides the settings.
-  /// Instead of what the configuration or the input says of the cameras; nothing: that.
+  /// Instead of what the configuration or the input says of the cameras, before --rotate and
+  /// --resize; nothing: that.
   std::optional<CameraChain> calibration = std::nullopt;
+  /// Of an input that carries no calibration, the only one of these whose images have its size.
+  std::vector<CameraChain> known_cameras = {};
   /// How to calibrate from the images of an input that carries no calibration, its seed aside;
   /// nothing: such an input is an error.
   std::optional<CalibrateOptions> calibrate;

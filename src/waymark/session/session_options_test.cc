@@ -65,6 +65,20 @@ TEST_F(OpenSession, SaysWhatIsWrong) {
               HasSubstr("carries no calibration, expected its cameras in a file given with -c"));
 }
 
+TEST_F(OpenSession, KnowsAPlaceholderForACalibration) {
+  for (const char* numbers : {"[1, 1, 0, 0]", "[1, 1, 31.5, 23.5]", "[50, 50, 0, 0]"}) {
+    std::string cameras = kCameras;
+    const std::string measured = "[50, 50, 31.5, 23.5]";
+    cameras.replace(cameras.find(measured), measured.size(), numbers);
+    options_.configs = {folder_.write("cameras.yaml", cameras)};
+    for (const auto resize_px : {std::optional<int>(), std::optional<int>(32)}) {
+      options_.reading.resize_px = resize_px;
+      EXPECT_THAT(input_error_of([&] { open_session(options_); }), HasSubstr("a placeholder, exp"))
+          << numbers;
+    }
+  }
+}
+
 TEST_F(OpenSession, GoesOnInAMap) {
   StoredMap stored;
   stored.map = Map().freeze();

@@ -149,7 +149,7 @@ TEST(RunSession, KeepsFeaturesOffWhatMovesAlong) {
     System system(small_rig(), small_settings(), timing);
     const SessionResults results = run_session(input, system);
     EXPECT_NEAR(results.summary.moves_along.value_or(0.0), 140.0 * 40.0 / (320.0 * 240.0), 0.02);
-    for (const Keypoint& keypoint : system.details().features->keypoints) {
+    for (const Keypoint& keypoint : system.result().features->keypoints) {
       EXPECT_FALSE(keypoint.y_px > 205.0f && std::abs(keypoint.x_px - 160.0f) < 60.0f);
     }
     write_results(folder.path(), results);

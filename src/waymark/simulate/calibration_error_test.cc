@@ -14,7 +14,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-const Rigid3 kBeside(so3_exp({0.01, -0.02, 0.005}), {-0.11, 0.002, 0.001});
+const Rigid3 kSpatialNeighbours(so3_exp({0.01, -0.02, 0.005}), {-0.11, 0.002, 0.001});
 
 std::string error_of(const std::function<void()>& run) {
   try {
@@ -49,17 +49,19 @@ TEST(CalibrationError, ChangesWhatItSaysAndNothingElse) {
 
 TEST(CalibrationError, TurnsTheSecondCameraWhereItStands) {
   const CameraDescription camera = named_camera("perspective", 480);
-  const CameraChain told =
-      told_chain(stereo_chain(camera, camera, kBeside), parse_calibration_error({"turn_y=2"}));
+  const CameraChain told = told_chain(stereo_chain(camera, camera, kSpatialNeighbours),
+                                      parse_calibration_error({"turn_y=2"}));
   EXPECT_TRUE(told.cameras[0].description.is_same(camera));
   const Rigid3& turned = told.cameras[1].cam_from_rig;
-  EXPECT_NEAR(turned.rotation.angularDistance(kBeside.rotation), 2e-3, 1e-9);
-  const Eigen::Vector3d moved = turned.inverse().translation - kBeside.inverse().translation;
+  EXPECT_NEAR(turned.rotation.angularDistance(kSpatialNeighbours.rotation), 2e-3, 1e-9);
+  const Eigen::Vector3d moved =
+      turned.inverse().translation - kSpatialNeighbours.inverse().translation;
   EXPECT_LT(moved.norm(), 1e-12);
   const CameraChain longer =
-      told_chain(stereo_chain(camera, camera, kBeside), {.baseline = 1000.0});
-  EXPECT_LT((longer.cameras[1].cam_from_rig.translation - 1000.0 * kBeside.translation).norm(),
-            1e-9);
+      told_chain(stereo_chain(camera, camera, kSpatialNeighbours), {.baseline = 1000.0});
+  EXPECT_LT(
+      (longer.cameras[1].cam_from_rig.translation - 1000.0 * kSpatialNeighbours.translation).norm(),
+      1e-9);
 }
 
 TEST(CalibrationError, ScalesDepth) {

@@ -14,6 +14,7 @@
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/exchange/trajectory.h"
+#include "waymark/image/opencv_image.h"
 
 namespace waymark {
 namespace {
@@ -61,12 +62,10 @@ std::string format_sensor(const ChainCamera& camera, double rate_hz) {
 }
 
 template <class T>
-void write_png(const fs::path& path, const BasicImage<T>& image, int type) {
-  // OpenCV wants a pointer to non-const values, but does not write to them.
-  const cv::Mat mat(image.height_px, image.width_px, type, const_cast<T*>(image.values.data()));
+void write_png(const fs::path& path, const BasicImage<T>& image) {
   bool is_written = false;
   try {
-    is_written = cv::imwrite(path.string(), mat, {cv::IMWRITE_PNG_COMPRESSION, 1});
+    is_written = cv::imwrite(path.string(), mat_of(image.view()), {cv::IMWRITE_PNG_COMPRESSION, 1});
   } catch (const cv::Exception& error) {
     throw OutputError(path.string(), error.err);
   }
@@ -91,11 +90,11 @@ class Writer {
     const std::string name = (is_csv ? std::to_string(frame.timestamp_ns) : seconds) + ".png";
     const std::vector<fs::path> folders = image_folders();
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      write_png(folder_ / folders[i] / name, frame.images[i], CV_8UC1);
+      write_png(folder_ / folders[i] / name, frame.images[i]);
     }
     if (layout_ == Layout::kTumRgbd) {
       const std::string depth_seconds = format_seconds(frame.depth_timestamp_ns);
-      write_png(folder_ / "depth" / (depth_seconds + ".png"), frame.depth, CV_16UC1);
+      write_png(folder_ / "depth" / (depth_seconds + ".png"), frame.depth);
       list_ += fmt::format("{} rgb/{}\n", seconds, name);
       depth_list_ += fmt::format("{0} depth/{0}.png\n", depth_seconds);
     } else {

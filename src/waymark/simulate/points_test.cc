@@ -36,7 +36,7 @@ class Points : public ::testing::Test {
     const Features& features = *seen.features;
     const Keypoint& keypoint = features.keypoints[feature];
     const Rigid3 cam_from_world =
-        stereo_.cameras[keypoint.camera].cam_from_rig * world_from_rig_.inverse();
+        stereo_->cameras[keypoint.camera].cam_from_rig * world_from_rig_.inverse();
     const PointLandmark& landmark = cloud_.landmarks[seen.landmark_of_feature[feature]];
     const Vector3d predicted = (cam_from_world * landmark.position).normalized();
     const Vector3d difference = predicted - features.bearings[feature].cast<double>();
@@ -50,8 +50,8 @@ class Points : public ::testing::Test {
 
   std::shared_ptr<const World> world_ = make_world("bare", 2);
   PointCloud cloud_ = scatter_on(world_, 6000, 3.0, 5);
-  Rig mono_ = make_rig_of(1);
-  Rig stereo_ = make_rig_of(2);
+  const std::shared_ptr<const Rig> mono_ = std::make_shared<const Rig>(make_rig_of(1));
+  const std::shared_ptr<const Rig> stereo_ = std::make_shared<const Rig>(make_rig_of(2));
   Rigid3 world_from_rig_ = make_motion("bare", "loop", 10.0).world_from_rig(2.0);
 };
 

@@ -9,6 +9,7 @@
 #include <opencv2/imgproc.hpp>
 
 #include "waymark/base/check.h"
+#include "waymark/image/opencv_image.h"
 
 namespace waymark {
 namespace {
@@ -103,20 +104,17 @@ Eigen::Matrix<double, 2, 3> Stabilizer::sensor_from_picture(int frame) const {
 }
 
 Image Stabilizer::stabilize(const Image& sensor, int frame) const {
-  Image picture(sensor.width_px, sensor.height_px);
-  // OpenCV wants a pointer to non-const values, but does not write to them.
-  const cv::Mat from(
-      sensor.height_px, sensor.width_px, CV_8UC1, const_cast<std::uint8_t*>(sensor.values.data()));
-  cv::Mat to(picture.height_px, picture.width_px, CV_8UC1, picture.values.data());
+  const cv::Mat from = mat_of(sensor.view());
+  cv::Mat to;
   const Eigen::Matrix<double, 2, 3, Eigen::RowMajor> map = sensor_from_picture(frame);
   const cv::Mat transform(2, 3, CV_64FC1, const_cast<double*>(map.data()));
   cv::warpAffine(from,
                  to,
                  transform,
-                 to.size(),
+                 from.size(),
                  cv::INTER_LINEAR | cv::WARP_INVERSE_MAP,
                  cv::BORDER_REPLICATE);
-  return picture;
+  return image_of<std::uint8_t>(to);
 }
 
 CameraDescription sensor_of(CameraDescription picture, double share) {

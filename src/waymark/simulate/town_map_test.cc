@@ -71,7 +71,7 @@ TEST_P(TownSessions, MapRoundABlock) {
   std::uint32_t num_tracked = 0;
   double worst = 0.0;
   for (std::uint32_t i = 0; i < settings.num_frames; ++i) {
-    const TrackOutcome outcome = session.track(recording.frame(i));
+    const Tracked outcome = session.track(recording.frame(i));
     if (!outcome.world_from_rig) continue;
     ++num_tracked;
     const Rigid3 truth = first.inverse() * recording.world_from_rig(i);

@@ -4,7 +4,7 @@
 // A camera that stands still for long: what a session holds must not grow with time.
 #include <gtest/gtest.h>
 
-#include "waymark/system/test_point_session.h"
+#include "waymark/system/testing/point_session.h"
 
 namespace waymark {
 namespace {
@@ -54,7 +54,7 @@ TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
   const std::size_t num_landmarks = session.map().landmarks().end_id().value;
   for (int i = 0; i < 200; ++i) {
     session.look_from(beside(0.58 + 0.02 * i), 1);
-    const TrackOutcome outcome = session.track();
+    const Tracked outcome = session.track();
     if (!outcome.message) continue;
     const auto& sightings = std::get<NewKeyframe>(*outcome.message).sightings;
     ASSERT_FALSE(sightings.empty());
@@ -88,7 +88,7 @@ TEST_P(AtRest, StaysWhateverMovesBeforeIt) {
   for (int i = 0; i < 100; ++i) {
     session.show(turned_box(0.02 * i));
     session.look_from(beside(0.58), 1);
-    const TrackOutcome outcome = session.track();
+    const Tracked outcome = session.track();
     ASSERT_TRUE(outcome.world_from_rig) << i;
     // The first frames of the box in motion pull a little, while it could be noise.
     EXPECT_LT((outcome.world_from_rig->translation - rest.translation).norm(), 0.04 * distance);

@@ -10,7 +10,7 @@
 #include <thread>
 
 #include "waymark/base/check.h"
-#include "waymark/system/test_sequence.h"
+#include "waymark/system/testing/sequence.h"
 
 namespace waymark {
 namespace {

@@ -10,7 +10,7 @@
 #include "waymark/camera/fisheye.h"
 #include "waymark/camera/perspective.h"
 #include "waymark/image/small_image.h"
-#include "waymark/system/test_sequence.h"
+#include "waymark/system/testing/sequence.h"
 
 namespace waymark {
 namespace {
@@ -46,7 +46,7 @@ TEST(FramesAhead, LooksAgainWhereTheCalibrationIsAnother) {
   another.cameras[0].camera = std::make_shared<PerspectiveCamera>(
       PerspectiveModel({231.0, 231.0}, {159.5, 119.5}), 320, 240);
   for (std::size_t i = 0; i < 4; ++i) {
-    if (i == 2) builder.look_with(another);
+    if (i == 2) builder.set_calibration(std::make_shared<const Rig>(another));
     const FrameImages images = input_of(frames()[i]);
     std::optional<FoundFrame> found = ahead.take(images);
     ASSERT_TRUE(found);

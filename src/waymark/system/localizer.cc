@@ -45,9 +45,9 @@ class Localizer::Impl {
       : settings_(settings),
         frames_(std::move(rig), settings, middling_pixel_angle(*map), is_metric(*map)),
         snapshot_(index_map(std::move(map))),
-        temporary_(std::in_place, frames_.rig(), snapshot_),
-        tracker_(frames_.rig(), is_metric(*snapshot_.map), settings.tracking, seed()),
-        relocalizer_(frames_.rig(), settings.tracking, seed()),
+        temporary_(snapshot_),
+        tracker_(is_metric(*snapshot_.map), settings.tracking, seed()),
+        relocalizer_(settings.tracking, seed()),
         calibration_(frames_.rig(), settings.calibration, snapshot_.map) {
     tracker_.begin_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   }
@@ -62,14 +62,16 @@ class Localizer::Impl {
   std::uint64_t seed() const { return static_cast<std::uint64_t>(settings_.seed); }
   std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
   /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
-  void bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns);
+  void bridge_gaps(const TrackingResult& result,
+                   std::optional<MapperMessage> message,
+                   std::int64_t timestamp_ns);
   /// From the next frame on.
-  void look_with(std::shared_ptr<const Rig> rig);
+  void set_calibration(std::shared_ptr<const Rig> rig);
 
   const Settings settings_;
   QueryFrames frames_;
   const MapSnapshot snapshot_;
-  std::optional<TemporaryMap> temporary_;  ///< For the stream; never empty.
+  TemporaryMap temporary_;  ///< For the stream.
   bool is_on_temporary_ = false;
   std::int64_t last_in_map_ns_ = 0;
   Tracker tracker_;
@@ -88,21 +90,18 @@ TrackingResult Localizer::Impl::track(const FrameImages& images) {
   const RigMotion motion = frames_.needs_motion(images) ? tracker_.predict_motion() : RigMotion{};
   const Frame frame = frames_.build(images, motion, result);
   last_timestamp_ns_ = images.timestamp_ns;
-  const TrackOutcome outcome = tracker_.track(frame, temporary_->visible(), result.stages);
-  bridge_gaps(outcome, images.timestamp_ns);
-  static_cast<FrameVerdict&>(result) = outcome;
-  if (outcome.world_from_rig && ++num_tracked_ % kCalibrationSpacing == 0 &&
-      calibration_.add(frame, outcome.world_from_rig->inverse(), outcome.details.landmarks)) {
-    look_with(calibration_.known().rig);
+  bridge_gaps(result, tracker_.track(frame, temporary_.visible(), result), images.timestamp_ns);
+  result.is_keyframe = false;  // Of what is thrown away afterwards.
+  if (result.world_from_rig && ++num_tracked_ % kCalibrationSpacing == 0 &&
+      calibration_.add(frame, result.world_from_rig->inverse(), result.landmarks)) {
+    set_calibration(calibration_.known().rig);
   }
   return result;
 }
 
-void Localizer::Impl::look_with(std::shared_ptr<const Rig> rig) {
-  frames_.look_with(rig);
-  tracker_.look_with(rig);
-  relocalizer_ = Relocalizer(rig, settings_.tracking, seed());
-  temporary_.emplace(rig, snapshot_);
+void Localizer::Impl::set_calibration(std::shared_ptr<const Rig> rig) {
+  frames_.set_calibration(std::move(rig));
+  temporary_.clear();
   if (std::exchange(is_on_temporary_, false)) {
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
   }
@@ -113,22 +112,21 @@ std::vector<CalibrationEstimate> Localizer::Impl::calibration() const {
   return known.is_changed() ? known.estimates() : std::vector<CalibrationEstimate>{};
 }
 
-void Localizer::Impl::bridge_gaps(const TrackOutcome& outcome, std::int64_t timestamp_ns) {
+void Localizer::Impl::bridge_gaps(const TrackingResult& result,
+                                  std::optional<MapperMessage> message,
+                                  std::int64_t timestamp_ns) {
   const LandmarkId end = snapshot_.map->landmarks().end_id();
-  const auto num_lasting =
-      std::count_if(outcome.seen.begin(), outcome.seen.end(), [&](const SeenLandmark& seen) {
-        return seen.landmark.value < end.value;
-      });
+  const auto num_lasting = std::ranges::count_if(
+      result.landmarks, [&](LandmarkId id) { return id.is_valid() && id < end; });
   if (num_lasting >= kMinLandmarks) last_in_map_ns_ = timestamp_ns;
   const bool has_left = timestamp_ns - last_in_map_ns_ > kMaxBridgeNs;
-  if (is_on_temporary_ && outcome.world_from_rig && num_lasting < kEnoughLandmarks && !has_left) {
-    if (!outcome.message) return;
-    temporary_->add(std::get<NewKeyframe>(*outcome.message));
+  if (is_on_temporary_ && result.world_from_rig && num_lasting < kEnoughLandmarks && !has_left) {
+    if (message) temporary_.add(std::get<NewKeyframe>(*message));
   } else if (is_on_temporary_) {
     is_on_temporary_ = false;
-    temporary_->clear();
+    temporary_.clear();
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kLocalizing);
-  } else if (outcome.world_from_rig && num_lasting < kFewLandmarks) {
+  } else if (result.world_from_rig && num_lasting < kFewLandmarks) {
     is_on_temporary_ = true;
     tracker_.continue_in(*snapshot_.map, TrackingPurpose::kMapping);
   }
@@ -155,7 +153,7 @@ TrackingResult Localizer::Impl::locate(const FrameImages& images,
   // Bent by a rolling shutter, and straightened by no motion, an image tells nothing.
   if (frames_.rig()->cameras[0].readout_s == 0.0 &&
       calibration_.add(frame, located->rig_from_world, located->landmarks)) {
-    look_with(calibration_.known().rig);
+    set_calibration(calibration_.known().rig);
   }
   return result;
 }

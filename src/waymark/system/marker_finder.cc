@@ -47,9 +47,9 @@ std::function<MarkerSightings()> MarkerFinder::search_in(const FrameImages& imag
 MarkerSightings MarkerFinder::confirm(const FrameImages& images,
                                       const Rig& rig,
                                       const Map& map,
-                                      const FrameVerdict& outcome,
+                                      const TrackingResult& result,
                                       const MarkerSightings& read) const {
-  const Rigid3 rig_from_world = outcome.world_from_rig->inverse();
+  const Rigid3 rig_from_world = result.world_from_rig->inverse();
   MarkerSightings all = read;
   const std::vector<ImageView> views = views_of(images, rig);
   for (std::size_t i = 0; i < views.size(); ++i) {
@@ -59,7 +59,7 @@ MarkerSightings MarkerFinder::confirm(const FrameImages& images,
       const bool is_read = std::ranges::any_of(read, [&](const MarkerSighting& sighting) {
         return sighting.id == marker.id && sighting.camera == camera;
       });
-      if (is_read || map.submap_of(marker) != outcome.submap) continue;
+      if (is_read || map.submap_of(marker) != result.submap) continue;
       const Rigid3 cam_from_world = rig.cameras[i].cam_from_rig * rig_from_world;
       expected.push_back(
           {marker.id, marker.side_m, cam_from_world * map.world_from_marker(marker)});
@@ -76,11 +76,11 @@ void MarkerFinder::add_markers(const Frame& frame,
                                const FrameImages& images,
                                const Rig& rig,
                                const Map& map,
-                               const FrameVerdict& outcome,
+                               const TrackingResult& result,
                                MapperMessage& message) const {
   MarkerSightings found = frame.find_markers();
   auto* keyframe = std::get_if<NewKeyframe>(&message);
-  if (keyframe && outcome.world_from_rig) found = confirm(images, rig, map, outcome, found);
+  if (keyframe && result.world_from_rig) found = confirm(images, rig, map, result, found);
   if (found.empty()) return;
   auto markers = std::make_shared<const MarkerSightings>(std::move(found));
   if (keyframe) {

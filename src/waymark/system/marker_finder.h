@@ -15,8 +15,8 @@
 #include "waymark/marker/settings.h"
 #include "waymark/system/system.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/frame_verdict.h"
 #include "waymark/track/messages.h"
+#include "waymark/track/tracking_result.h"
 
 namespace waymark {
 
@@ -42,19 +42,19 @@ class MarkerFinder {
                                              std::shared_ptr<const Rig> rig) const;
 
   /// Notes with a keyframe the markers that its frame shows: those that can be read, and those of
-  /// the map that are seen where they should be. outcome: of the frame.
+  /// the map that are seen where they should be. result: of the frame.
   void add_markers(const Frame& frame,
                    const FrameImages& images,
                    const Rig& rig,
                    const Map& map,
-                   const FrameVerdict& outcome,
+                   const TrackingResult& result,
                    MapperMessage& message) const;
 
  private:
   MarkerSightings confirm(const FrameImages& images,
                           const Rig& rig,
                           const Map& map,
-                          const FrameVerdict& outcome,
+                          const TrackingResult& result,
                           const MarkerSightings& read) const;
 
   std::optional<MarkerDetector> detector_;

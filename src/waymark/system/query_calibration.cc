@@ -80,7 +80,6 @@ void QueryCalibration::insert(const Frame& frame,
   keyframe.parent = map_.submaps().at(keyframe.submap.value).root;
   keyframe.applied_scale = map_.keyframes().at(keyframe.parent).applied_scale;
   keyframe.rig_from_world = rig_from_world;
-  keyframe.rig = known_.rig;
   keyframe.features = frame.features;
   const SubmapId submap = keyframe.submap;
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
@@ -99,8 +98,7 @@ bool QueryCalibration::refine() {
   known_ = *std::move(found.calibration);
   for (const auto& move : found.correction.keyframes) {
     const Features& features = *map_.keyframes().at(move.keyframe).features;
-    map_.measure_keyframe(
-        move.keyframe, known_.rig, measure_anew(features, *known_.rig, features.motion));
+    map_.recompute_keyframe(move.keyframe, recompute(features, known_.rig, features.motion));
     map_.move_keyframe(move.keyframe, move.rig_from_world);
   }
   return true;

@@ -31,7 +31,7 @@ double reduction_for(const Rig& rig, double map_pixel_angle) {
 Rig reduced(Rig rig, double factor) {
   if (factor == 1.0) return rig;
   const auto resized = [factor](std::shared_ptr<const Camera> camera) {
-    return std::make_shared<const ScaledCamera>(ScaledCamera::resized(std::move(camera), factor));
+    return std::make_shared<const ScaledCamera>(std::move(camera), factor);
   };
   for (RigCamera& camera : rig.cameras) {
     camera.camera = resized(camera.camera);
@@ -49,7 +49,7 @@ double middling_pixel_angle(const Map& map) {
   std::map<const Camera*, double> angle_of_camera;
   std::vector<double> angles;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    const Camera* camera = keyframe.rig->cameras.at(0).camera.get();
+    const Camera* camera = keyframe.rig().cameras.at(0).camera.get();
     const auto [at, is_new] = angle_of_camera.try_emplace(camera, 0.0);
     if (is_new) at->second = central_pixel_angle(*camera);
     angles.push_back(at->second);
@@ -61,20 +61,15 @@ QueryFrames::QueryFrames(Rig rig, const Settings& settings, double map_pixel_ang
     : full_rig_(std::make_shared<const Rig>(
           with_depth_offset(std::move(rig), settings.depth.inverse_offset))),
       reduction_(reduction_for(*full_rig_, map_pixel_angle)),
-      rig_(std::make_shared<const Rig>(reduced(*full_rig_, reduction_))),
       uses_range_(uses_range),
-      builder_(*rig_, {settings.features, settings.stereo, settings.depth, settings.view}),
+      builder_(reduced(*full_rig_, reduction_),
+               {settings.features, settings.stereo, settings.depth, settings.view}),
       marker_finder_(settings.markers) {}
-
-void QueryFrames::look_with(std::shared_ptr<const Rig> rig) {
-  rig_ = std::move(rig);
-  builder_.look_with(*rig_);
-}
 
 Rig QueryFrames::full_rig() const {
   Rig rig = *full_rig_;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
-    const RigCamera& now = rig_->cameras[c];
+    const RigCamera& now = builder_.rig()->cameras[c];
     rig.cameras[c].cam_from_rig = now.cam_from_rig;
     rig.cameras[c].description = now.description;
     rig.cameras[c].readout_s = now.readout_s;

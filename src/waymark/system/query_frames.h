@@ -28,11 +28,11 @@ class QueryFrames {
   QueryFrames(Rig rig, const Settings& settings, double map_pixel_angle, bool uses_range);
 
   /// The cameras of the reduced images, as calibrated by now.
-  const std::shared_ptr<const Rig>& rig() const { return rig_; }
+  const std::shared_ptr<const Rig>& rig() const { return builder_.rig(); }
   /// Those of the images as they are given.
   Rig full_rig() const;
   /// From the next frame on the reduced images are of this rig.
-  void look_with(std::shared_ptr<const Rig> rig);
+  void set_calibration(std::shared_ptr<const Rig> rig) { builder_.set_calibration(std::move(rig)); }
 
   /// How many were built.
   std::uint32_t num_frames() const { return num_frames_; }
@@ -46,7 +46,6 @@ class QueryFrames {
 
   const std::shared_ptr<const Rig> full_rig_;
   const double reduction_;
-  std::shared_ptr<const Rig> rig_;
   const bool uses_range_;
   FrameBuilder builder_;
   const MarkerFinder marker_finder_;

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "waymark/system/test_point_session.h"
+#include "waymark/system/testing/point_session.h"
 
 namespace waymark {
 namespace {

@@ -9,7 +9,7 @@
 
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/loop/test_loop.h"
+#include "waymark/loop/testing/loop.h"
 #include "waymark/map/parts.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/simulate/testing/town_map.h"
@@ -28,12 +28,12 @@ class SavedLoopsTest : public ::testing::Test {
   }
 
   /// What the query says of the match if it sees what was seen from a third.
-  Revisit revisit(int query, int match, int seen_from) const {
-    Revisit revisit;
-    revisit.query = KeyframeId{static_cast<std::uint32_t>(query)};
-    revisit.match = KeyframeId{static_cast<std::uint32_t>(match)};
-    revisit.query_from_match = scene_.true_motion(query, seen_from);
-    return revisit;
+  LoopCandidate candidate(int query, int match, int seen_from) const {
+    LoopCandidate candidate;
+    candidate.query = KeyframeId{static_cast<std::uint32_t>(query)};
+    candidate.match = KeyframeId{static_cast<std::uint32_t>(match)};
+    candidate.query_from_match = scene_.true_motion(query, seen_from);
+    return candidate;
   }
 
   GlobalMapper mapper_of(const MapSnapshot& snapshot) const {
@@ -45,7 +45,7 @@ class SavedLoopsTest : public ::testing::Test {
   /// Closes a false loop and saves what comes of it.
   StoredMap with_lie_saved_and_loaded() {
     GlobalMapper mapper = mapper_of(index_map(scene_.map.freeze()));
-    EXPECT_TRUE(mapper.close(revisit(60, 5, 59))) << "nothing contradicts the first";
+    EXPECT_TRUE(mapper.close(candidate(60, 5, 59))) << "nothing contradicts the first";
     const testing::TemporaryFolder folder;
     StoredMap stored;
     stored.map = mapper.snapshot().map;
@@ -57,7 +57,7 @@ class SavedLoopsTest : public ::testing::Test {
   std::shared_ptr<const Map> extended(std::shared_ptr<const Map> map) const {
     GlobalMapper mapper = mapper_of(index_map(std::move(map)));
     for (const auto& [query, match] : {std::pair(44, 4), {52, 12}, {78, 38}, {66, 26}}) {
-      mapper.close(revisit(query, match, match));
+      mapper.close(candidate(query, match, match));
     }
     return mapper.snapshot().map;
   }

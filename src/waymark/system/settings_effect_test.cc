@@ -11,8 +11,8 @@
 
 #include "waymark/base/config.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/mapping/test_calibration.h"
-#include "waymark/system/test_sequence.h"
+#include "waymark/mapping/testing/calibration.h"
+#include "waymark/system/testing/sequence.h"
 
 namespace waymark {
 namespace {
@@ -34,7 +34,7 @@ Settings settings_with(const std::vector<std::string>& assignments) {
 std::shared_ptr<const Features> features_with(const std::vector<std::string>& assignments) {
   System system(small_rig(), settings_with(assignments), Timing::kInline);
   system.feed(input_of(frames()[0]));
-  return system.details().features;
+  return system.result().features;
 }
 
 struct EffectRun {
@@ -136,7 +136,7 @@ TEST(SettingsEffect, MinRangeBaselinesLeavesOutWhatIsNear) {
     input.depth = {};
     input.image1 = frame.images[1].view();
     system.feed(input);
-    const FeatureArray<float>& ranges = system.details().features->range_m;
+    const FeatureArray<float>& ranges = system.result().features->range_m;
     return std::count_if(ranges.begin(), ranges.end(), [](float range) { return range > 0.0f; });
   };
   // All of the room is nearer than 200 times 0.1 m.
@@ -179,7 +179,7 @@ TEST(SettingsEffect, DepthLagAddsToThatOfTheTimeStamps) {
       input.depth_lag_ns = lag_ns;
       system.feed(input);
     }
-    return system.details().features->range_m;
+    return system.result().features->range_m;
   };
   const auto share_alike = [](const FeatureArray<float>& a, const FeatureArray<float>& b) {
     int num_alike = 0;

@@ -30,7 +30,7 @@ void check_has_scale(const Map& map) {
 
 void check_cameras(const Map& map) {
   map.keyframes().for_each([](KeyframeId, const Keyframe& keyframe) {
-    for (const RigCamera& camera : keyframe.rig->cameras) {
+    for (const RigCamera& camera : keyframe.rig().cameras) {
       if (!camera.camera->can_project()) camera.camera->project({}, {}, {});
     }
   });

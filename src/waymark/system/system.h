@@ -16,23 +16,12 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
-#include "waymark/mapping/focal_check.h"
 #include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
-#include "waymark/track/frame_verdict.h"
 #include "waymark/track/kept_scale.h"
-#include "waymark/track/stage_times.h"
+#include "waymark/track/tracking_result.h"
 
 namespace waymark {
-
-/// What is known of a frame right after it was fed.
-struct TrackingResult : FrameVerdict {
-  FrameId frame;                   ///< Of this session, from 0 on.
-  bool is_keyframe = false;        ///< Whether it was sent to the map.
-  bool is_relocalized = false;     ///< Whether the camera was found again after a loss.
-  std::uint32_t num_features = 0;  ///< Of camera 0.
-  StageTimes stages;               ///< What it took.
-};
 
 /// A frame in the final trajectory.
 struct TrajectoryFrame {
@@ -82,8 +71,9 @@ class System {
   System& operator=(const System&) = delete;
 
   /// Tracks one frame; timestamps must increase. A map without scale takes no images with range:
-  /// then the first frame throws InputError. Rethrows what failed in the mapper's thread.
-  TrackingResult feed(const FrameImages& images);
+  /// then the first frame throws InputError. Rethrows what failed in the mapper's thread. The
+  /// result stays valid until the next call.
+  const TrackingResult& feed(const FrameImages& images);
 
   /// Has other threads find the features of a frame that is fed later, while those before it are
   /// tracked: with the images of max_prepared() frames at hand all cores are busy. Only time
@@ -95,8 +85,8 @@ class System {
   /// kLockstep.
   std::size_t max_prepared() const;
 
-  /// Of the frame fed last; empty before the first.
-  const FrameDetails& details() const;
+  /// Of the frame fed last, as feed() gave it; empty before the first.
+  const TrackingResult& result() const;
 
   /// Has the map keep what only searching and joining need (features, the index of places) in this
   /// memory, such as a DiskMemory. Before the first frame. No result depends on it.
@@ -111,10 +101,6 @@ class System {
   /// Ends the input: waits for outstanding mapping, refines globally. No feed() afterwards.
   void finish();
 
-  /// After finish(): drops landmarks on what is gone (see find_seen_through()). Apart from
-  /// finish(), so that they have their part in all that the map is asked for before.
-  void drop_seen_through();
-
   /// Every frame that has a pose, in order, with what is known now. After finish(): final.
   std::vector<TrajectoryFrame> trajectory() const;
 
@@ -124,10 +110,6 @@ class System {
   /// In mono: parts of the map that began after a loss with the unit of length of another part.
   /// Those that were joined to it meanwhile are not among them.
   std::vector<KeptScale> kept_scales() const;
-
-  /// What the residuals say of the calibration, once some 200 frames are mapped and where the
-  /// motion tells; else null.
-  const FocalCheck* focal_check() const;
 
   /// The cameras as they are calibrated by now.
   std::shared_ptr<const Rig> rig() const;

@@ -9,7 +9,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/disk_memory.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/system/test_sequence.h"
+#include "waymark/system/testing/sequence.h"
 
 namespace waymark {
 namespace {
@@ -172,14 +172,14 @@ TEST(System, TellsWhatTheNewestFrameSaw) {
   System system(small_rig(), small_settings(), Timing::kInline);
   int num_recognized = 0;
   for (int i = 0; i < 5; ++i) {
-    const TrackingResult result = system.feed(input_of(frames()[i]));
-    const FrameDetails& details = system.details();
-    EXPECT_EQ(details.frame, FrameId{static_cast<std::uint32_t>(i)});
-    ASSERT_NE(details.features, nullptr);
-    if (details.landmarks.empty()) continue;
-    EXPECT_EQ(details.landmarks.size(), details.features->size());
-    const auto num_seen = std::count_if(details.landmarks.begin(),
-                                        details.landmarks.end(),
+    const TrackingResult& result = system.feed(input_of(frames()[i]));
+    EXPECT_EQ(&result, &system.result());
+    EXPECT_EQ(result.frame_in_map, FrameId{static_cast<std::uint32_t>(i)});
+    ASSERT_NE(result.features, nullptr);
+    if (result.landmarks.empty()) continue;
+    EXPECT_EQ(result.landmarks.size(), result.features->size());
+    const auto num_seen = std::count_if(result.landmarks.begin(),
+                                        result.landmarks.end(),
                                         [](LandmarkId id) { return id.is_valid(); });
     EXPECT_GE(num_seen, result.num_inliers / 2);
     num_recognized += num_seen > 30;

@@ -9,8 +9,8 @@
 
 namespace waymark {
 
-TemporaryMap::TemporaryMap(std::shared_ptr<const Rig> rig, const MapSnapshot& lasting)
-    : rig_(std::move(rig)), lasting_(lasting), visible_(lasting), map_(Map::thaw(*lasting.map)) {}
+TemporaryMap::TemporaryMap(const MapSnapshot& lasting)
+    : lasting_(lasting), visible_(lasting), map_(Map::thaw(*lasting.map)) {}
 
 void TemporaryMap::add(const NewKeyframe& message) {
   const KeyframeId id = insert(message);
@@ -32,7 +32,6 @@ KeyframeId TemporaryMap::insert(const NewKeyframe& message) {
   keyframe.submap = reference.submap;
   keyframe.applied_scale = reference.applied_scale;
   keyframe.rig_from_world = message.pose.rig_from_reference * reference.rig_from_world;
-  keyframe.rig = rig_;
   keyframe.features = message.features;
   const KeyframeId id = map_.add_keyframe(std::move(keyframe));
   const LandmarkId end = lasting_.map->landmarks().end_id();

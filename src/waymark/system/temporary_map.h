@@ -17,8 +17,7 @@ namespace waymark {
 /// does not move.
 class TemporaryMap {
  public:
-  /// rig: the one that sees the stream.
-  TemporaryMap(std::shared_ptr<const Rig> rig, const MapSnapshot& lasting);
+  explicit TemporaryMap(const MapSnapshot& lasting);
 
   /// The map that stays and what was added to it, together.
   const MapSnapshot& visible() const { return visible_; }
@@ -32,7 +31,6 @@ class TemporaryMap {
  private:
   KeyframeId insert(const NewKeyframe& message);
 
-  const std::shared_ptr<const Rig> rig_;
   const MapSnapshot lasting_;
   MapSnapshot visible_;
   Map map_;

@@ -6,6 +6,18 @@
 #include <utility>
 
 namespace waymark {
+namespace {
+
+std::vector<LandmarkId> visible_of(const LandmarkSet& set, const ProjectionMatches& matches) {
+  std::vector<LandmarkId> visible;
+  for (std::size_t i = 0; i < set.size(); ++i) {
+    if (matches.is_visible[i]) visible.push_back(set.ids[i]);
+  }
+  return visible;
+}
+
+}  // namespace
+
 int num_valid(std::span<const LandmarkId> landmarks) {
   return static_cast<int>(std::ranges::count_if(landmarks, &LandmarkId::is_valid));
 }
@@ -24,16 +36,8 @@ LocatedFrame FrameLocator::locate(const Features& features,
                                   const Rigid3& initial_rig_from_world,
                                   std::vector<LandmarkId> landmarks) {
   collect(features, map, landmarks);
-  PoseEstimate estimate =
-      optimize_pose(*rig_, observations_, initial_rig_from_world, PoseOptions{}, workspace_);
-  if (const auto world = larger_motion_.find(observations_, initial_rig_from_world, estimate)) {
-    for (std::size_t k = 0; k < observations_.size(); ++k) {
-      if (!larger_motion_.is_contradicted(observations_, k, *world)) continue;
-      landmarks[feature_of_observation_[k]] = LandmarkId{};
-    }
-    collect(features, map, landmarks);
-    estimate = optimize_pose(*rig_, observations_, *world, PoseOptions{}, workspace_);
-  }
+  const PoseEstimate estimate =
+      optimize_pose(*features.rig, observations_, initial_rig_from_world, workspace_);
   LocatedFrame located;
   located.rig_from_world = estimate.rig_from_world;
   located.covariance = estimate.covariance;
@@ -49,12 +53,28 @@ LocatedFrame FrameLocator::locate(const Features& features,
 std::vector<LandmarkId> FrameLocator::find(const Features& features,
                                            const LandmarkSet& set,
                                            const Rigid3& rig_from_world,
-                                           const ProjectionOptions& options) {
-  const ProjectionMatches& matches = matcher_.match(set, features, {}, rig_from_world, options);
-  is_visible_ = matches.is_visible;
+                                           const ProjectionOptions& options,
+                                           std::vector<LandmarkId>* visible) {
+  const ProjectionMatches& matches =
+      matcher_.match(*features.rig, set, features, {}, rig_from_world, options);
+  if (visible) *visible = visible_of(set, matches);
   std::vector<LandmarkId> landmarks(features.size());
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] != kNoFeature) landmarks[matches.features[i]] = set.ids[i];
+  }
+  return landmarks;
+}
+
+std::vector<LandmarkId> FrameLocator::find_alike(const Features& features,
+                                                 const Keyframe& keyframe) {
+  std::vector<std::uint32_t> with_landmark;
+  for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
+    if (keyframe.landmarks[i].is_valid()) with_landmark.push_back(i);
+  }
+  std::vector<LandmarkId> landmarks(features.size());
+  for (const FeatureMatch& match : appearance_.match_all(
+           *keyframe.features, with_landmark, features, {.max_distance = 60, .max_ratio = 0.8})) {
+    landmarks[match.b] = keyframe.landmarks[match.a];
   }
   return landmarks;
 }
@@ -73,14 +93,15 @@ LocatedFrame FrameLocator::locate_again(const Features& features,
   std::vector<LandmarkId> found = primary_landmarks(features, first.landmarks);
   std::ranges::sort(found);
   const ProjectionMatches& matches =
-      matcher_.match(set, features, is_taken_, first.rig_from_world, options);
-  is_visible_ = matches.is_visible;
+      matcher_.match(*features.rig, set, features, is_taken_, first.rig_from_world, options);
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
     if (std::ranges::binary_search(found, set.ids[i])) continue;
     first.landmarks[matches.features[i]] = set.ids[i];
   }
-  return locate(features, map, first.rig_from_world, std::move(first.landmarks));
+  LocatedFrame located = locate(features, map, first.rig_from_world, std::move(first.landmarks));
+  located.visible = visible_of(set, matches);
+  return located;
 }
 
 void FrameLocator::collect(const Features& features,

@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "waymark/map/map.h"
+#include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
 #include "waymark/optimize/pose.h"
-#include "waymark/track/larger_motion.h"
 
 namespace waymark {
 
@@ -21,6 +21,7 @@ struct LocatedFrame {
   int num_matches = 0;  ///< Primary features with a landmark before outliers were removed.
   int num_inliers = 0;  ///< Primary features with a landmark after.
   std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none.
+  std::vector<LandmarkId> visible;    ///< Of the local map: what should be seen from there.
 };
 
 /// How many features show a landmark.
@@ -33,9 +34,6 @@ std::vector<LandmarkId> primary_landmarks(const Features& features,
 /// Pose of a frame from the landmarks that its features show. Keeps its buffers.
 class FrameLocator {
  public:
-  explicit FrameLocator(std::shared_ptr<const Rig> rig)
-      : rig_(rig), matcher_(rig), larger_motion_(rig) {}
-
   /// landmarks: per feature; primary features have candidates (living in the map). Of these
   /// outliers are cleared.
   LocatedFrame locate(const Features& features,
@@ -43,11 +41,17 @@ class FrameLocator {
                       const Rigid3& initial_rig_from_world,
                       std::vector<LandmarkId> landmarks);
 
-  /// The landmark of the set that each feature may show, seen from about this pose.
+  /// The landmark of the set that each feature may show, seen from about this pose. visible: gets
+  /// those of the set that should be seen; null: not asked for.
   std::vector<LandmarkId> find(const Features& features,
                                const LandmarkSet& set,
                                const Rigid3& rig_from_world,
-                               const ProjectionOptions& options);
+                               const ProjectionOptions& options,
+                               std::vector<LandmarkId>* visible = nullptr);
+
+  /// The landmark of a keyframe that each feature looks like without doubt, wherever it is in the
+  /// image.
+  std::vector<LandmarkId> find_alike(const Features& features, const Keyframe& keyframe);
 
   /// Locates a frame again, with those landmarks of the set in addition that its other features
   /// show, seen from where it was located first. Points on edges are all looked for anew.
@@ -57,20 +61,15 @@ class FrameLocator {
                             const LandmarkSet& set,
                             const ProjectionOptions& options);
 
-  /// Per landmark of the set searched for last: 1 where it should have been seen.
-  std::span<const std::uint8_t> is_visible() const { return is_visible_; }
-
  private:
   void collect(const Features& features, const Map& map, const std::vector<LandmarkId>& landmarks);
 
-  std::shared_ptr<const Rig> rig_;
   ProjectionMatcher matcher_;
-  std::span<const std::uint8_t> is_visible_;  ///< Of the matcher.
+  AppearanceMatcher appearance_;
   PoseObservations observations_;
   std::vector<std::uint32_t> feature_of_observation_;
   std::vector<std::uint8_t> is_taken_;
   PoseWorkspace workspace_;
-  LargerMotion larger_motion_;
 };
 
 }  // namespace waymark

@@ -6,12 +6,11 @@
 #include <cmath>
 
 #include "waymark/base/median.h"
-#include "waymark/geometry/world_motion.h"
+#include "waymark/geometry/two_view.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/image/range_precision.h"
-#include "waymark/optimize/bundle.h"
 #include "waymark/track/enough.h"
-#include "waymark/track/rest.h"
+#include "waymark/track/matched_pair.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {
@@ -32,6 +31,13 @@ constexpr double kSearchRadiusPx = 60.0;
 constexpr double kSearchPart = 1.0 / 16.0;
 /// What noise moves a feature by at most; a camera at rest shows no more.
 constexpr double kRestPx = kMinParallaxPx / 4;
+
+const Camera& camera_of(const Frame& frame) { return *frame.features->rig->cameras[0].camera; }
+
+/// Around where a feature was last seen.
+double search_radius_px(const Frame& frame) {
+  return waymark::search_radius_px(camera_of(frame), kSearchRadiusPx, kSearchPart);
+}
 
 int min_landmarks(const Features& features) {
   return enough_of(kMinLandmarks, features.num_corners());
@@ -79,25 +85,6 @@ double median_distance(const std::vector<Eigen::Vector3d>& points) {
   return median(distances);
 }
 
-/// Bearings of matched features and their noise, as arrays of their own.
-struct MatchedBearings {
-  std::vector<Eigen::Vector3d> a, b;
-  std::vector<double> sigmas_rad_a, sigmas_rad_b;
-
-  MatchedBearings(const Features& features_a,
-                  const Features& features_b,
-                  std::span<const FeatureMatch> matches) {
-    for (const FeatureMatch& match : matches) {
-      a.push_back(features_a.bearings[match.a].cast<double>());
-      b.push_back(features_b.bearings[match.b].cast<double>());
-      sigmas_rad_a.push_back(features_a.size_rad[match.a]);
-      sigmas_rad_b.push_back(features_b.size_rad[match.b]);
-    }
-  }
-
-  BearingMatches view() const { return {a, b, sigmas_rad_a, sigmas_rad_b}; }
-};
-
 FrameReason reason_of(TwoViewStatus status) {
   switch (status) {
     case TwoViewStatus::kTooFewMatches:
@@ -107,42 +94,6 @@ FrameReason reason_of(TwoViewStatus status) {
     default:  // Ambiguity ends once there is more parallax.
       return FrameReason::kTooLittleParallax;
   }
-}
-
-/// The points of a pair and its motion after adjustment, in units of the first translation.
-struct RefinedPair {
-  Rigid3 b_from_a;
-  std::vector<Eigen::Vector3d> points;
-  std::vector<FeatureMatch> matches;
-};
-
-RefinedPair refine_pair(const Rig& rig,
-                        const Features& a,
-                        const Features& b,
-                        std::span<const FeatureMatch> matches,
-                        const TwoViewGeometry& geometry) {
-  BundleProblem problem;
-  problem.rig_from_world = {Rigid3{}, geometry.b_from_a};
-  problem.rigs = {&rig, &rig};
-  problem.is_pose_fixed = {1, 0};
-  std::vector<FeatureMatch> kept;
-  for (std::size_t i = 0; i < matches.size(); ++i) {
-    if (!geometry.has_point[i]) continue;
-    const auto point = static_cast<std::uint32_t>(problem.points.size());
-    problem.points.push_back(geometry.points_in_a[i]);
-    problem.observations.push_back({a.measurement(matches[i].a), 0, point});
-    problem.observations.push_back({b.measurement(matches[i].b), 1, point});
-    kept.push_back(matches[i]);
-  }
-  const BundleResult result = adjust_bundle(problem, BundleOptions{});
-  RefinedPair refined;
-  refined.b_from_a = problem.rig_from_world[1];
-  for (std::size_t i = 0; i < kept.size(); ++i) {
-    if (result.is_outlier[2 * i] || result.is_outlier[2 * i + 1]) continue;
-    refined.points.push_back(problem.points[i]);
-    refined.matches.push_back(kept[i]);
-  }
-  return refined;
 }
 
 /// The landmarks of a new sub-map, as its last keyframe sees them.
@@ -179,16 +130,10 @@ RigMotion motion_at(const InitialKeyframe& keyframe, const std::vector<InitialKe
 
 }  // namespace
 
-Initializer::Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed)
-    : rig_(rig),
-      has_range_(has_range),
-      seed_(seed),
-      pixel_rad_(central_pixel_angle(*rig->cameras.at(0).camera)),
-      search_radius_px_(search_radius_px(*rig->cameras.at(0).camera, kSearchRadiusPx, kSearchPart)),
-      turn_aligner_(rig->cameras[0].camera),
-      projection_(rig) {}
-
 std::optional<Initialization> Initializer::add(const Frame& frame) {
+  if (!references_.empty() && references_.back().frame.features->rig != frame.features->rig) {
+    reset();
+  }
   if (static_cast<int>(frame.features->num_primary) < min_landmarks(*frame.features)) {
     reason_ = FrameReason::kNoFeatures;
     return std::nullopt;
@@ -201,7 +146,7 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
   Initialization start;
   start.submap.is_metric = true;
   start.submap.keyframes.push_back({frame.id, frame.timestamp_ns, Rigid3{}, frame.features});
-  const Rigid3 world_from_cam = rig_->cameras[0].cam_from_rig.inverse();
+  const Rigid3 world_from_cam = features.rig->cameras[0].cam_from_rig.inverse();
   for (const std::uint32_t i : features_to_start_from(features)) {
     const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
     start.submap.landmarks.push_back({world_from_cam * point, {i}});
@@ -216,7 +161,13 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
 
 std::optional<Initialization> Initializer::start_from_two_views(const Frame& frame) {
   reason_ = FrameReason::kTooFewMatches;
-  for (Reference& reference : references_) match(reference, frame);
+  Rest rest;  // Goes on with the next reference.
+  for (Reference& reference : references_) {
+    match(reference, frame);
+    reference.rest.update(
+        camera_of(frame), *reference.frame.features, *frame.features, reference.matches);
+    if (reference.rest.is_at_rest()) rest = reference.rest;
+  }
   std::erase_if(references_, [&](const Reference& reference) {
     return static_cast<int>(reference.matches.size()) <
            min_landmarks(*reference.frame.features, *frame.features);
@@ -235,7 +186,7 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
   if (references_.empty() ||
       (frame.id.value - references_.back().frame.id.value >= kReferenceInterval &&
        has_moved(references_.back(), frame))) {
-    references_.push_back({frame, pixels_of(*frame.features), {}});
+    references_.push_back({frame, pixels_of(*frame.features), {}, rest});
     if (references_.size() > kMaxReferences) references_.erase(references_.begin() + 1);
   }
   while (passed_.front().id < references_.front().frame.id || passed_.size() > kMaxPassed) {
@@ -253,7 +204,8 @@ void Initializer::match(Reference& reference, const Frame& frame) {
 
 bool Initializer::expect_turned(Reference& reference, const Frame& frame) {
   if (!reference.frame.image || !frame.image) return false;
-  const TurnAlignment turn = turn_aligner_.align(*reference.frame.image, *frame.image);
+  const RotationAlignment turn = rotation_aligner_.align(
+      frame.features->rig->cameras[0].camera, *reference.frame.image, *frame.image);
   if (!turn.is_certain()) return false;
   const Features& features = *reference.frame.features;
   const std::size_t count = features.num_primary;
@@ -263,7 +215,7 @@ bool Initializer::expect_turned(Reference& reference, const Frame& frame) {
   }
   std::vector<Eigen::Vector2d> pixels(count);
   std::vector<std::uint8_t> is_visible(count);
-  rig_->cameras[0].camera->project(bearings, pixels, is_visible);
+  camera_of(frame).project(bearings, pixels, is_visible);
   for (std::size_t i = 0; i < count; ++i) {
     if (is_visible[i]) reference.expected_pixels[i] = pixels[i].cast<float>();
   }
@@ -273,7 +225,7 @@ bool Initializer::expect_turned(Reference& reference, const Frame& frame) {
 void Initializer::match_near_expected(Reference& reference, const Frame& frame) {
   const auto matches = appearance_.match_near(*reference.frame.features,
                                               reference.expected_pixels,
-                                              search_radius_px_,
+                                              search_radius_px(frame),
                                               *frame.features,
                                               {.max_distance = 60, .max_ratio = 0.85});
   reference.matches.assign(matches.begin(), matches.end());
@@ -284,14 +236,13 @@ void Initializer::match_near_expected(Reference& reference, const Frame& frame) 
 }
 
 bool Initializer::has_moved(const Reference& reference, const Frame& frame) const {
+  const double rest_rad = kRestPx * central_pixel_angle(camera_of(frame));
   const auto moved = [&](const FeatureMatch& match) {
     const Eigen::Vector3f& before = reference.frame.features->bearings[match.a];
-    return (frame.features->bearings[match.b] - before).norm() >= kRestPx * pixel_rad_;
+    return (frame.features->bearings[match.b] - before).norm() >= rest_rad;
   };
   const int enough = min_landmarks(*reference.frame.features, *frame.features);
-  if (std::ranges::count_if(reference.matches, moved) < enough) return false;
-  return !is_at_rest(
-      *rig_->cameras[0].camera, *reference.frame.features, *frame.features, reference.matches);
+  return !reference.rest.is_at_rest() && std::ranges::count_if(reference.matches, moved) >= enough;
 }
 
 std::optional<Initialization> Initializer::start_from_pair(const Reference& reference,
@@ -299,7 +250,7 @@ std::optional<Initialization> Initializer::start_from_pair(const Reference& refe
   std::optional<Initialization> start = try_pair(reference, frame);
   if (!start) return std::nullopt;
   fill(reference, *start);
-  if (rig_->cameras[0].readout_s == 0.0) return start;
+  if (frame.features->rig->cameras[0].readout_s == 0.0) return start;
   // Again, from what the rolling shutter would have seen at once, now that the motion is known.
   Reference straight = reference;
   straight.frame.features = start->submap.keyframes[0].features;
@@ -318,14 +269,14 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
   options.stream = frame.id.value;
   const int enough = min_landmarks(*reference.frame.features, *frame.features);
   options.min_num_points = enough;
-  options.min_parallax_rad = kMinParallaxPx * pixel_rad_;
-  const TwoViewResult two_view = estimate_world_motion(bearings.view(), options);
+  options.min_parallax_rad = kMinParallaxPx * central_pixel_angle(camera_of(frame));
+  const TwoViewResult two_view = estimate_two_view(bearings.view(), options);
   if (!two_view.geometry) {
     reason_ = reason_of(two_view.status);
     return std::nullopt;
   }
   const RefinedPair pair = refine_pair(
-      *rig_, *reference.frame.features, *frame.features, reference.matches, *two_view.geometry);
+      *reference.frame.features, *frame.features, reference.matches, *two_view.geometry);
   if (static_cast<int>(pair.matches.size()) < enough) {
     reason_ = FrameReason::kTooFewInliers;
     return std::nullopt;
@@ -372,15 +323,19 @@ void Initializer::fill(const Reference& reference, Initialization& start) {
   guess = reaches_reference ? Rigid3{} : start.rig_from_world;
   for (auto it = middle; it != passed_.begin(); --it) try_fill(*std::prev(it), guess);
   for (InitialKeyframe& keyframe : start.submap.keyframes) {
-    keyframe.features = moved(keyframe.features, *rig_, motion_at(keyframe, posed));
+    keyframe.features = moved(keyframe.features, motion_at(keyframe, posed));
   }
 }
 
 std::optional<Rigid3> Initializer::locate(const Frame& frame,
                                           const Rigid3& guess,
                                           const LandmarkSet& landmarks) {
-  const ProjectionMatches& matches = projection_.match(
-      landmarks, *frame.features, {}, guess, {.radius_px = search_radius_px_ / 2});
+  const ProjectionMatches& matches = projection_.match(*frame.features->rig,
+                                                       landmarks,
+                                                       *frame.features,
+                                                       {},
+                                                       guess,
+                                                       {.radius_px = search_radius_px(frame) / 2});
   PoseObservations observations;
   for (std::size_t i = 0; i < landmarks.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;
@@ -388,7 +343,7 @@ std::optional<Rigid3> Initializer::locate(const Frame& frame,
                      frame.features->measurement(matches.features[i]));
   }
   const PoseEstimate estimate =
-      optimize_pose(*rig_, observations, guess, PoseOptions{}, pose_workspace_);
+      optimize_pose(*frame.features->rig, observations, guess, pose_workspace_);
   if (estimate.num_inliers < kMinLandmarks / 3) return std::nullopt;
   return estimate.rig_from_world;
 }

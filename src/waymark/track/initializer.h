@@ -12,10 +12,11 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
-#include "waymark/match/turn_alignment.h"
+#include "waymark/match/rotation_alignment.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/messages.h"
+#include "waymark/track/rest.h"
 
 namespace waymark {
 
@@ -35,8 +36,9 @@ class Initializer {
  public:
   static constexpr std::size_t kMaxPassed = 300;
 
-  Initializer(std::shared_ptr<const Rig> rig, bool has_range, std::uint64_t seed);
+  Initializer(bool has_range, std::uint64_t seed) : has_range_(has_range), seed_(seed) {}
 
+  /// Frames that were measured by cameras calibrated otherwise than this one are forgotten.
   std::optional<Initialization> add(const Frame& frame);
   /// Forgets the frames added so far.
   void reset() { references_.clear(), passed_.clear(); }
@@ -48,6 +50,7 @@ class Initializer {
     Frame frame;
     std::vector<Eigen::Vector2f> expected_pixels;  ///< Where its features were last seen.
     std::vector<FeatureMatch> matches;             ///< With the newest frame.
+    Rest rest = {};                                ///< Since that frame.
   };
 
   std::optional<Initialization> start_from_range(const Frame& frame);
@@ -67,14 +70,11 @@ class Initializer {
                                const Rigid3& guess,
                                const LandmarkSet& landmarks);
 
-  std::shared_ptr<const Rig> rig_;
   bool has_range_;
   std::uint64_t seed_;
-  double pixel_rad_;         ///< Angle of a pixel at the image centre.
-  double search_radius_px_;  ///< Around where a feature was last seen.
   FrameReason reason_ = FrameReason::kNone;
   AppearanceMatcher appearance_;
-  TurnAligner turn_aligner_;
+  RotationAligner rotation_aligner_;
   ProjectionMatcher projection_;
   PoseWorkspace pose_workspace_;
   std::deque<Reference> references_;

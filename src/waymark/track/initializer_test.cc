@@ -10,7 +10,7 @@
 #include <set>
 
 #include "waymark/image/range_precision.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -25,7 +25,7 @@ struct Scene {
   Path world_from_rig;
 
   PointObservation look(std::uint32_t frame) const {
-    return observe(cloud, *rig, world_from_rig(frame), noise, frame);
+    return observe(cloud, rig, world_from_rig(frame), noise, frame);
   }
   Frame frame(std::uint32_t number) const {
     return {FrameId{number}, 50'000'000 * std::int64_t{number}, look(number).features};
@@ -39,7 +39,7 @@ struct Started {
 };
 
 Started run(const Scene& scene, bool has_range, std::uint32_t num_frames) {
-  Initializer initializer(scene.rig, has_range, 7);
+  Initializer initializer(has_range, 7);
   Started started;
   for (; started.at < num_frames; ++started.at) {
     started.start = initializer.add(scene.frame(started.at));
@@ -62,7 +62,7 @@ TEST(Initializer, MonoStartsThroughFastTurnsThatImagesTell) {
   const Scene scene =
       mono_scene([](std::uint32_t i) { return pose_at(0.15 * i, 0.0, 0.0, 0.2 * i - 0.4); });
   EXPECT_FALSE(run(scene, false, 8).start);
-  Initializer initializer(scene.rig, false, 7);
+  Initializer initializer(false, 7);
   bool has_started = false;
   for (std::uint32_t i = 0; i < 8 && !has_started; ++i) {
     Frame frame = scene.frame(i);
@@ -180,7 +180,7 @@ TEST(Initializer, MonoWaitsForTheCameraToMoveWhateverMovesBeforeIt) {
   constexpr std::uint32_t kNumStill = 40;
   Scene scene = mono_scene(
       [](std::uint32_t i) { return i < kNumStill ? Rigid3{} : sideways()(i - kNumStill); });
-  Initializer initializer(scene.rig, false, 7);
+  Initializer initializer(false, 7);
   std::uint32_t at = 0;
   for (std::optional<Initialization> start; at < kNumStill + 30 && !start; ++at) {
     scene.cloud = box_before_wall(at);
@@ -197,7 +197,7 @@ TEST(Initializer, MonoKeepsOnlySoManyFramesWhileTheCameraStandsStill) {
   Scene scene =
       mono_scene([&](std::uint32_t i) { return path(i < num_still ? 0 : i - num_still); });
   scene.noise.max_features = 130;
-  Initializer initializer(scene.rig, false, 7);
+  Initializer initializer(false, 7);
   std::optional<Initialization> start;
   const auto still = scene.look(0).features;
   for (std::uint32_t i = 0; i < num_still; ++i) {

@@ -23,30 +23,27 @@ constexpr std::size_t kEstablishedObservers = 3;
 
 }  // namespace
 
-KeyframeAssessor::KeyframeAssessor(std::shared_ptr<const Rig> rig, bool has_range)
-    : rig_(std::move(rig)),
-      has_range_(has_range),
-      pixel_rad_(central_pixel_angle(*rig_->cameras.at(0).camera)) {}
-
-KeyframeSituation KeyframeAssessor::assess(const Features& features,
-                                           const LocatedFrame& located,
-                                           const Map& map,
-                                           KeyframeId reference_id,
-                                           std::size_t submap_age) const {
+KeyframeSituation compare_with_reference(const Features& features,
+                                         bool has_range,
+                                         const LocatedFrame& located,
+                                         const Map& map,
+                                         KeyframeId reference_id,
+                                         std::size_t submap_age) {
   const Keyframe& reference = map.keyframes().at(reference_id);
   const std::size_t established = std::min(kEstablishedObservers, submap_age);
   KeyframeSituation situation;
-  situation.has_range = has_range_;
+  situation.has_range = has_range;
   for (std::uint32_t i = 0; i < reference.features->num_primary; ++i) {
     const Landmark* landmark = map.landmarks().find(reference.landmarks[i]);
     situation.num_reference += landmark && num_observers(*landmark) >= established;
   }
   const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
   const Eigen::Vector3d reference_centre = reference.rig_from_world.origin_in_source();
+  const double pixel_rad = central_pixel_angle(*features.rig->cameras[0].camera);
   std::vector<double> parallaxes_px;
   for (std::uint32_t i = 0; i < features.num_primary; ++i) {
     const LandmarkId id = located.landmarks[i];
-    const bool is_near = has_range_ && has_reliable_range(features, i);
+    const bool is_near = has_range && has_reliable_range(features, i);
     situation.num_near_tracked += is_near && id.is_valid();
     situation.num_near_untracked += is_near && !id.is_valid();
     if (!id.is_valid()) continue;
@@ -56,7 +53,7 @@ KeyframeSituation KeyframeAssessor::assess(const Features& features,
     const Eigen::Vector3d& point = landmark.position_in_world;
     const Eigen::Vector3d a = (point - centre).normalized();
     const Eigen::Vector3d b = (point - reference_centre).normalized();
-    parallaxes_px.push_back((a - b).norm() / pixel_rad_);
+    parallaxes_px.push_back((a - b).norm() / pixel_rad);
   }
   if (!parallaxes_px.empty()) situation.median_parallax_px = median(parallaxes_px);
   return situation;

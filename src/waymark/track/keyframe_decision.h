@@ -3,7 +3,6 @@
 #pragma once
 
 #include <cstddef>
-#include <memory>
 
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/settings.h"
@@ -22,24 +21,15 @@ struct KeyframeSituation {
   bool has_range = false;           ///< Stereo or depth.
 };
 
-/// Compares frames with the keyframe that shares most landmarks with them.
-class KeyframeAssessor {
- public:
-  KeyframeAssessor(std::shared_ptr<const Rig> rig, bool has_range);
-
-  /// What the frame itself says; num_pending and frames_since_keyframe are left to the caller.
-  /// submap_age: keyframes that the sub-map has had so far.
-  KeyframeSituation assess(const Features& features,
-                           const LocatedFrame& located,
-                           const Map& map,
-                           KeyframeId reference,
-                           std::size_t submap_age) const;
-
- private:
-  std::shared_ptr<const Rig> rig_;
-  bool has_range_;
-  double pixel_rad_;  ///< Angle of a pixel at the image centre.
-};
+/// What a frame says of itself beside the keyframe that shares most landmarks with it; num_pending
+/// and frames_since_keyframe are left to the caller. submap_age: keyframes that the sub-map has had
+/// so far.
+KeyframeSituation compare_with_reference(const Features& features,
+                                         bool has_range,
+                                         const LocatedFrame& located,
+                                         const Map& map,
+                                         KeyframeId reference,
+                                         std::size_t submap_age);
 
 /// Whether a frame should become a keyframe.
 bool should_make_keyframe(const KeyframeSituation& situation, const TrackingSettings& settings);

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -84,8 +84,8 @@ class KeyframeAssessment : public ::testing::TestWithParam<int> {
     for (std::size_t i = 0; i < view.features->num_primary; ++i) {
       if (i % stride != 0) located.landmarks[i] = LandmarkId{};
     }
-    const KeyframeAssessor assessor(scene_.rig, GetParam() == 2);
-    return assessor.assess(*view.features, located, scene_.map, KeyframeId{1}, 2);
+    return compare_with_reference(
+        *view.features, GetParam() == 2, located, scene_.map, KeyframeId{1}, 2);
   }
 
   TestMap scene_;

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {

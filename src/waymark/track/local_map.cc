@@ -54,6 +54,11 @@ void add_neighbours(const Map& map, std::vector<KeyframeId>& keyframes) {
 
 }  // namespace
 
+KeyframeId main_observer(const Map& map, std::span<const LandmarkId> seen) {
+  const std::vector<Vote> votes = count_votes(map, seen);
+  return votes.empty() ? KeyframeId{} : votes.front().keyframe;
+}
+
 void gather_local_map(const Map& map,
                       std::span<const LandmarkId> seen,
                       KeyframeId fallback,

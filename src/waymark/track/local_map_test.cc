@@ -6,7 +6,7 @@
 
 #include <algorithm>
 
-#include "waymark/match/test_scene.h"
+#include "waymark/match/testing/scene.h"
 
 namespace waymark {
 namespace {
@@ -20,13 +20,12 @@ class Row {
     features->keypoints.resize(kSeen);
     features->descriptors.resize(kSeen);
     features->partner.assign(kSeen, kNoFeature);
-    const auto rig = make_test_rig(1);
+    features->rig = make_test_rig(1);
     const SubmapId submap = map.add_submap(true);
     for (std::uint32_t k = 0; k < num_keyframes; ++k) {
       Keyframe keyframe;
       keyframe.submap = submap;
       if (k > 0) keyframe.parent = KeyframeId{k - 1};
-      keyframe.rig = rig;
       keyframe.features = features;
       const KeyframeId id = map.add_keyframe(std::move(keyframe));
       for (std::uint32_t i = 0; i < kSeen; ++i) {

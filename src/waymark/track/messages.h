@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "waymark/base/id.h"
-#include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/image/features.h"
 #include "waymark/marker/marker.h"
@@ -38,13 +37,12 @@ struct Sighting {
 
 /// The tracker asks the mapper to add a frame to the map.
 struct NewKeyframe {
-  FrameId frame;                             ///< Which one.
-  std::int64_t timestamp_ns = 0;             ///< Of its images.
-  RelativePose pose;                         ///< Moves with the map.
-  std::shared_ptr<const Features> features;  ///< Never null.
-  std::vector<LandmarkId> landmarks;         ///< Per feature, invalid where none.
-  std::vector<Sighting> sightings;           ///< Ascending by landmark.
-  std::shared_ptr<const Rig> rig;            ///< As calibrated when the features were measured.
+  FrameId frame;                                             ///< Which one.
+  std::int64_t timestamp_ns = 0;                             ///< Of its images.
+  RelativePose pose;                                         ///< Moves with the map.
+  std::shared_ptr<const Features> features;                  ///< Never null.
+  std::vector<LandmarkId> landmarks;                         ///< Per feature, invalid where none.
+  std::vector<Sighting> sightings;                           ///< Ascending by landmark.
   std::shared_ptr<const MarkerSightings> markers = nullptr;  ///< That it sees; null: none.
 };
 
@@ -68,7 +66,6 @@ struct NewSubmap {
   bool is_metric = false;                  ///< Whether lengths are in metres.
   std::vector<InitialKeyframe> keyframes;  ///< By time.
   std::vector<InitialLandmark> landmarks;  ///< In no order.
-  std::shared_ptr<const Rig> rig;          ///< As calibrated when the features were measured.
 };
 
 /// What the tracker sends to the mapper.

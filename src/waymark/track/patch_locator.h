@@ -28,8 +28,6 @@ std::vector<std::uint32_t> well_known(const LandmarkSet& landmarks, const Map& m
 /// the frame, so that keyframes, new landmarks and adjustments rest on them as on others.
 class PatchLocator {
  public:
-  explicit PatchLocator(std::shared_ptr<const Rig> rig);
-
   /// around: landmarks that surround the camera; well_known: the indices of those that are tried
   /// first; predicted: the frame's rig_from_world by the motion before. Nothing where the images do
   /// not tell, or the frame has none.
@@ -40,7 +38,9 @@ class PatchLocator {
                                       const Rigid3& predicted);
 
   /// The pose that an alignment of the last call tells.
-  LocatedFrame pose_of(const LocatedPatches& before, const PatchAlignment& found) const;
+  static LocatedFrame pose_of(const Rig& rig,
+                              const LocatedPatches& before,
+                              const PatchAlignment& found);
 
   /// Adds features that show landmarks around, as aligned in the last call, to a frame and to what
   /// is known of it; but of those whose landmark it shows already.
@@ -56,9 +56,6 @@ class PatchLocator {
                                            const Frame& frame,
                                            const Rigid3& initial_b_from_a);
 
-  std::shared_ptr<const Rig> rig_;
-  double scale_ = 1.0;      ///< Pixels of the image per pixel of its detail.
-  std::uint8_t level_ = 0;  ///< Of features that are known as well as these pixels tell.
   PatchAligner aligner_;
   std::vector<Eigen::Vector3d> points_in_cam_;  ///< When the image before was taken.
   std::vector<Eigen::Vector3d> chosen_points_;

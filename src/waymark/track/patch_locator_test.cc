@@ -23,8 +23,7 @@ class PatchLocatorTest : public ::testing::Test {
       : camera_(
             CameraRegistry::with_builtin_models().make_camera(named_camera("perspective", 480))),
         rig_(std::make_shared<const Rig>(Rig{{{camera_, cam_from_rig_}}})),
-        renderer_(make_world("room", 3), camera_),
-        locator_(rig_) {
+        renderer_(make_world("room", 3), camera_) {
     const DepthImage depth = renderer_.depth(world_from_cam(before_), kUnitsPerMetre, pool_);
     for (int y = 20; y < camera_->height_px(); y += 20) {
       for (int x = 20; x < camera_->width_px(); x += 20) {
@@ -52,6 +51,7 @@ class PatchLocatorTest : public ::testing::Test {
   /// That shows nothing but its small image.
   Frame make_frame(std::shared_ptr<const SmallImage> image) {
     auto features = std::make_shared<Features>();
+    features->rig = rig_;
     features->num_primary = 0;
     return {FrameId{1}, 0, std::move(features), std::move(image)};
   }
@@ -73,7 +73,7 @@ TEST_F(PatchLocatorTest, FindsThePoseAndWhereTheLandmarksAre) {
   const LocatedPatches before{*image_before, before_};
   const auto found = locator_.align(before, around_, {}, frame, before_);
   ASSERT_TRUE(found);
-  LocatedFrame located = locator_.pose_of(before, *found);
+  LocatedFrame located = locator_.pose_of(*rig_, before, *found);
   const Rigid3 error = located.rig_from_world * (motion * before_).inverse();
   EXPECT_LT(error.translation.norm(), 0.005);
   EXPECT_LT(so3_log(error.rotation).norm(), 0.002);
@@ -95,7 +95,7 @@ TEST_F(PatchLocatorTest, AddsNoLandmarkTwice) {
   const LocatedPatches before{*image, before_};
   const auto found = locator_.align(before, around_, {}, frame, before_);
   ASSERT_TRUE(found);
-  LocatedFrame located = locator_.pose_of(before, *found);
+  LocatedFrame located = locator_.pose_of(*rig_, before, *found);
   locator_.add_features(*found, around_, frame, located);
   const std::size_t count = frame.features->num_primary;
   locator_.add_features(*found, around_, frame, located);
@@ -121,7 +121,7 @@ TEST_F(PatchLocatorTest, TrustsLandmarksThatAreKnownWell) {
   const auto length_m = [&](const std::vector<std::uint32_t>& well_known) {
     const auto found = locator_.align(before, around_, well_known, frame, motion * before_);
     if (!found) return 0.0;
-    const LocatedFrame located = locator_.pose_of(before, *found);
+    const LocatedFrame located = locator_.pose_of(*rig_, before, *found);
     return (located.rig_from_world * before_.inverse()).translation.norm();
   };
   EXPECT_NEAR(length_m(known), 0.06, 0.003);

@@ -102,15 +102,17 @@ double judge(const Regions& regions) {
 
 }  // namespace
 
-double place_confidence(const Rig& rig,
-                        const Features& features,
+double place_confidence(const Features& features,
                         std::span<const LandmarkId> landmarks,
                         const Map& map,
                         KeyframeId nearby,
                         const Rigid3& rig_from_world) {
-  const Camera& camera = *rig.cameras[0].camera;
-  const Expected expected = facing_landmarks(
-      map.keyframes().at(nearby), features, map, rig.cameras[0].cam_from_rig * rig_from_world);
+  const Camera& camera = *features.rig->cameras[0].camera;
+  const Expected expected =
+      facing_landmarks(map.keyframes().at(nearby),
+                       features,
+                       map,
+                       features.rig->cameras[0].cam_from_rig * rig_from_world);
   std::vector<Eigen::Vector2d> pixels(expected.ids.size());
   std::vector<std::uint8_t> is_visible(expected.ids.size());
   camera.project(expected.points_in_cam, pixels, is_visible);

@@ -15,8 +15,7 @@ namespace waymark {
 /// well and others not at all; a change of light thins all of them. No more is expected than there
 /// are features where the keyframe shows something.
 /// landmarks: per feature the landmark that it shows at this pose.
-double place_confidence(const Rig& rig,
-                        const Features& features,
+double place_confidence(const Features& features,
                         std::span<const LandmarkId> landmarks,
                         const Map& map,
                         KeyframeId nearby,

@@ -6,7 +6,7 @@
 
 #include <functional>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -26,7 +26,7 @@ class PlaceConfidenceTest : public ::testing::Test {
       if (!is_kept(i)) landmarks[i] = LandmarkId{};
     }
     return place_confidence(
-        *scene_.rig, *view_.features, landmarks, scene_.map, KeyframeId{0}, truth_.inverse());
+        *view_.features, landmarks, scene_.map, KeyframeId{0}, truth_.inverse());
   }
 
   const Rigid3 truth_ = pose_at(0.4, 0.1, 0.3, 0.05);
@@ -61,12 +61,11 @@ TEST_F(PlaceConfidenceTest, ExpectsOnlyWhatTheCameraCouldSee) {
   const PointObservation view = scene_.look(turned, 101);
   const std::vector<LandmarkId> landmarks = scene_.true_associations(view);
   const auto keyframe = KeyframeId{0};
-  const double there = place_confidence(
-      *scene_.rig, *view.features, landmarks, scene_.map, keyframe, turned.inverse());
+  const double there =
+      place_confidence(*view.features, landmarks, scene_.map, keyframe, turned.inverse());
   EXPECT_GT(there, 0.7);
   const Rigid3 behind = pose_at(0.0, 0.0, 15.0, 3.14159);  // Sees only what nobody saw from there.
-  EXPECT_EQ(place_confidence(
-                *scene_.rig, *view.features, landmarks, scene_.map, keyframe, behind.inverse()),
+  EXPECT_EQ(place_confidence(*view.features, landmarks, scene_.map, keyframe, behind.inverse()),
             0.0);
 }
 
@@ -78,7 +77,7 @@ std::shared_ptr<const Features> with_edges(const Features& features) {
 
 TEST_F(PlaceConfidenceTest, RestsOnCorners) {
   const Keyframe& keyframe = scene_.map.keyframes().at(KeyframeId{0});
-  scene_.map.measure_keyframe(KeyframeId{0}, scene_.rig, with_edges(*keyframe.features));
+  scene_.map.recompute_keyframe(KeyframeId{0}, with_edges(*keyframe.features));
   view_.features = with_edges(*view_.features);
   const std::size_t num_corners = view_.features->num_corners();
   EXPECT_GT(confidence([&](std::size_t i) { return i < num_corners; }), 0.8);

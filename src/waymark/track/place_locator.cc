@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <span>
 #include <utility>
 
 #include "waymark/optimize/locate.h"
@@ -34,9 +35,6 @@ constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio 
 constexpr int kMinInliers = 30;
 
 }  // namespace
-
-PlaceLocator::PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed)
-    : rig_(rig), seed_(seed), locator_(rig) {}
 
 std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  const Map& map,
@@ -83,17 +81,19 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
   for (const auto& [radius_px, min_inliers] : rounds) {
     gather_local_map(map, primary_landmarks(features, located->landmarks), candidate, local_);
     local_.landmarks.keep_corners();
+    const int num_kept = num_valid(std::span(located->landmarks).first(features.num_corners()));
     located = locator_.locate_again(features,
                                     map,
                                     *std::move(located),
                                     local_.landmarks,
                                     {.radius_px = radius_px, .appearance = kGuidedAppearance});
+    attempt_.num_matches += located->num_matches - num_kept;
     attempt_.num_inliers = located->num_inliers;
     if (located->num_inliers < min_inliers) return std::nullopt;
   }
   attempt_.failure = FrameReason::kNone;
   const double confidence = place_confidence(
-      *rig_, features, located->landmarks, map, local_.reference, located->rig_from_world);
+      features, located->landmarks, map, local_.reference, located->rig_from_world);
   return LocatedPlace{*std::move(located), local_.reference, confidence};
 }
 
@@ -125,7 +125,7 @@ void PlaceLocator::match_keyframe(const Features& features, const Map& map, Keyf
   }
   const auto alike =
       appearance_.match_all(*keyframe.features, with_landmark_, features, kAppearance);
-  const auto agreeing = turn_vote_.agreeing(*keyframe.features, features, alike);
+  const auto agreeing = rotation_vote_.agreeing(*keyframe.features, features, alike);
   for (const FeatureMatch& match : agreeing.size() >= kMinAgreeing ? agreeing : alike) {
     matches_.push_back({match.b, keyframe.landmarks[match.a], match.distance});
   }
@@ -150,7 +150,7 @@ std::optional<LocatedFrame> PlaceLocator::find_consensus(const Features& feature
       std::max(kMinPlaceInlierRatio,
                static_cast<double>(kMinConsensus) / static_cast<double>(observations_.size()));
   const std::optional<PoseEstimate> estimate =
-      waymark::locate(*rig_, observations_, PoseOptions{}, ransac_options, workspace_);
+      waymark::locate(*features.rig, observations_, ransac_options, workspace_);
   if (estimate) attempt_.num_inliers = static_cast<int>(estimate->num_inliers);
   if (!estimate || estimate->num_inliers < kMinConsensus) return std::nullopt;
   for (std::size_t k = 0; k < feature_of_observation_.size(); ++k) {

@@ -11,7 +11,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
-#include "waymark/match/turn_vote.h"
+#include "waymark/match/rotation_vote.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/local_map.h"
@@ -29,8 +29,8 @@ struct LocatedPlace {
 struct PlaceAttempt {
   /// kTooFewMatches, kTooFewInliers or kNotVerified, in this order; kNone of a success.
   FrameReason failure = FrameReason::kTooFewMatches;
-  int num_matches = 0;
-  int num_inliers = 0;
+  int num_matches = 0;  ///< By looks alone, and beyond these near the pose that they agree on.
+  int num_inliers = 0;  ///< Of them.
 };
 
 /// Finds out whether features show the surroundings of a keyframe, and from where, without a
@@ -42,8 +42,7 @@ class PlaceLocator {
   /// Below this a pose may be that of a place that merely looks alike.
   static constexpr double kMinConfidence = 0.3;
 
-  /// rig: the one that sees the features.
-  PlaceLocator(std::shared_ptr<const Rig> rig, std::uint64_t seed);
+  explicit PlaceLocator(std::uint64_t seed) : seed_(seed) {}
 
   /// Nothing unless the pose rests on 30 landmarks with this confidence; all of these are of the
   /// candidate's sub-map. Same seed and stream (the frame, for example), same result.
@@ -87,10 +86,9 @@ class PlaceLocator {
                                              std::uint64_t stream,
                                              std::vector<LandmarkId> landmarks);
 
-  std::shared_ptr<const Rig> rig_;
   std::uint64_t seed_;
   AppearanceMatcher appearance_;
-  TurnVote turn_vote_;
+  RotationVote rotation_vote_;
   FrameLocator locator_;
   PoseObservations observations_;
   PoseWorkspace workspace_;

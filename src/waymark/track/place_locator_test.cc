@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "waymark/camera/fisheye.h"
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -19,8 +19,7 @@ double error_m(const Rigid3& rig_from_world, const Rigid3& truth) {
 /// A perspective camera's map of a cloud from three keyframes side by side.
 class PlaceLocatorTest : public ::testing::TestWithParam<int> {
  protected:
-  PlaceLocatorTest()
-      : scene_(GetParam(), cloud_ahead(), {.seed = 5}, true), locator_(scene_.rig, 1) {
+  PlaceLocatorTest() : scene_(GetParam(), cloud_ahead(), {.seed = 5}, true), locator_(1) {
     for (const double x : {0.0, 0.5, 1.0}) scene_.add_keyframe(pose_at(x));
   }
 
@@ -124,8 +123,8 @@ TEST(PlaceLocator, FindsAViewOfAnotherCamera) {
   fisheye.cameras.push_back({std::make_shared<FisheyeCamera>(model, 512, 512), Rigid3()});
   const auto rig = std::make_shared<const Rig>(std::move(fisheye));
   const Rigid3 truth = pose_at(0.4, 0.2, 0.8, 0.2);
-  const PointObservation view = observe(scene.cloud, *rig, truth, scene.noise, 100);
-  PlaceLocator locator(rig, 1);
+  const PointObservation view = observe(scene.cloud, rig, truth, scene.noise, 100);
+  PlaceLocator locator(1);
   const auto place = locator.locate(*view.features, scene.map, KeyframeId{0}, 7);
   ASSERT_TRUE(place);
   EXPECT_LT(error_m(place->frame.rig_from_world, truth), 0.04);

@@ -44,13 +44,13 @@ std::vector<SeenLandmark> seen_landmarks(const Features& features,
   return seen;
 }
 
-std::optional<Rigid3> PoseRefiner::refine(const Map& map,
+std::optional<Rigid3> PoseRefiner::refine(const Rig& rig,
+                                          const Map& map,
                                           std::span<const SeenLandmark> seen,
                                           const Rigid3& rig_from_world) {
-  measure(map, seen);
+  measure(rig, map, seen);
   if (observations_.size() < kMinObservations) return std::nullopt;
-  const PoseEstimate estimate =
-      optimize_pose(*rig_, observations_, rig_from_world, PoseOptions{}, workspace_);
+  const PoseEstimate estimate = optimize_pose(rig, observations_, rig_from_world, workspace_);
   if (estimate.num_inliers < kMinObservations ||
       static_cast<double>(estimate.num_inliers) <
           kMinInlierRatio * static_cast<double>(observations_.size())) {
@@ -59,13 +59,14 @@ std::optional<Rigid3> PoseRefiner::refine(const Map& map,
   return estimate.rig_from_world;
 }
 
-std::vector<SeenLandmark> PoseRefiner::seen_at_once(const Map& map,
+std::vector<SeenLandmark> PoseRefiner::seen_at_once(const Rig& rig,
+                                                    const Map& map,
                                                     std::span<const SeenLandmark> seen,
                                                     const Rigid3& rig_from_world,
                                                     const RigMotion& motion,
                                                     float readout_s) {
-  const TangentArrays& tangents = linearize(map, seen);
-  const RigCamera& camera = rig_->cameras[0];
+  const TangentArrays& tangents = linearize(rig, map, seen);
+  const RigCamera& camera = rig.cameras[0];
   std::vector<SeenLandmark> at_once;
   for (std::size_t i = 0; i < living_.size(); ++i) {
     if (!tangents.is_valid[i]) continue;
@@ -83,7 +84,9 @@ std::vector<SeenLandmark> PoseRefiner::seen_at_once(const Map& map,
   return at_once;
 }
 
-const TangentArrays& PoseRefiner::linearize(const Map& map, std::span<const SeenLandmark> seen) {
+const TangentArrays& PoseRefiner::linearize(const Rig& rig,
+                                            const Map& map,
+                                            std::span<const SeenLandmark> seen) {
   living_.clear();
   pixels_.clear();
   level_scales_.clear();
@@ -93,11 +96,11 @@ const TangentArrays& PoseRefiner::linearize(const Map& map, std::span<const Seen
     pixels_.emplace_back(one.x_px, one.y_px);
     level_scales_.push_back(static_cast<float>(Pyramid::scale(one.level)));
   }
-  return tangents_.compute(*rig_->cameras[0].camera, pixels_, level_scales_);
+  return tangents_.compute(*rig.cameras[0].camera, pixels_, level_scales_);
 }
 
-void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
-  const TangentArrays& tangents = linearize(map, seen);
+void PoseRefiner::measure(const Rig& rig, const Map& map, std::span<const SeenLandmark> seen) {
+  const TangentArrays& tangents = linearize(rig, map, seen);
   observations_.clear();
   for (std::size_t i = 0; i < living_.size(); ++i) {
     if (!tangents.is_valid[i]) continue;
@@ -113,7 +116,8 @@ void PoseRefiner::measure(const Map& map, std::span<const SeenLandmark> seen) {
   }
 }
 
-std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
+std::vector<SeenLandmark> PoseRefiner::find(const Rig& rig,
+                                            const Map& map,
                                             KeyframeId keyframe,
                                             const Features& features,
                                             const Rigid3& rig_from_world) {
@@ -122,7 +126,7 @@ std::vector<SeenLandmark> PoseRefiner::find(const Map& map,
     if (id.is_valid()) set.add(id, map.landmarks().at(id));
   }
   const ProjectionMatches& matches =
-      matcher_.match(set, features, {}, rig_from_world, {.radius_px = kRefineRadiusPx});
+      matcher_.match(rig, set, features, {}, rig_from_world, {.radius_px = kRefineRadiusPx});
   std::vector<SeenLandmark> seen;
   for (std::size_t i = 0; i < set.size(); ++i) {
     if (matches.features[i] == kNoFeature) continue;

@@ -37,37 +37,39 @@ std::vector<SeenLandmark> seen_landmarks(const Features& features,
 /// Finds the poses of past frames again, in a map that has changed since. A frame between keyframes
 /// is known relative to one of them, and the map may have been a few percent too small or bent
 /// where and when it was tracked; moving the frame with its keyframe does not mend that, locating
-/// it anew does. Keeps its buffers.
+/// it anew does. rig: as calibrated by now. Keeps its buffers.
 class PoseRefiner {
  public:
-  explicit PoseRefiner(std::shared_ptr<const Rig> rig) : rig_(rig), matcher_(rig) {}
-
   /// Pose of a frame from what it saw of landmarks that still live, as the rig measures it; nothing
   /// if too few do, or too few agree on a pose near the given one.
-  std::optional<Rigid3> refine(const Map& map,
+  std::optional<Rigid3> refine(const Rig& rig,
+                               const Map& map,
                                std::span<const SeenLandmark> seen,
                                const Rigid3& rig_from_world);
 
   /// The living of the same, moved to where a rolling shutter would have seen them had it read all
   /// rows at the time of the frame, by this motion there and this readout. rig_from_world: about
   /// the pose of the frame.
-  std::vector<SeenLandmark> seen_at_once(const Map& map,
+  std::vector<SeenLandmark> seen_at_once(const Rig& rig,
+                                         const Map& map,
                                          std::span<const SeenLandmark> seen,
                                          const Rigid3& rig_from_world,
                                          const RigMotion& motion,
                                          float readout_s);
 
   /// What a frame near a keyframe sees of that keyframe's landmarks, given about its pose.
-  std::vector<SeenLandmark> find(const Map& map,
+  std::vector<SeenLandmark> find(const Rig& rig,
+                                 const Map& map,
                                  KeyframeId keyframe,
                                  const Features& features,
                                  const Rigid3& rig_from_world);
 
  private:
-  const TangentArrays& linearize(const Map& map, std::span<const SeenLandmark> seen);
-  void measure(const Map& map, std::span<const SeenLandmark> seen);
+  const TangentArrays& linearize(const Rig& rig,
+                                 const Map& map,
+                                 std::span<const SeenLandmark> seen);
+  void measure(const Rig& rig, const Map& map, std::span<const SeenLandmark> seen);
 
-  std::shared_ptr<const Rig> rig_;
   ProjectionMatcher matcher_;
   TangentComputer tangents_;
   std::vector<const SeenLandmark*> living_;

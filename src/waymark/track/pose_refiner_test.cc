@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -13,7 +13,7 @@ namespace {
 /// too small.
 class PoseRefinerTest : public ::testing::TestWithParam<int> {
  protected:
-  PoseRefinerTest() : scene_(GetParam(), cloud_ahead(), {.seed = 5}, false), refiner_(scene_.rig) {
+  PoseRefinerTest() : scene_(GetParam(), cloud_ahead(), {.seed = 5}, false) {
     scene_.add_keyframe(pose_at(0.0));
     scene_.add_keyframe(pose_at(0.5));
     view_ = scene_.look(truth_, 100);
@@ -37,7 +37,7 @@ class PoseRefinerTest : public ::testing::TestWithParam<int> {
 TEST_P(PoseRefinerTest, MendsAPoseFromAWrongMap) {
   ASSERT_GT(seen_.size(), 200u);
   ASSERT_GT(error_m(stale_), 0.03);
-  const auto refined = refiner_.refine(scene_.map, seen_, stale_);
+  const auto refined = refiner_.refine(*scene_.rig, scene_.map, seen_, stale_);
   ASSERT_TRUE(refined);
   EXPECT_LT(error_m(*refined), 0.01);
 }
@@ -55,25 +55,25 @@ TEST_P(PoseRefinerTest, FollowsMergesAndLeavesOutTheErased) {
         scene_.map.add_landmark(scene_.submap, old.position_in_world, old.reference);
     scene_.map.merge_landmarks(survivor, seen_[i].landmark);
   }
-  const auto refined = refiner_.refine(scene_.map, seen_, stale_);
+  const auto refined = refiner_.refine(*scene_.rig, scene_.map, seen_, stale_);
   ASSERT_TRUE(refined);
   EXPECT_LT(error_m(*refined), 0.015);
 }
 
 TEST_P(PoseRefinerTest, GivesNothingWhereTooLittleIsLeftOrAgrees) {
   std::vector<SeenLandmark> few(seen_.begin(), seen_.begin() + 10);
-  EXPECT_FALSE(refiner_.refine(scene_.map, few, stale_));
+  EXPECT_FALSE(refiner_.refine(*scene_.rig, scene_.map, few, stale_));
   std::vector<SeenLandmark> wrong = seen_;
   for (std::size_t i = 0; i < wrong.size(); ++i) {
     wrong[i].landmark = seen_[(i + seen_.size() / 2) % seen_.size()].landmark;
   }
-  EXPECT_FALSE(refiner_.refine(scene_.map, wrong, stale_));
+  EXPECT_FALSE(refiner_.refine(*scene_.rig, scene_.map, wrong, stale_));
 }
 
 TEST_P(PoseRefinerTest, FindsWhatAFrameSeesOfAKeyframe) {
-  const auto found = refiner_.find(scene_.map, KeyframeId{1}, *view_.features, stale_);
+  const auto found = refiner_.find(*scene_.rig, scene_.map, KeyframeId{1}, *view_.features, stale_);
   ASSERT_GT(found.size(), 150u);
-  const auto refined = refiner_.refine(scene_.map, found, stale_);
+  const auto refined = refiner_.refine(*scene_.rig, scene_.map, found, stale_);
   ASSERT_TRUE(refined);
   EXPECT_LT(error_m(*refined), 0.01);
 }

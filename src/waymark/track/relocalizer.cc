@@ -78,11 +78,6 @@ bool is_near(const LastPlace& last, const Map& map, const LocatedFrame& located)
 
 }  // namespace
 
-Relocalizer::Relocalizer(std::shared_ptr<const Rig> rig,
-                         const TrackingSettings& settings,
-                         std::uint64_t seed)
-    : rig_(rig), locator_(std::move(rig), seed), min_inliers_(settings.min_inliers) {}
-
 std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const Map& map,
                                                 const PlaceIndex& places,
@@ -111,7 +106,7 @@ std::optional<LocatedFrame> Relocalizer::locate_at(const Frame& frame,
 std::optional<LocatedFrame> Relocalizer::locate_at_markers(const Frame& frame, const Map& map) {
   if (!frame.find_markers || map.markers().empty()) return std::nullopt;
   std::optional<LocatedFrame> best;
-  for (const MarkerPose& pose : poses_by_markers(frame.find_markers(), *rig_, map)) {
+  for (const MarkerPose& pose : poses_by_markers(frame.find_markers(), *frame.features->rig, map)) {
     auto located = locate_at(frame, map, pose);
     if (!located || (best && best->num_inliers >= located->num_inliers)) continue;
     best = std::move(located);

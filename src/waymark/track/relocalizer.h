@@ -36,8 +36,8 @@ struct MarkerPose {
 /// the map, and misses are preferred to wrong places. Keeps its buffers.
 class Relocalizer {
  public:
-  /// rig: the one that sees the frames; the map may be of other cameras.
-  Relocalizer(std::shared_ptr<const Rig> rig, const TrackingSettings& settings, std::uint64_t seed);
+  Relocalizer(const TrackingSettings& settings, std::uint64_t seed)
+      : locator_(seed), min_inliers_(settings.min_inliers) {}
 
   /// Pose of a frame in whichever sub-map shows the place. The index may know more or fewer
   /// keyframes than the map.
@@ -64,7 +64,6 @@ class Relocalizer {
   void note(const PlaceAttempt& attempt);
   std::optional<LocatedFrame> locate_at(const Frame& frame, const Map& map, const MarkerPose& pose);
 
-  std::shared_ptr<const Rig> rig_;
   PlaceLocator locator_;
   int min_inliers_;
   FrameStatus diagnosis_;

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
@@ -21,8 +21,7 @@ PointCloud another_cloud(std::uint64_t seed) {
 /// Two places in a sub-map each, of four keyframes each.
 class RelocalizerTest : public ::testing::Test {
  protected:
-  RelocalizerTest()
-      : scene_(1, cloud_ahead(), {.seed = 5}, false), relocalizer_(scene_.rig, {}, 1) {
+  RelocalizerTest() : scene_(1, cloud_ahead(), {.seed = 5}, false), relocalizer_({}, 1) {
     add_keyframes();
     first_ = std::exchange(scene_.cloud, another_cloud(11));
     scene_.submap = scene_.map.add_submap(false);
@@ -40,7 +39,7 @@ class RelocalizerTest : public ::testing::Test {
   std::optional<LocatedFrame> locate(const PointCloud& cloud,
                                      const Rigid3& world_from_rig,
                                      const std::optional<LastPlace>& last = {}) {
-    const auto view = observe(cloud, *scene_.rig, world_from_rig, scene_.noise, 100);
+    const auto view = observe(cloud, scene_.rig, world_from_rig, scene_.noise, 100);
     const Frame frame = {FrameId{100}, 0, view.features};
     return relocalizer_.locate(frame, scene_.map, places_, last);
   }
@@ -104,6 +103,7 @@ TEST_F(RelocalizerTest, BelievesNearTheLastPlaceWhatItWouldNotElsewhere) {
   const Rigid3 truth = pose_at(0.5, 0.1, 0.2);
   EXPECT_FALSE(locate(changed, truth));
   EXPECT_EQ(relocalizer_.diagnosis().reason, FrameReason::kNotVerified);
+  EXPECT_LE(relocalizer_.diagnosis().num_inliers, relocalizer_.diagnosis().num_matches);
   EXPECT_FALSE(locate(changed, truth, LastPlace{KeyframeId{1}, pose_at(0.5, 8.0).inverse()}));
   const auto near = locate(changed, truth, LastPlace{KeyframeId{1}, pose_at(0.4).inverse()});
   ASSERT_TRUE(near);
@@ -131,7 +131,7 @@ TEST_F(RelocalizerTest, SaysThatThereIsNoCandidate) {
 
 TEST_F(RelocalizerTest, LeavesOutKeyframesThatTheMapDoesNotHave) {
   scene_.map.erase_keyframe(KeyframeId{6});
-  const auto view = observe(scene_.cloud, *scene_.rig, pose_at(0.6), scene_.noise, 101);
+  const auto view = observe(scene_.cloud, scene_.rig, pose_at(0.6), scene_.noise, 101);
   for (std::uint32_t id = 8; id < 30; ++id) {
     places_.add(KeyframeId{id}, SubmapId{1}, view.features->descriptors);
   }

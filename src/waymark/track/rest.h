@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <bitset>
 #include <span>
 
 #include "waymark/camera/camera.h"
@@ -10,13 +11,29 @@
 
 namespace waymark {
 
-/// Whether the camera stood still between two frames, whatever moved before it: all over the image
-/// features stay where they were to a pixel. A camera that moves has such features as well, but not
-/// all over: what is far away or straight ahead, what moves along, text that is burnt in. One that
-/// shows all directions may show what carries it in half of its image or more.
-bool is_at_rest(const Camera& camera,
-                const Features& before,
-                const Features& now,
-                std::span<const FeatureMatch> matches);
+/// Whether a camera has stood still since a frame, whatever moves before it: in some cells of the
+/// image, in most of its rows and half of its columns, features stay where they were to half
+/// a pixel in the median. Where a camera moves, what is far away moves with its turns; burnt-in
+/// text and what moves along stay, but not all over. A camera that shows all directions may show
+/// what carries it in half of its image or more; there three quarters have to stay.
+/// Once at rest, it is for as long as most of the cells that stayed in one frame stay in the next:
+/// things may come to hide nearly all of the view, a camera that moves leaves few cells at once.
+class Rest {
+ public:
+  /// With the matches between the frame and a later one; for each in turn.
+  void update(const Camera& camera,
+              const Features& before,
+              const Features& now,
+              std::span<const FeatureMatch> matches);
+  bool is_at_rest() const { return staying_.any(); }
+
+ private:
+  static constexpr int kColumns = 6, kRows = 4;
+  using Cells = std::bitset<kColumns * kRows>;
+
+  static bool are_all_over(const Cells& staying, const Cells& telling, bool wraps);
+
+  Cells staying_;  ///< In the last frame at rest; none where the camera is not.
+};
 
 }  // namespace waymark

@@ -2,29 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/scale_keeper.h"
 
-#include <algorithm>
-#include <cmath>
-
 #include "waymark/base/median.h"
 #include "waymark/track/last_frame.h"
 
 namespace waymark {
 namespace {
 
-/// So many landmarks agree on a similarity by chance hardly ever: each has two images to agree in.
-constexpr std::size_t kMinSimilar = 6;
-constexpr AppearanceOptions kSimilarAppearance{.max_distance = 64, .max_ratio = 0.85};
-/// Of landmarks that were mapped independently, one side from two views near each other: twice as
-/// much as where loops are closed (docs/decisions.md).
-constexpr double kSimilarNoisePx = 3.0;
-
 /// The speed before is that of so many steps from keyframe to keyframe, in the median.
 constexpr std::size_t kNumSpeedSteps = 3;
 /// Who moved less, as a part of the distance of what is seen, may as well have stood still.
 constexpr double kLeastMotion = 0.01;
-/// Scales of parts that begin 1.5 s after the one before ends, as their speeds tell them, by the
-/// true ones (docs/decisions.md).
-constexpr double kSpeedLogSigma = 0.24;
 
 struct KeyframeStep {
   double length = 0.0;
@@ -48,64 +35,9 @@ KeyframeId keyframe_before(const Map& map, KeyframeId id) {
   return {};
 }
 
-std::vector<std::uint32_t> features_with_landmark(const Keyframe& keyframe) {
-  std::vector<std::uint32_t> with_landmark;
-  for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
-    if (keyframe.landmarks[i].is_valid()) with_landmark.push_back(i);
-  }
-  return with_landmark;
-}
-
 }  // namespace
 
-LandmarkMatches ScaleKeeper::match(const Map& map,
-                                   const Keyframe& before,
-                                   const NewSubmap& start,
-                                   std::size_t index) {
-  const InitialKeyframe& after = start.keyframes[index];
-  std::vector<const InitialLandmark*> shown(after.features->size());
-  for (const InitialLandmark& landmark : start.landmarks) {
-    const std::uint32_t feature = landmark.features[index];
-    if (feature != kNoFeature) shown[feature] = &landmark;
-  }
-  const Rigid3 before_cam_from_world = before.rig->cameras[0].cam_from_rig * before.rig_from_world;
-  const Rigid3 after_cam_from_world = start.rig->cameras[0].cam_from_rig * after.rig_from_world;
-  LandmarkMatches matches;
-  for (const FeatureMatch& pair : appearance_.match_all(
-           *before.features, features_with_landmark(before), *after.features, kSimilarAppearance)) {
-    const InitialLandmark* const landmark = shown[pair.b];
-    if (!landmark) continue;
-    const Landmark& known = map.landmarks().at(before.landmarks[pair.a]);
-    matches.a.add(after_cam_from_world * landmark->position_in_world,
-                  after.features->measurement(pair.b));
-    matches.b.add(before_cam_from_world * known.position_in_world,
-                  before.features->measurement(pair.a));
-  }
-  return matches;
-}
-
-std::optional<KeptScale> ScaleKeeper::by_landmarks(const Map& map,
-                                                   std::span<const KeyframeId> keyframes,
-                                                   const NewSubmap& start) {
-  std::optional<KeptScale> best;
-  for (const KeyframeId id : keyframes) {
-    for (std::size_t k = 0; k < start.keyframes.size(); ++k) {
-      const LandmarkMatches matches = match(map, map.keyframes().at(id), start, k);
-      const auto found = find_similarity(
-          matches,
-          {.is_scale_free = true, .noise_px = kSimilarNoisePx},
-          {.seed = seed_, .stream = start.keyframes[k].frame.value, .min_inlier_ratio = 0.15});
-      if (!found || found->num_inliers < kMinSimilar) continue;
-      if (best && best->num_landmarks >= found->num_inliers) continue;
-      const double log_sigma = std::sqrt(found->covariance(6, 6));
-      if (!(log_sigma < kSpeedLogSigma)) continue;
-      best = {{}, {}, found->b_from_a.scale, log_sigma, found->num_inliers};
-    }
-  }
-  return best;
-}
-
-std::optional<KeptScale> scale_by_speed(const Map& map, KeyframeId last, const NewSubmap& start) {
+std::optional<double> scale_by_speed(const Map& map, KeyframeId last, const NewSubmap& start) {
   if (start.keyframes.size() < 2) return std::nullopt;
   std::vector<double> speeds;
   double in_distances = 0.0;  // How far it went, as a part of the distance of what it saw.
@@ -124,7 +56,7 @@ std::optional<KeptScale> scale_by_speed(const Map& map, KeyframeId last, const N
   const KeyframeStep after = step_between(start.keyframes.front(), start.keyframes.back());
   if (in_distances < kLeastMotion || !(after.length > 0.0)) return std::nullopt;
   const double speed_after = after.length / after.seconds;
-  return KeptScale{{}, {}, median(speeds) / speed_after, kSpeedLogSigma, 0};
+  return median(speeds) / speed_after;
 }
 
 void scale_by(double factor, Initialization& start) {
@@ -136,18 +68,12 @@ void scale_by(double factor, Initialization& start) {
   for (FilledPose& filled : start.filled) filled.pose.rig_from_reference.translation *= factor;
 }
 
-void ScaleKeeper::keep(const Map& map,
-                       std::span<const KeyframeId> keyframes,
-                       Initialization& start) {
-  if (keyframes.empty()) return;
-  const KeyframeId last = *std::ranges::max_element(keyframes);
-  std::optional<KeptScale> kept = by_landmarks(map, keyframes, start.submap);
-  if (!kept) kept = scale_by_speed(map, last, start.submap);
-  if (!kept) return;
-  scale_by(kept->scale, start);
-  kept->submap = SubmapId{static_cast<std::uint32_t>(map.submaps().size())};
-  kept->before = map.keyframes().at(last).submap;
-  kept_.push_back(*kept);
+void ScaleKeeper::keep(const Map& map, KeyframeId last, Initialization& start) {
+  const std::optional<double> scale = scale_by_speed(map, last, start.submap);
+  if (!scale) return;
+  scale_by(*scale, start);
+  kept_.push_back({SubmapId{static_cast<std::uint32_t>(map.submaps().size())},
+                   map.keyframes().at(last).submap});
 }
 
 std::vector<KeptScale> ScaleKeeper::kept_in(const Map& map) const {

@@ -14,13 +14,21 @@ namespace waymark {
 class SentIds {
  public:
   SentIds() = default;
-  explicit SentIds(const Map& map)
+  /// newest_frame: the one that became a keyframe last, if any did.
+  explicit SentIds(const Map& map, FrameId newest_frame = {})
       : num_keyframes_(map.keyframes().end_id().value),
-        num_submaps_(static_cast<std::uint32_t>(map.submaps().size())) {}
+        num_submaps_(static_cast<std::uint32_t>(map.submaps().size())),
+        newest_frame_(newest_frame) {}
 
-  KeyframeId add_keyframe() { return KeyframeId{num_keyframes_++}; }
+  /// frame: that becomes the keyframe.
+  KeyframeId add_keyframe(FrameId frame) {
+    newest_frame_ = frame;
+    return KeyframeId{num_keyframes_++};
+  }
 
-  SubmapId add_submap(std::size_t num_keyframes) {
+  /// frame: the newest that becomes a keyframe of it.
+  SubmapId add_submap(std::size_t num_keyframes, FrameId frame) {
+    newest_frame_ = frame;
     submap_start_ = num_keyframes_;
     num_keyframes_ += static_cast<std::uint32_t>(num_keyframes);
     return SubmapId{num_submaps_++};
@@ -29,6 +37,8 @@ class SentIds {
   /// The first keyframe of the newest sub-map that was sent.
   KeyframeId submap_start() const { return KeyframeId{submap_start_}; }
   KeyframeId newest_keyframe() const { return KeyframeId{num_keyframes_ - 1}; }
+  /// The one that became a keyframe last.
+  FrameId newest_frame() const { return newest_frame_; }
 
   /// Keyframes of the newest sub-map (without one: all) that a map has had so far.
   std::size_t submap_age(const Map& map) const {
@@ -43,6 +53,7 @@ class SentIds {
   std::uint32_t num_keyframes_ = 0;
   std::uint32_t num_submaps_ = 0;
   std::uint32_t submap_start_ = 0;
+  FrameId newest_frame_;
 };
 
 }  // namespace waymark

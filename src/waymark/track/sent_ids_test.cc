@@ -4,17 +4,17 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
 
 namespace waymark {
 namespace {
 
 TEST(SentIds, AreConsecutiveOverSubmaps) {
   SentIds ids;
-  EXPECT_EQ(ids.add_submap(2), SubmapId{0});
+  EXPECT_EQ(ids.add_submap(2, FrameId{0}), SubmapId{0});
   EXPECT_EQ(ids.newest_keyframe(), KeyframeId{1});
-  EXPECT_EQ(ids.add_keyframe(), KeyframeId{2});
-  EXPECT_EQ(ids.add_submap(1), SubmapId{1});
+  EXPECT_EQ(ids.add_keyframe(FrameId{0}), KeyframeId{2});
+  EXPECT_EQ(ids.add_submap(1, FrameId{0}), SubmapId{1});
   EXPECT_EQ(ids.submap_start(), KeyframeId{3});
   EXPECT_EQ(ids.newest_keyframe(), KeyframeId{3});
 }
@@ -26,8 +26,8 @@ TEST(SentIds, GoOnFromAMapAndKnowWhatItLacks) {
   SentIds ids(scene.map);
   EXPECT_EQ(ids.num_pending(scene.map), 0u);
   EXPECT_EQ(ids.submap_age(scene.map), 3u) << "one that is gone counts, too";
-  EXPECT_EQ(ids.add_keyframe(), KeyframeId{3});
-  EXPECT_EQ(ids.add_submap(2), SubmapId{1});
+  EXPECT_EQ(ids.add_keyframe(FrameId{0}), KeyframeId{3});
+  EXPECT_EQ(ids.add_submap(2, FrameId{0}), SubmapId{1});
   EXPECT_EQ(ids.num_pending(scene.map), 3u);
 }
 

@@ -7,7 +7,8 @@
 #include <memory>
 #include <variant>
 
-#include "waymark/track/test_map.h"
+#include "waymark/track/testing/map.h"
+#include "waymark/track/testing/tracked.h"
 
 namespace waymark {
 namespace {
@@ -26,31 +27,33 @@ class TrackerTest : public ::testing::Test {
   static PointCloud cloud() { return scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 3); }
 
   std::unique_ptr<Tracker> make_tracker() const {
-    return std::make_unique<Tracker>(scene_.rig, true, TrackingSettings{}, 1);
+    return std::make_unique<Tracker>(true, TrackingSettings{}, 1);
   }
 
-  TrackOutcome track(std::uint32_t number, const Features& features) {
-    StageTimes times;
+  Tracked track(std::uint32_t number, const Features& features) {
     const Frame frame{FrameId{number},
                       50'000'000 * std::int64_t{number},
                       std::make_shared<const Features>(features)};
-    return tracker_->track(frame, {map_, places_}, times);
+    Tracked outcome;
+    outcome.message = tracker_->track(frame, {map_, places_}, outcome);
+    return outcome;
   }
 
   /// With the image; whether that took a search among keyframes.
   bool recovers(std::uint32_t number, const Rigid3& world_from_rig) {
-    StageTimes times;
+    Tracked outcome;
     const Frame frame{FrameId{number},
                       50'000'000 * std::int64_t{number},
                       scene_.look(world_from_rig, number).features,
                       far_image(*scene_.rig->cameras[0].camera, world_from_rig)};
-    expect_pose(tracker_->track(frame, {map_, places_}, times), world_from_rig);
-    return times[Stage::kRecover] > 0.0;
+    outcome.message = tracker_->track(frame, {map_, places_}, outcome);
+    expect_pose(outcome, world_from_rig);
+    return tracker_->found_by() != "motion";
   }
 
   /// Tracks a view and lets the mapper answer.
-  TrackOutcome track(std::uint32_t number, const Rigid3& world_from_rig) {
-    TrackOutcome outcome = track(number, *scene_.look(world_from_rig, number).features);
+  Tracked track(std::uint32_t number, const Rigid3& world_from_rig) {
+    Tracked outcome = track(number, *scene_.look(world_from_rig, number).features);
     if (outcome.message) {
       scene_.add_keyframe(world_from_rig);
       map_ = scene_.map.freeze();
@@ -65,7 +68,7 @@ class TrackerTest : public ::testing::Test {
     }
   }
 
-  static void expect_pose(const TrackOutcome& outcome, const Rigid3& world_from_rig) {
+  static void expect_pose(const Tracked& outcome, const Rigid3& world_from_rig) {
     ASSERT_TRUE(outcome.world_from_rig);
     const Vector6d error = (world_from_rig.inverse() * *outcome.world_from_rig).log();
     EXPECT_LT(error.head<3>().norm(), 0.02);
@@ -79,12 +82,12 @@ class TrackerTest : public ::testing::Test {
 };
 
 TEST_F(TrackerTest, StartsASubmapAndThenFollows) {
-  const TrackOutcome first = track(0, path(0));
+  const Tracked first = track(0, path(0));
   EXPECT_EQ(first.state, FrameState::kTracked);
   ASSERT_TRUE(first.message);
   EXPECT_TRUE(std::holds_alternative<NewSubmap>(*first.message));
   for (std::uint32_t i = 1; i < kMaxFrames; ++i) {
-    const TrackOutcome outcome = track(i, path(i));
+    const Tracked outcome = track(i, path(i));
     ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
     EXPECT_EQ(outcome.reason, FrameReason::kNone);
     expect_pose(outcome, path(i));
@@ -92,7 +95,7 @@ TEST_F(TrackerTest, StartsASubmapAndThenFollows) {
     EXPECT_GT(outcome.covariance.trace(), 0.0);
     // The pose is the same by reference.
     if (outcome.message) continue;  // The mapper puts keyframes where they truly are.
-    const RelativePose& pose = outcome.details.pose;
+    const RelativePose& pose = outcome.pose;
     const Rigid3 again =
         map_->rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
     EXPECT_TRUE(again.inverse().matrix().isApprox(outcome.world_from_rig->matrix(), 1e-9));
@@ -107,10 +110,10 @@ TEST_F(TrackerTest, AsksForKeyframesWithConsecutiveIdsAndTrueAssociations) {
     const Rigid3 pose = path(2.0 * i);  // Twice as fast.
     const PointObservation view = scene_.look(pose, i);
     const std::vector<LandmarkId> truth = scene_.true_associations(view);
-    const TrackOutcome outcome = track(i, pose);
+    const Tracked outcome = track(i, pose);
     ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
     if (!outcome.message) continue;
-    EXPECT_EQ(outcome.details.pose.reference, KeyframeId{num_keyframes++});
+    EXPECT_EQ(outcome.pose.reference, KeyframeId{num_keyframes++});
     const auto& message = std::get<NewKeyframe>(*outcome.message);
     EXPECT_EQ(message.frame, FrameId{i});
     ASSERT_EQ(message.landmarks.size(), view.features->size());
@@ -150,20 +153,20 @@ TEST_F(TrackerTest, MovesWithTheMap) {
     scene_.map.set_appearance(id, appearance);
   }
   map_ = scene_.map.freeze();
-  const TrackOutcome outcome = track(10, *scene_.look(path(10), 10).features);
+  const Tracked outcome = track(10, *scene_.look(path(10), 10).features);
   ASSERT_EQ(outcome.state, FrameState::kTracked);
   expect_pose(outcome, moved * path(10));
 }
 
 TEST_F(TrackerTest, IsLostWhereItSeesNothingKnownAndRecoversWhereItDoes) {
   follow_path(10);
-  const TrackOutcome away = track(10, pose_at(0.2, 0.0, 0.0, 3.1));
+  const Tracked away = track(10, pose_at(0.2, 0.0, 0.0, 3.1));
   EXPECT_EQ(away.state, FrameState::kLost);
   EXPECT_NE(away.reason, FrameReason::kNone);
   EXPECT_FALSE(away.world_from_rig);
   EXPECT_FALSE(away.message);
   // Back, but not where the motion would have led.
-  const TrackOutcome back = track(11, pose_at(0.05, 0.05, -0.1, -0.03));
+  const Tracked back = track(11, pose_at(0.05, 0.05, -0.1, -0.03));
   ASSERT_EQ(back.state, FrameState::kTracked);
   expect_pose(back, pose_at(0.05, 0.05, -0.1, -0.03));
   EXPECT_EQ(track(12, path(3)).state, FrameState::kTracked);
@@ -175,15 +178,15 @@ TEST_F(TrackerTest, ExtendsAMapMadeBefore) {
   places_ = index_map(map_).places;
   tracker_ = make_tracker();
   tracker_->begin_in(*map_, TrackingPurpose::kMapping);
-  const TrackOutcome found = track(50, path(12));
+  const Tracked found = track(50, path(12));
   EXPECT_TRUE(found.is_relocalized);
   expect_pose(found, path(12));
   std::uint32_t num_new = found.message.has_value();
   for (std::uint32_t i = 51; i < 100; ++i) {
-    const TrackOutcome outcome = track(i, path(12 + 3 * (i - 50)));
+    const Tracked outcome = track(i, path(12 + 3 * (i - 50)));
     ASSERT_EQ(outcome.state, FrameState::kTracked) << i;
     if (!outcome.message) continue;
-    EXPECT_EQ(outcome.details.pose.reference, KeyframeId{num_keyframes + num_new++});
+    EXPECT_EQ(outcome.pose.reference, KeyframeId{num_keyframes + num_new++});
     EXPECT_TRUE(std::holds_alternative<NewKeyframe>(*outcome.message));
   }
   EXPECT_GE(num_new, 2u);
@@ -196,7 +199,7 @@ TEST_F(TrackerTest, BeginsASubmapWhereTheMapDoesNotHelp) {
   tracker_->begin_in(*map_, TrackingPurpose::kMapping);
   scene_.cloud = scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 99);
   for (std::uint32_t i = 10; i < 20; ++i) {
-    const TrackOutcome outcome = track(i, *scene_.look(path(i), i).features);
+    const Tracked outcome = track(i, *scene_.look(path(i), i).features);
     if (outcome.state == FrameState::kLost) continue;
     ASSERT_TRUE(outcome.message);
     EXPECT_TRUE(std::holds_alternative<NewSubmap>(*outcome.message));
@@ -214,7 +217,7 @@ TEST_F(TrackerTest, LeavesTheMapAloneWhereItOnlyLocalizes) {
   for (std::uint32_t i = 0; i < 30; ++i) {
     const bool is_away = i >= 10 && i < 20;
     const Rigid3 pose = is_away ? pose_at(0.2, 0.0, 0.0, 3.1) : path(3 + 0.9 * i);
-    const TrackOutcome outcome = track(i, pose);
+    const Tracked outcome = track(i, pose);
     EXPECT_EQ(outcome.state, is_away ? FrameState::kLost : FrameState::kTracked) << i;
     EXPECT_FALSE(outcome.message);
     if (!is_away) expect_pose(outcome, pose);
@@ -223,7 +226,7 @@ TEST_F(TrackerTest, LeavesTheMapAloneWhereItOnlyLocalizes) {
 
 TEST_F(TrackerTest, SaysThatAFrameHasNoFeatures) {
   follow_path(5);
-  const TrackOutcome outcome = track(5, Features{});
+  const Tracked outcome = track(5, Features{});
   EXPECT_EQ(outcome.state, FrameState::kLost);
   EXPECT_EQ(outcome.reason, FrameReason::kNoFeatures);
   EXPECT_EQ(track(6, path(6)).state, FrameState::kTracked);
@@ -241,7 +244,7 @@ TEST_F(TrackerTest, GoesOnWithTheMotionWhereImagesShowedNothing) {
   }
   for (; number < 18; ++number) EXPECT_EQ(track(number, Features{}).state, FrameState::kLost);
   const Rigid3 ahead = path(6.0 * number);  // Farther than the widest search reaches.
-  const TrackOutcome outcome = track(number, ahead);
+  const Tracked outcome = track(number, ahead);
   ASSERT_EQ(outcome.state, FrameState::kTracked);
   expect_pose(outcome, ahead);
 }
@@ -250,7 +253,7 @@ TEST_F(TrackerTest, FollowsASuddenTurn) {
   follow_path(10);
   // 40 px: more than the motion model expects, less than the widest search.
   const Rigid3 turned = pose_at(0.2, 0.0, 0.0, 0.01 + 30.0 / 420.0);
-  const TrackOutcome outcome = track(10, turned);
+  const Tracked outcome = track(10, turned);
   ASSERT_EQ(outcome.state, FrameState::kTracked);
   expect_pose(outcome, turned);
 }
@@ -266,7 +269,7 @@ TEST_F(TrackerTest, IsToldOfASuddenTurnByTheImage) {
 }
 
 TEST_F(TrackerTest, StaysInitializingWhileThereAreNoFeatures) {
-  const TrackOutcome outcome = track(0, Features{});
+  const Tracked outcome = track(0, Features{});
   EXPECT_EQ(outcome.state, FrameState::kInitializing);
   EXPECT_EQ(outcome.reason, FrameReason::kNoFeatures);
   EXPECT_EQ(track(1, path(1)).state, FrameState::kTracked);

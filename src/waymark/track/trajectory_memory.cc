@@ -32,19 +32,23 @@ void TrajectoryMemory::Entry::set_pose(const RelativePose& pose) {
   Eigen::Map<Eigen::Vector3d>(translation_.data()) = pose.rig_from_reference.translation;
 }
 
-void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, const Map& map) {
-  entries_.emplace_back(frame.timestamp_ns, outcome.state, outcome.details.pose);
-  if (outcome.message) newest_sent_ = frame.id;
+void TrajectoryMemory::add(const Frame& frame, const TrackingResult& result, const Map& map) {
+  entries_.emplace_back(frame.timestamp_ns, result.state, result.pose);
+  if (result.is_keyframe) newest_sent_ = frame.id;
+  num_relocalizations_ += result.is_relocalized;
   // Long after the map has changed last it has settled, and the frame with it.
   const bool is_settled = frame.id.value - newest_sent_.value > kMaxSinceKeyframe;
-  if (!outcome.seen.empty() && !is_settled) {
-    const Features& features = *outcome.details.features;
-    unsettled_.push_back(
-        {frame.id, outcome.seen, nullptr, features.readout_s[0], features.inverse_depth_offset});
+  if (!result.landmarks.empty() && !is_settled) {
+    const Features& features = *result.features;
+    unsettled_.push_back({frame.id,
+                          seen_landmarks(features, result.landmarks),
+                          nullptr,
+                          features.readout_s[0],
+                          features.inverse_depth_offset});
   }
-  if (outcome.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
+  if (result.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
-  for (const FilledPose& filled : outcome.details.filled) {
+  for (const FilledPose& filled : result.filled) {
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
     entry.set_pose(filled.pose);
@@ -55,20 +59,20 @@ void TrajectoryMemory::add(const Frame& frame, const TrackOutcome& outcome, cons
                           filled.features->inverse_depth_offset});
   }
   while (unsettled_.size() > kMaxUnsettled) {
-    settle(unsettled_.front(), map);
+    settle(unsettled_.front(), *frame.features->rig, map);
     unsettled_.pop_front();
   }
 }
 
-void TrajectoryMemory::settle(const Map& map) {
-  for (const Unsettled& unsettled : unsettled_) settle(unsettled, map);
+void TrajectoryMemory::settle(const Rig& rig, const Map& map) {
+  for (const Unsettled& unsettled : unsettled_) settle(unsettled, rig, map);
   unsettled_.clear();
-  for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, map);
-  for (const Unposed& unposed : unposed_) fill(unposed, -1, map);
+  for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, rig, map);
+  for (const Unposed& unposed : unposed_) fill(unposed, -1, rig, map);
   unposed_.clear();
 }
 
-void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
+void TrajectoryMemory::settle(const Unsettled& unsettled, const Rig& rig, const Map& map) {
   Entry& entry = entry_of(unsettled.frame);
   const RelativePose pose = entry.pose();
   const KeyframeId living = map.resolve(pose.reference);
@@ -76,16 +80,17 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Map& map) {
   if (keyframe.frame == unsettled.frame) return;  // Adjusted with the map.
   const Rigid3 guess =
       map.rig_from_world(pose.reference, pose.rig_from_reference, pose.reference_scale);
-  std::vector<SeenLandmark> seen =
-      unsettled.features ? refiner_.find(map, living, *unsettled.features, guess) : unsettled.seen;
-  const float readout_s = static_cast<float>(rig_->cameras[0].readout_s) - unsettled.readout_s;
+  std::vector<SeenLandmark> seen = unsettled.features
+                                       ? refiner_.find(rig, map, living, *unsettled.features, guess)
+                                       : unsettled.seen;
+  const float readout_s = static_cast<float>(rig.cameras[0].readout_s) - unsettled.readout_s;
   if (const auto motion = readout_s == 0.0f ? std::nullopt : motion_in(unsettled.frame, map)) {
-    seen = refiner_.seen_at_once(map, seen, guess, *motion, readout_s);
+    seen = refiner_.seen_at_once(rig, map, seen, guess, *motion, readout_s);
   }
   const float offset =
-      static_cast<float>(rig_->inverse_depth_offset) - unsettled.inverse_depth_offset;
+      static_cast<float>(rig.inverse_depth_offset) - unsettled.inverse_depth_offset;
   for (SeenLandmark& one : seen) one.inverse_depth -= offset;
-  const auto refined = refiner_.refine(map, seen, guess);
+  const auto refined = refiner_.refine(rig, map, seen, guess);
   if (!refined) return;
   entry.set_pose({living, keyframe.applied_scale, *refined * keyframe.rig_from_world.inverse()});
 }
@@ -110,7 +115,7 @@ std::optional<RigMotion> TrajectoryMemory::motion_in(FrameId frame, const Map& m
   return RigMotion{rate.tail<3>().cast<float>(), rate.head<3>().cast<float>()};
 }
 
-void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
+void TrajectoryMemory::fill(const Unposed& unposed, int step, const Rig& rig, const Map& map) {
   Entry& entry = entry_of(unposed.frame);
   const std::int64_t neighbour =
       std::int64_t{unposed.frame.value} - std::int64_t{first_.value} + step;
@@ -123,9 +128,12 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Map& map) {
   // The motion between the two frames beyond goes on.
   const auto beyond = rig_from_world(neighbour + step, keyframe.submap, map);
   const Rigid3 guess = beyond ? near * beyond->inverse() * near : near;
-  const auto seen = refiner_.find(map, living, *unposed.features, guess);
-  const auto found = refiner_.refine(map, seen, guess);
+  const auto seen = refiner_.find(rig, map, living, *unposed.features, guess);
+  const auto found = refiner_.refine(rig, map, seen, guess);
   if (!found) return;
+  const auto alike = locator_.find_alike(*unposed.features, keyframe);
+  const double part = part_in_place(*unposed.features, map, alike, *found);
+  if (part < PoseCheck::kMinPartInPlace) return;
   entry.state = FrameState::kFilled;
   entry.set_pose({living, keyframe.applied_scale, *found * keyframe.rig_from_world.inverse()});
 }

@@ -10,7 +10,7 @@
 #include <vector>
 
 #include "waymark/track/pose_refiner.h"
-#include "waymark/track/tracker.h"
+#include "waymark/track/tracking_result.h"
 
 namespace waymark {
 
@@ -44,14 +44,7 @@ class TrajectoryMemory {
   };
 
   /// first: the id of the first frame; those of the others follow.
-  explicit TrajectoryMemory(std::shared_ptr<const Rig> rig, FrameId first = FrameId{0})
-      : first_(first), newest_sent_(first), rig_(rig), refiner_(rig) {}
-
-  /// From now on the frames are of the same cameras calibrated otherwise.
-  void look_with(std::shared_ptr<const Rig> rig) {
-    rig_ = rig;
-    refiner_ = PoseRefiner(std::move(rig));
-  }
+  explicit TrajectoryMemory(FrameId first = FrameId{0}) : first_(first), newest_sent_(first) {}
 
   FrameId first() const { return first_; }
   /// The id of the frame after those added so far.
@@ -60,10 +53,10 @@ class TrajectoryMemory {
   }
 
   /// Adds the next frame; map is the one it was tracked in.
-  void add(const Frame& frame, const TrackOutcome& outcome, const Map& map);
+  void add(const Frame& frame, const TrackingResult& result, const Map& map);
   /// Finds the poses of all unsettled frames again in the final map, and from there those of the
-  /// frames before and after them that had none.
-  void settle(const Map& map);
+  /// frames before and after them that had none. rig: as calibrated by now.
+  void settle(const Rig& rig, const Map& map);
 
   /// How the rig moved in a frame, without what it saw, by the poses of the frames before and after
   /// it; nothing where neither has one.
@@ -71,6 +64,8 @@ class TrajectoryMemory {
 
   /// In the order of the frames.
   const std::deque<Entry>& entries() const { return entries_; }
+  /// Frames that were found again after a loss.
+  int num_relocalizations() const { return num_relocalizations_; }
 
  private:
   /// What a frame without a keyframe's place in the map saw.
@@ -89,19 +84,20 @@ class TrajectoryMemory {
   };
 
   Entry& entry_of(FrameId frame) { return entries_.at(frame.value - first_.value); }
-  void settle(const Unsettled& unsettled, const Map& map);
+  void settle(const Unsettled& unsettled, const Rig& rig, const Map& map);
   /// Looks for a frame near its neighbour, one step (1 or -1 frames) away.
-  void fill(const Unposed& unposed, int step, const Map& map);
+  void fill(const Unposed& unposed, int step, const Rig& rig, const Map& map);
   /// index: of an entry.
   std::optional<Rigid3> rig_from_world(std::int64_t index, SubmapId submap, const Map& map) const;
 
   const FrameId first_;
-  FrameId newest_sent_;        ///< To the map.
+  FrameId newest_sent_;  ///< To the map.
+  int num_relocalizations_ = 0;
   std::deque<Entry> entries_;  ///< Grows without copies of its own.
   std::deque<Unsettled> unsettled_;
   std::deque<Unposed> unposed_;
-  std::shared_ptr<const Rig> rig_;
   PoseRefiner refiner_;
+  FrameLocator locator_;
 };
 
 }  // namespace waymark

@@ -9,6 +9,8 @@
 #include <cctype>
 #include <random>
 
+#include "waymark/base/text.h"
+
 namespace waymark {
 namespace {
 
@@ -28,10 +30,13 @@ bool is_equal_name(std::string_view a, std::string_view b) {
   });
 }
 
-/// The host of HOST[:PORT], in brackets where it has them.
+/// The host of HOST[:PORT], in brackets where it has them; nothing for what is neither.
 std::string_view without_port(std::string_view host) {
-  if (host.starts_with('[')) return host.substr(0, host.find(']') + 1);
-  return host.substr(0, host.find(':'));
+  const std::size_t end =
+      host.starts_with('[') ? host.find(']') + 1 : std::min(host.find(':'), host.size());
+  const std::string_view rest = host.substr(end);
+  const bool is_port = rest.starts_with(':') && std::ranges::all_of(rest.substr(1), is_digit);
+  return rest.empty() || is_port ? host.substr(0, end) : std::string_view();
 }
 
 }  // namespace

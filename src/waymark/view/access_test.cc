@@ -23,7 +23,9 @@ TEST(Access, LoopbackNeedsItsOwnName) {
   EXPECT_TRUE(is_session_allowed(rules, "/ws", "[::1]:8080", ""));
   EXPECT_FALSE(is_session_allowed(rules, "/ws", "evil.example:8080", "http://evil.example:8080"));
   EXPECT_FALSE(is_session_allowed(rules, "/ws", "127.0.0.1.evil.example", ""));
-  EXPECT_FALSE(is_session_allowed(rules, "/ws", "", ""));
+  for (const char* host : {"", "[::1].evil.example", "[::1]evil", "[::1", "[::1]:80.evil", ":80"}) {
+    EXPECT_FALSE(is_session_allowed(rules, "/ws", host, "")) << host;
+  }
 }
 
 TEST(Access, ForeignOriginsAreRefused) {

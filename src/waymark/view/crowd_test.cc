@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "waymark/view/test_client.h"
+#include "waymark/view/testing/client.h"
 #include "waymark/view/viewer.h"
 
 // The server where more come than it has places for.

@@ -11,6 +11,8 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/image/opencv_image.h"
+
 namespace waymark {
 namespace {
 
@@ -21,10 +23,12 @@ constexpr int kMaxRequestsPerSecond = 50;
 
 /// Makes one update of two.
 void merge(ViewUpdate later, ViewUpdate& update) {
+  if (!later.info) later.info = std::move(update.info);
   if (later.is_reset) {
     update = std::move(later);
     return;
   }
+  update.info = std::move(later.info);
   if (later.map) update.map = std::move(later.map);
   std::move(later.frames.begin(), later.frames.end(), std::back_inserter(update.frames));
   std::move(later.colors.begin(), later.colors.end(), std::back_inserter(update.colors));
@@ -110,6 +114,7 @@ bool ViewHub::take_updates() {
   while (std::optional<ViewUpdate> later = channel_.updates.try_pop()) {
     merge(*std::move(later), *update);
   }
+  if (update->info) greet(*std::move(update->info));
   status_ = update->status;
   const std::vector<Message> messages = scene_.advance(*update, !clients_.empty());
   snapshot_.clear();
@@ -128,6 +133,12 @@ bool ViewHub::take_updates() {
     is_frame_new_ = true;
   }
   return true;
+}
+
+void ViewHub::greet(SessionInfo info) {
+  info_ = std::move(info);
+  hello_ = text(format_hello(info_));
+  for (const auto& [number, client] : clients_) client->outbox.add_answer(hello_);
 }
 
 void ViewHub::take_replies() {
@@ -257,6 +268,9 @@ Message ViewHub::pass_on(ViewRequest request) {
     return text(format_reply(request.number, "no file was named, expected waymark view MAP -o"));
   }
   if (!info_.is_live && !is_scale) return text(format_reply(request.number, "this is a saved map"));
+  if (!status_.doing.empty() && request.kind != ViewRequest::Kind::kStop) {
+    return text(format_reply(request.number, "there is no session yet: " + status_.doing));
+  }
   if (is_save && !info_.can_save) {
     return text(format_reply(request.number, "no file was named, expected --map-out"));
   }
@@ -279,8 +293,7 @@ void ViewHub::close_clients() {
 
 std::string encode_preview(const Image& image) {
   if (image.view().is_empty()) return {};
-  const cv::Mat whole(
-      image.height_px, image.width_px, CV_8U, const_cast<std::uint8_t*>(image.values.data()));
+  const cv::Mat whole = mat_of(image.view());
   cv::Mat small = whole;
   if (image.width_px > kMaxWidth) {
     const double scale = static_cast<double>(kMaxWidth) / image.width_px;

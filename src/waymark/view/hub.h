@@ -127,6 +127,8 @@ class ViewHub {
   }
   /// True if something came.
   bool take_updates();
+  /// Tells all clients who it is that they look at.
+  void greet(SessionInfo info);
   void take_replies();
   void send_snapshots();
   void send_frames(Clock::time_point now);
@@ -140,8 +142,8 @@ class ViewHub {
   void send_image(const ViewRequest& request, const SharedJpeg& jpeg);
 
   ViewChannel& channel_;
-  const SessionInfo info_;
-  const Message hello_;
+  SessionInfo info_;
+  Message hello_;
   Scene scene_;
   SessionStatus status_;
   std::map<std::uint64_t, std::shared_ptr<ViewClient>> clients_;

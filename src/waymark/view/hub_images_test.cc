@@ -6,8 +6,8 @@
 
 #include "waymark/map/testing/random_map.h"
 #include "waymark/view/hub.h"
-#include "waymark/view/test_hub_clients.h"
-#include "waymark/view/test_messages.h"
+#include "waymark/view/testing/hub_clients.h"
+#include "waymark/view/testing/messages.h"
 
 namespace waymark {
 namespace {

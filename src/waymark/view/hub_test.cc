@@ -7,8 +7,8 @@
 #include <nlohmann/json.hpp>
 
 #include "waymark/map/testing/random_map.h"
-#include "waymark/view/test_hub_clients.h"
-#include "waymark/view/test_messages.h"
+#include "waymark/view/testing/hub_clients.h"
+#include "waymark/view/testing/messages.h"
 
 namespace waymark {
 namespace {
@@ -109,6 +109,31 @@ TEST_F(Hub, GreetsAndThenTellsTheStatusWhenItChanges) {
   EXPECT_EQ(status["frames"], 17);
   EXPECT_EQ(status["clients"], 1);
   EXPECT_EQ(json::parse(hub_.status()), status);
+}
+
+/// While the input is opened and its calibration found: what is done, and who may be asked for
+/// what.
+TEST_F(Hub, TellsWhatIsDoneBeforeThereIsASession) {
+  const auto [number, reader] = join_as();
+  ViewUpdate before;
+  before.status.doing = "calibration: round 1";
+  push(std::move(before));
+  tick();
+  EXPECT_EQ(reader->of_type("status").back()["doing"], "calibration: round 1");
+  const json refused = ask(number, *reader, R"({"request": 1, "do": "pause"})");
+  EXPECT_EQ(refused["error"], "there is no session yet: calibration: round 1");
+  EXPECT_EQ(ask(number, *reader, R"({"request": 2, "do": "stop"})")["ok"], true);
+  ViewUpdate begun, reset;
+  begun.info.emplace(info_).setup = "stereo";
+  reset.is_reset = true;  // What was told of the session stays.
+  push(std::move(begun));
+  push(std::move(reset));
+  tick();
+  EXPECT_EQ(reader->of_type("status").back()["doing"], "");
+  ASSERT_EQ(reader->of_type("hello").size(), 2u);
+  EXPECT_EQ(reader->of_type("hello").back()["setup"], "stereo");
+  EXPECT_EQ(join()->of_type("hello").front()["setup"], "stereo");
+  EXPECT_EQ(ask(number, *reader, R"({"request": 3, "do": "pause"})")["ok"], true);
 }
 
 TEST_F(Hub, TellsTheStatusOnceASecondWhereNothingHappens) {

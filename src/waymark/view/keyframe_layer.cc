@@ -181,7 +181,7 @@ void KeyframeLayer::snapshot(const Map& map,
 }
 
 std::uint16_t KeyframeLayer::rig_of(const Keyframe& keyframe) const {
-  const auto found = std::find(rigs_.begin(), rigs_.end(), keyframe.rig);
+  const auto found = std::find(rigs_.begin(), rigs_.end(), keyframe.features->rig);
   return saturate16(static_cast<std::size_t>(found - rigs_.begin()));
 }
 
@@ -190,7 +190,7 @@ bool KeyframeLayer::learn_rigs(const Map& before, const Map& after) {
   after.keyframes().for_each_difference(before.keyframes(),
                                         [&](KeyframeId, const Keyframe* old, const Keyframe* now) {
                                           if (old || !now || rig_of(*now) < rigs_.size()) return;
-                                          rigs_.push_back(now->rig);
+                                          rigs_.push_back(now->features->rig);
                                         });
   return rigs_.size() > num_before;
 }

@@ -54,7 +54,7 @@ json array_of(const std::vector<CalibrationEstimate>& calibration) {
 /// Distance of a feature from where its landmark should be seen.
 double error_px(const Keyframe& keyframe, std::uint32_t feature, const Landmark& landmark) {
   const Features& features = *keyframe.features;
-  const RigCamera& camera = keyframe.rig->cameras.at(features.keypoints[feature].camera);
+  const RigCamera& camera = keyframe.rig().cameras.at(features.keypoints[feature].camera);
   const Eigen::Vector3d point =
       camera.cam_from_rig * (keyframe.rig_from_world * landmark.position_in_world);
   const Eigen::Vector3f difference = point.normalized().cast<float>() - features.bearings[feature];
@@ -225,6 +225,7 @@ std::string format_status(const SessionStatus& status, const Map& map, std::size
   return dump(
       {{"type", "status"},
        {"phase", kPhases.at(static_cast<std::size_t>(status.phase))},
+       {"doing", status.doing},
        {"is_mapping", status.is_mapping},
        {"frame", status.frame ? json(status.frame->value) : json(nullptr)},
        {"time_s", rounded(status.time_s)},
@@ -288,7 +289,7 @@ std::string format_keyframe(const Map& map, KeyframeId id, std::uint64_t number)
                {"rotation", {rotation[0], rotation[1], rotation[2], rotation[3]}},
                {"parent", id_or_null(keyframe->parent)},
                {"features", keyframe->features->num_primary},
-               {"camera", describe_camera(*keyframe->rig)},
+               {"camera", describe_camera(keyframe->rig())},
                {"covisible", covisible},
                {"landmarks", landmarks}});
 }
@@ -298,7 +299,7 @@ Message encode_keyframe_image(const Keyframe& keyframe,
                               std::uint64_t number,
                               std::string_view jpeg) {
   const Features& features = *keyframe.features;
-  const Camera& camera = *keyframe.rig->cameras.at(0).camera;
+  const Camera& camera = *keyframe.rig().cameras.at(0).camera;
   const auto num_features = static_cast<std::uint32_t>(features.num_primary);
   MessageWriter writer(MessageKind::kKeyframeImage, num_features);
   writer.add(static_cast<std::uint32_t>(number));

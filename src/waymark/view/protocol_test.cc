@@ -9,7 +9,7 @@
 
 #include "waymark/view/hub.h"
 #include "waymark/view/message.h"
-#include "waymark/view/test_messages.h"
+#include "waymark/view/testing/messages.h"
 
 namespace waymark {
 namespace {
@@ -77,8 +77,8 @@ TEST(Protocol, AnImageOfAKeyframeIsWhatTheDocumentSays) {
   camera.intrinsics = {300.0, 300.0, 320.0, 240.0};
   camera.width_px = 640;
   camera.height_px = 480;
+  features->rig = std::make_shared<const Rig>(make_rig(chain));
   Keyframe keyframe;
-  keyframe.rig = std::make_shared<const Rig>(make_rig(chain));
   keyframe.features = features;
   keyframe.landmarks = {LandmarkId{3}};
   EXPECT_EQ(*encode_keyframe_image(keyframe, KeyframeId{2}, 6, "\xff\xd8\xff\xd9"),

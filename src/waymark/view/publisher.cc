@@ -40,12 +40,12 @@ Image drawn_image(const System& system, const FrameImages& input) {
   return image;
 }
 
-FeatureColors colors_of(const FrameDetails& details, const ImageView& image) {
+FeatureColors colors_of(const TrackingResult& result, const ImageView& image) {
   FeatureColors colors;
-  colors.frame = details.frame;
-  colors.rgb.reserve(details.features->num_primary);
-  for (std::size_t i = 0; i < details.features->num_primary; ++i) {
-    const Keypoint& keypoint = details.features->keypoints[i];
+  colors.frame = result.frame_in_map;
+  colors.rgb.reserve(result.features->num_primary);
+  for (std::size_t i = 0; i < result.features->num_primary; ++i) {
+    const Keypoint& keypoint = result.features->keypoints[i];
     const int x = std::clamp(static_cast<int>(keypoint.x_px + 0.5f), 0, image.width_px - 1);
     const int y = std::clamp(static_cast<int>(keypoint.y_px + 0.5f), 0, image.height_px - 1);
     const std::uint8_t grey = image.at(x, y);
@@ -56,8 +56,11 @@ FeatureColors colors_of(const FrameDetails& details, const ImageView& image) {
 
 }  // namespace
 
-ViewPublisher::ViewPublisher(ViewChannel& channel, std::optional<std::size_t> num_frames_total)
+ViewPublisher::ViewPublisher(ViewChannel& channel,
+                             std::optional<std::size_t> num_frames_total,
+                             std::optional<SessionInfo> info)
     : channel_(channel) {
+  update_.info = std::move(info);
   update_.status.num_frames_total = num_frames_total;
   push();
 }
@@ -65,26 +68,25 @@ ViewPublisher::ViewPublisher(ViewChannel& channel, std::optional<std::size_t> nu
 void ViewPublisher::tell(const System& system,
                          const FrameImages& input,
                          const TrackingResult& result) {
-  const FrameDetails& details = system.details();
   SessionStatus& status = update_.status;
   if (status.phase == SessionPhase::kStarting) status.phase = SessionPhase::kRunning;
-  if (timestamps_ns_.empty()) first_frame_ = details.frame;
+  if (timestamps_ns_.empty()) first_frame_ = result.frame_in_map;
   timestamps_ns_.push_back(input.timestamp_ns);
-  status.frame = details.frame;
+  status.frame = result.frame_in_map;
   status.time_s = 1e-9 * static_cast<double>(input.timestamp_ns - timestamps_ns_.front());
   measure(result);
   count(result);
   update_.map = system.map();
   note_calibration(system);
   note_frames(system, input, result);
-  update_.colors.push_back(colors_of(details, input.image0));
+  update_.colors.push_back(colors_of(result, input.image0));
   if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
-    update_.image = std::make_shared<const DrawnFrame>(DrawnFrame{details.frame,
+    update_.image = std::make_shared<const DrawnFrame>(DrawnFrame{result.frame_in_map,
                                                                   input.timestamp_ns,
                                                                   input.image0.width_px,
                                                                   input.image0.height_px,
-                                                                  details.features,
-                                                                  details.landmarks,
+                                                                  result.features,
+                                                                  result.landmarks,
                                                                   drawn_image(system, input)});
   }
   push();
@@ -93,20 +95,19 @@ void ViewPublisher::tell(const System& system,
 void ViewPublisher::note_frames(const System& system,
                                 const FrameImages& input,
                                 const TrackingResult& result) {
-  const FrameDetails& details = system.details();
   update_.frames.push_back({result,
-                            details.frame,
+                            result.frame_in_map,
                             input.timestamp_ns,
                             static_cast<float>(result.stages.tracking_ms()),
-                            result.world_from_rig ? std::optional(details.pose) : std::nullopt});
-  for (const FilledPose& filled : details.filled) {
+                            result.world_from_rig ? std::optional(result.pose) : std::nullopt});
+  for (const FilledPose& filled : result.filled) {
     update_.frames.push_back({{.state = FrameState::kFilled},
                               filled.frame,
                               timestamps_ns_.at(filled.frame.value - first_frame_.value),
                               0.0f,
                               filled.pose});
   }
-  update_.status.num_tracked += details.filled.size();
+  update_.status.num_tracked += result.filled.size();
 }
 
 /// Every estimate of the calibration is another rig.
@@ -162,8 +163,10 @@ void ViewPublisher::set_mapping(bool is_on) {
 
 void ViewPublisher::reset() {
   const std::optional<std::size_t> total = update_.status.num_frames_total;
+  std::optional<SessionInfo> info = std::move(update_.info);
   update_ = ViewUpdate();
   update_.is_reset = true;
+  update_.info = std::move(info);
   update_.map = std::make_shared<const Map>();
   update_.status.num_frames_total = total;
   timestamps_ns_.clear();

@@ -7,6 +7,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include "waymark/system/system.h"
 #include "waymark/view/viewer.h"
@@ -17,11 +18,16 @@ namespace waymark {
 /// pointers, the notes of the frame and, ten times per second at most, a copy of the image.
 class ViewPublisher {
  public:
-  /// num_frames_total: of the input, if it is known.
-  ViewPublisher(ViewChannel& channel, std::optional<std::size_t> num_frames_total);
+  /// num_frames_total: of the input, if it is known. info: where the viewer knew less when it
+  /// began.
+  ViewPublisher(ViewChannel& channel,
+                std::optional<std::size_t> num_frames_total,
+                std::optional<SessionInfo> info = std::nullopt);
   /// To a viewer, which lives longer.
-  ViewPublisher(Viewer& viewer, std::optional<std::size_t> num_frames_total)
-      : ViewPublisher(viewer.channel(), num_frames_total) {}
+  ViewPublisher(Viewer& viewer,
+                std::optional<std::size_t> num_frames_total,
+                std::optional<SessionInfo> info = std::nullopt)
+      : ViewPublisher(viewer.channel(), num_frames_total, std::move(info)) {}
 
   /// A frame was fed; input is what was fed.
   void tell(const System& system, const FrameImages& input, const TrackingResult& result);

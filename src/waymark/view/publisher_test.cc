@@ -116,7 +116,7 @@ TEST_F(Publisher, TellsOfEachFrame) {
     EXPECT_EQ(update.frames[0].frame, FrameId{i});
     EXPECT_TRUE(update.frames[0].pose);
     ASSERT_EQ(update.colors.size(), 1u);
-    EXPECT_EQ(update.colors[0].rgb.size(), session_.system().details().features->num_primary);
+    EXPECT_EQ(update.colors[0].rgb.size(), session_.system().result().features->num_primary);
     EXPECT_EQ(update.image, nullptr) << "nobody asked for one";
   }
 }
@@ -129,7 +129,7 @@ TEST_F(Publisher, GivesAnImageWhereOneIsWished) {
   ASSERT_NE(image, nullptr);
   EXPECT_EQ(image->image.width_px, kWidth);
   EXPECT_EQ(image->image.view().at(17, 33), input.image0.at(17, 33));
-  EXPECT_EQ(image->features, session_.system().details().features);
+  EXPECT_EQ(image->features, session_.system().result().features);
   feed(session_.input());
   EXPECT_EQ(listener_.last().image, nullptr);
 }

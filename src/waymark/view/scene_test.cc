@@ -6,7 +6,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/map/testing/random_map.h"
-#include "waymark/view/test_messages.h"
+#include "waymark/view/testing/messages.h"
 
 namespace waymark {
 namespace {

@@ -50,12 +50,26 @@ struct DrawnFrame {
   Image image;                               ///< Empty: no image this time.
 };
 
+/// What a session is; it does not change while there are frames.
+struct SessionInfo {
+  std::string program;    ///< With version.
+  bool is_live = true;    ///< False for a saved map.
+  std::string input;      ///< What is mapped, for people.
+  std::string setup;      ///< "mono", "stereo" or "rgbd"; empty: not known yet.
+  std::string timing;     ///< "inline", "lockstep" or "realtime".
+  bool can_save = false;  ///< Whether there is where to save the map.
+  /// Whether a saved map may be written with other lengths.
+  bool can_scale = false;
+  bool keeps_images = false;  ///< Whether images of keyframes are there to be seen.
+};
+
 /// Where a session is in its course; kMap: there is none, a saved map is shown.
 enum class SessionPhase { kStarting, kRunning, kPaused, kFinishing, kDone, kMap };
 
 /// Numbers of the session, as the status message has them.
 struct SessionStatus {
   SessionPhase phase = SessionPhase::kStarting;  ///< Where the session is in its course.
+  std::string doing;                             ///< What is done before there is one; or empty.
   bool is_mapping = true;                        ///< Whether the map grows.
   std::optional<FrameId> frame;                  ///< The newest.
   double time_s = 0.0;                           ///< Of the newest frame, since the first.
@@ -75,6 +89,7 @@ struct SessionStatus {
 /// What changed in the session since the update before.
 struct ViewUpdate {
   bool is_reset = false;                    ///< Everything before is void.
+  std::optional<SessionInfo> info = {};     ///< Known better than it was before.
   std::shared_ptr<const Map> map;           ///< Null: as before.
   std::vector<FrameNote> frames;            ///< New ones and those that are known better now.
   std::vector<FeatureColors> colors;        ///< Of new frames.
@@ -112,19 +127,6 @@ struct ViewReply {
   std::string error;    ///< Empty if all went well.
   /// The image that was asked for; null where there is none.
   std::shared_ptr<const std::string> jpeg = nullptr;
-};
-
-/// What does not change during a session.
-struct SessionInfo {
-  std::string program;    ///< With version.
-  bool is_live = true;    ///< False for a saved map.
-  std::string input;      ///< What is mapped, for people.
-  std::string setup;      ///< "mono", "stereo" or "rgbd".
-  std::string timing;     ///< "inline", "lockstep" or "realtime".
-  bool can_save = false;  ///< Whether there is where to save the map.
-  /// Whether a saved map may be written with other lengths.
-  bool can_scale = false;
-  bool keeps_images = false;  ///< Whether images of keyframes are there to be seen.
 };
 
 }  // namespace waymark

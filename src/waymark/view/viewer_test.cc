@@ -10,7 +10,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
 #include "waymark/view/assets.h"
-#include "waymark/view/test_client.h"
+#include "waymark/view/testing/client.h"
 
 namespace waymark {
 namespace {

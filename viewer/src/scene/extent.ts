@@ -21,16 +21,10 @@ export class Extent {
   measure(store: Store, parts: Parts, world: Object3D, lowestHeight: number): boolean {
     const { keyframes } = store;
     if (keyframes.count === 0) return false;
-    this.low.setScalar(Infinity);
-    this.high.setScalar(-Infinity);
     let path = 0;
     let links = 0;
     for (let slot = 0; slot < keyframes.slots.end; ++slot) {
       if (!keyframes.isAlive(slot)) continue;
-      this.point.fromArray(keyframes.position, 3 * slot);
-      this.point.add(parts.offset(keyframes.facts[2 * slot + 1]!, this.offset));
-      this.low.min(this.point);
-      this.high.max(this.point);
       const parent = keyframes.slots.find(keyframes.parent[slot]!);
       if (parent < 0) continue;
       path += Math.hypot(
@@ -41,9 +35,25 @@ export class Extent {
       ++links;
     }
     if (links > 0 && path > 0) this.step = path / links;
-    this.radius = Math.max(0.62 * this.low.distanceTo(this.high), 6 * this.step);
-    this.centre.addVectors(this.low, this.high).multiplyScalar(0.5).applyMatrix4(world.matrixWorld);
+    this.radius = this.sphere(store, parts, world, this.centre);
     this.floor = Math.max(lowestHeight, this.centre.y - 2 * this.radius);
     return true;
+  }
+
+  /** The sphere that holds the keyframes of a part of the map, or of all: the radius, and the centre in `centre`. */
+  sphere(store: Store, parts: Parts, world: Object3D, centre: Vector3, part: number | null = null): number {
+    const { keyframes } = store;
+    this.low.setScalar(Infinity);
+    this.high.setScalar(-Infinity);
+    for (let slot = 0; slot < keyframes.slots.end; ++slot) {
+      if (!keyframes.isAlive(slot)) continue;
+      const submap = keyframes.facts[2 * slot + 1]!;
+      if (part !== null && store.rootOf(submap) !== part) continue;
+      this.point.fromArray(keyframes.position, 3 * slot).add(parts.offset(submap, this.offset));
+      this.low.min(this.point);
+      this.high.max(this.point);
+    }
+    centre.addVectors(this.low, this.high).multiplyScalar(0.5).applyMatrix4(world.matrixWorld);
+    return Math.max(0.62 * this.low.distanceTo(this.high), 6 * this.step);
   }
 }

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-import { Color } from "three";
+import { Color, LinearSRGBColorSpace } from "three";
 
 /** Colours of the scene. They are the custom properties of style.css, which know about dark and light. */
 export interface Palette {
@@ -22,14 +22,17 @@ export interface Palette {
 export const NUM_RAMP = 5;
 export const NUM_PARTS = 8;
 
+/**
+ * A colour in whatever form of CSS: the build writes #ffffff as #fff. The shaders write what they are given, without conversion:
+ * colours stay as they are written in the style sheet.
+ */
+export function colourOf(text: string): Color {
+  return new Color().setStyle(text.trim(), LinearSRGBColorSpace);
+}
+
 export function readPalette(): Palette {
   const style = getComputedStyle(document.documentElement);
-  // The shaders write what they are given, without conversion: colours stay as they are written in the style sheet.
-  const colour = (name: string) => {
-    const value = new Color();
-    const digits = parseInt(style.getPropertyValue(`--${name}`).trim().slice(1), 16);
-    return value.setRGB(((digits >> 16) & 255) / 255, ((digits >> 8) & 255) / 255, (digits & 255) / 255);
-  };
+  const colour = (name: string) => colourOf(style.getPropertyValue(`--${name}`));
   const list = (name: string, n: number) => Array.from({ length: n }, (_, i) => colour(`${name}-${i}`));
   return {
     ground: colour("ground"), ink: colour("ink"), grid: colour("grid"), trail: colour("trail"),

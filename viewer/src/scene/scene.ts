@@ -141,6 +141,19 @@ export class Scene {
     this.view.goTo(this.world.localToWorld(this.a), 9 * this.extent.step);
   }
 
+  goToPart(part: number): void {
+    const radius = this.extent.sphere(this.store, this.parts, this.world, this.a, part);
+    if (!Number.isFinite(radius)) return;
+    if (this.view.name === "top") this.view.top(this.a, radius);
+    else this.view.orbit(this.a, radius);
+    this.needsRender = true;
+  }
+
+  /** How a direction of the map lies in the view: x right, y up, z towards who looks. */
+  viewDirection(direction: Vector3): Vector3 {
+    return direction.transformDirection(this.world.matrixWorld).transformDirection(this.view.camera.matrixWorldInverse);
+  }
+
   /** Takes up what changed and draws where needed; `cursor` is the frame to show the camera at. True where it drew. */
   update(now_ms: number, dt_s: number, cursor: number, isLost: boolean): boolean {
     if (!this.renderer) return false;

@@ -46,11 +46,21 @@ export class Choice<T extends string> {
   }
 }
 
+/** With a capital letter. */
+export function sentence(text: string): string {
+  return text.charAt(0).toUpperCase() + text.slice(1);
+}
+
 const numbers = new Intl.NumberFormat("en", { maximumFractionDigits: 0 });
 
 /** 12345 as "12 345", with narrow spaces. */
 export function grouped(value: number): string {
   return numbers.format(value).replaceAll(",", "\u202f");
+}
+
+/** How many of something there are: "1 keyframe", "2 keyframes". */
+export function countOf(count: number, noun: string): string {
+  return `${grouped(count)} ${noun}${count === 1 ? "" : "s"}`;
 }
 
 /** Seconds as "1:02.5" or "1:02:03". */

@@ -4,8 +4,9 @@ import type { Connection } from "../connection";
 import type { Picked } from "../scene/picking";
 import type { Scene } from "../scene/scene";
 import type { KeyframeData, LandmarkData } from "../text_messages";
-import { byId, clock, grouped, make, setIcon } from "./dom";
+import { byId, clock, countOf, grouped, make, setIcon } from "./dom";
 import { KeyframePicture } from "./keyframe_picture";
+import type { Measure } from "./measure";
 import type { Store } from "../store/store";
 
 const MOST_ROWS = 60;
@@ -17,7 +18,9 @@ export class Inspector {
   hasImages = false;
   private readonly host = byId("inspector");
 
-  constructor(private readonly scene: Scene, private readonly store: Store, private readonly connection: Connection) {}
+  constructor(
+    private readonly scene: Scene, private readonly store: Store, private readonly connection: Connection, private readonly measure: Measure,
+  ) {}
 
   async select(picked: Picked | null, goThere = false): Promise<void> {
     this.selected = picked;
@@ -68,7 +71,7 @@ export class Inspector {
       ["Camera", data.camera],
       ["Features", grouped(data.features)],
       ["Landmarks seen", grouped(data.landmarks.length)],
-      ["Position", position(data.position)],
+      ["Position", this.measure.shown(data.submap, data.position, 2)],
     ]);
     const links = data.covisible.slice(0, MOST_ROWS).map(([id, shared]) => make("span", {}, this.link(id), make("small", {}, ` ${shared}`)));
     if (data.parent !== null && data.parent !== 0xffffffff) {
@@ -79,13 +82,13 @@ export class Inspector {
   }
 
   private landmark(data: LandmarkData): Node[] {
-    const found = data.num_visible > 0 ? `${data.num_found} of ${data.num_visible} times` : "";
+    const found = data.num_visible > 0 ? `${data.num_found} of ${countOf(data.num_visible, "time")}` : "";
     const facts = rows([
-      ["Seen by", `${data.observations.length} keyframes`],
+      ["Seen by", countOf(data.observations.length, "keyframe")],
       ["Found in view", found],
       ["Made from", ""],
       ["Part", String(data.submap)],
-      ["Position", position(data.position)],
+      ["Position", this.measure.shown(data.submap, data.position, 2)],
     ]);
     facts.querySelectorAll("dd")[2]!.replaceChildren(this.link(data.reference));
     const head = make("tr", {}, ...["Keyframe", "Pixel", "Error, px"].map((word) => make("th", {}, word)));
@@ -103,8 +106,4 @@ export class Inspector {
 
 function rows(items: [string, string][]): HTMLElement {
   return make("dl", {}, ...items.flatMap(([name, value]) => [make("dt", {}, name), make("dd", { "data-small": value.length > 16 }, value)]));
-}
-
-function position(p: number[]): string {
-  return p.map((value) => value.toFixed(2)).join("  ");
 }

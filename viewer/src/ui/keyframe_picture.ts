@@ -1,7 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 import type { KeyframeImage } from "../protocol";
-import { make, setText } from "./dom";
+import { countOf, make, setText } from "./dom";
 import { drawDots, FEATURE_LOOKS } from "./features";
 
 /** Beyond this a canvas costs more than it shows. */
@@ -39,8 +39,8 @@ export class KeyframePicture {
     const numSeen = drawDots(context, image, (state) => (state & 1) === 1, scale, seen.colour, seen.radius * size);
     const numFree = drawDots(context, image, (state) => (state & 1) === 0, scale, free.colour, free.radius * size);
     const numOnEdges = image.state.reduce((sum, state) => sum + (state >> 1), 0);
-    const onEdges = numOnEdges > 0 ? `; ${numOnEdges} of all lie on edges` : "";
-    setText(this.caption, `${numSeen} features see a landmark, ${numFree} are free${onEdges}`);
+    const onEdges = numOnEdges > 0 ? `; on edges: ${numOnEdges} of all` : "";
+    setText(this.caption, `${countOf(numSeen, "feature")} with a landmark, ${numFree} free${onEdges}`);
     this.element.dataset["shown"] = String(image.keyframe);
   }
 

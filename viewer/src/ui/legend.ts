@@ -3,6 +3,7 @@
 import type { Colouring } from "../scene/landmark_layer";
 import { LAYERS, type LayerName, type Scene } from "../scene/scene";
 import { byId, Choice, grouped, make, setText } from "./dom";
+import type { Measure } from "./measure";
 
 const COLOURING_WORDS: [Colouring, string][] = [
   ["image", "Image"], ["height", "Height"], ["age", "Age"], ["observations", "Views"], ["part", "Part"],
@@ -24,7 +25,7 @@ export class Legend {
   private readonly choice: Choice<Colouring>;
   private readonly markers: HTMLElement;
 
-  constructor(private readonly scene: Scene) {
+  constructor(private readonly scene: Scene, private readonly measure: Measure) {
     this.choice = new Choice(byId("colouring-choice"), COLOURING_WORDS, (value) => this.setColouring(value));
     for (const name of LAYERS) this.addSwitch(name);
     this.markers = byId("layer-list").querySelector<HTMLElement>("[data-layer=markers]")!;
@@ -42,7 +43,7 @@ export class Legend {
   update(): void {
     const { height, observations } = this.scene.landmarks.low_high;
     const ends: Partial<Record<Colouring, [string, string]>> = {
-      height: [height.x.toFixed(1), height.y.toFixed(1)],
+      height: [height.x, height.y].map((value) => this.measure.shown(0, [value], 1)) as [string, string],
       age: ["old", "new"],
       observations: [grouped(2 ** observations.x), grouped(2 ** observations.y)],
     };

@@ -79,12 +79,18 @@ export class Measure {
 
   /** Of a part of the map: that of lengths as they are shown. */
   unitOf(part: number): string {
-    return this.isMetric(part) || this.known.has(part) ? "m" : "units";
+    return this.isMetric(part) || this.known.has(part) ? "m" : "map units";
   }
 
   /** Shown lengths by those of the map. */
   factorOf(part: number): number {
     return this.known.get(part)?.factor ?? 1;
+  }
+
+  /** Of a sub-map: a length, or coordinates, as shown, with its unit. */
+  shown(submap: number, lengths: readonly number[], digits: number, between = "  "): string {
+    const part = this.store.rootOf(submap);
+    return `${lengths.map((length) => (length * this.factorOf(part)).toFixed(digits)).join(between)} ${this.unitOf(part)}`;
   }
 
   /** Follows the map as it moves. */

@@ -3,7 +3,7 @@
 import type { ConnectionState } from "../connection";
 import type { Store } from "../store/store";
 import type { Hello, Status } from "../text_messages";
-import { byId, grouped, setText } from "./dom";
+import { byId, grouped, sentence, setText } from "./dom";
 import { ADVICE, isOver, REASON_WORDS } from "./words";
 
 type Words = { title: string; text: string; isStill?: boolean };
@@ -60,6 +60,7 @@ function loading(store: Store): Words {
 
 function waiting(hello: Hello | null, status: Status | null): Words {
   if (hello?.mode === "map" && status?.phase === "starting") return { title: "Loading the map", text: "The program prepares it to be shown." };
+  if (status?.phase === "starting" && status.doing) return { title: "Before the first image", text: `${sentence(status.doing)}.` };
   if (!status || status.phase === "starting") return { title: "Waiting for the first image", text: "The map grows here as soon as there are images." };
   if (status.phase === "map" || isOver(status)) return { title: "An empty map", text: "It holds neither keyframes nor landmarks.", isStill: true };
   return { title: "Finding a start", text: ADVICE[status.reason] ?? ADVICE["none"]! };

@@ -1,7 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 import type { Hello, Status } from "../text_messages";
-import { byId, grouped, make, setText } from "./dom";
+import { byId, countOf, grouped, make, sentence, setText } from "./dom";
 import { isOver, PHASE_WORDS, REASON_WORDS, STAGE_WORDS, STATE_COLOURS, STATE_WORDS } from "./words";
 
 const STAGE_COLOURS = ["--part-0", "--part-7", "--hairline", "--part-4", "--part-5", "--part-1", "--part-6", "--part-3"];
@@ -108,11 +108,10 @@ export class SessionPanel {
 
 function detailOf(status: Status): string {
   const { phase } = status;
-  if (phase === "starting") return "Waiting for the first image";
+  if (phase === "starting") return sentence(status.doing || "waiting for the first image");
   if (phase === "finishing") return "The last adjustment of the whole map";
   if (phase === "map") return status.submaps === 1 ? "One part" : `${status.submaps} parts`;
   if (phase === "done") return `${grouped(status.tracked)} of ${grouped(status.frames)} frames have a pose`;
-  if (status.state === "tracked") return `${grouped(status.inliers)} landmarks fit, of ${grouped(status.matches)} found`;
-  const reason = REASON_WORDS[status.reason] ?? status.reason;
-  return reason.charAt(0).toUpperCase() + reason.slice(1);
+  if (status.state === "tracked") return `${countOf(status.matches, "landmark")} found, ${grouped(status.inliers)} fit`;
+  return sentence(REASON_WORDS[status.reason] ?? status.reason);
 }

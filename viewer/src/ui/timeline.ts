@@ -3,6 +3,7 @@
 import type { Store } from "../store/store";
 import type { Hello } from "../text_messages";
 import { byId, clock, make, setIcon, setText } from "./dom";
+import type { Measure } from "./measure";
 import { REASON_WORDS, STATE_COLOURS, STATE_WORDS } from "./words";
 
 const SPEEDS = [1, 4, 16];
@@ -36,7 +37,7 @@ export class Timeline {
   private worst = new Uint8Array(0);
   private isLive = true;
 
-  constructor(private readonly store: Store, private readonly whenMoved: () => void) {
+  constructor(private readonly store: Store, private readonly measure: Measure, private readonly whenMoved: () => void) {
     byId("clock").append(this.time, this.now);
     setIcon(this.play, "play");
     this.play.addEventListener("click", () => this.togglePlay());
@@ -104,7 +105,7 @@ export class Timeline {
     const ratio = Math.min(2, window.devicePixelRatio);
     const width = Math.round(canvas.clientWidth * ratio);
     const height = Math.round(canvas.clientHeight * ratio);
-    const view = `${this.cursor} ${width} ${height}`;
+    const view = `${this.cursor} ${width} ${height} ${this.measure.factorOf(0)}`;
     const isSame = view === this.drawnView && store.trajectory.version === this.drawnVersion;
     const isEarly = view === this.drawnView && performance.now() - this.drawnAt_ms < REDRAW_MS;
     if ((isSame || isEarly) && !force) return;
@@ -184,7 +185,7 @@ export class Timeline {
     }
     context.fillStyle = style.getPropertyValue("--muted");
     context.font = `11px ${getComputedStyle(document.body).fontFamily}`;
-    context.fillText(this.isLive ? `Tracking, up to ${top.toFixed(0)} ms` : "Height of the way", 0, 10);
+    context.fillText(this.isLive ? `Tracking, up to ${top.toFixed(0)} ms` : `Height of the way, ${this.measure.shown(0, [low, top], 1, " to ")}`, 0, 10);
   }
 
   private drawAxis(width: number, height: number): void {

@@ -84,8 +84,9 @@ class RandomMap {
     features.partner.push_back(kNoFeature);
   }
 
-  std::shared_ptr<const Features> random_features(const Rig& rig) {
+  std::shared_ptr<const Features> random_features(std::shared_ptr<const Rig> rig) {
     auto features = std::make_shared<Features>();
+    features->rig = rig;
     features->num_primary = num_primary_;
     features->num_edges = num_primary_ / 5;
     for (std::uint32_t i = 0; i < num_primary_; ++i) {
@@ -94,7 +95,7 @@ class RandomMap {
       features->range_m.push_back(rng_.below(2) ? real(-9, 9) : 0.0f);
       features->inverse_range_sigma.push_back(features->range_m.back() != 0.0f ? 0.01f : 0.0f);
     }
-    for (std::uint32_t i = 0; rig.cameras.size() > 1 && i < num_primary_; i += 3) {
+    for (std::uint32_t i = 0; rig->cameras.size() > 1 && i < num_primary_; i += 3) {
       append_feature(*features, 1);
       features->partner[i] = static_cast<std::uint32_t>(features->size() - 1);
       features->partner.back() = i;
@@ -112,8 +113,8 @@ class RandomMap {
     keyframe.submap = submap;
     keyframe.parent = parent;
     keyframe.rig_from_world = random_pose();
-    keyframe.rig = rigs_[rng_.below(static_cast<std::uint32_t>(rigs_.size()))];
-    keyframe.features = random_features(*keyframe.rig);
+    keyframe.features =
+        random_features(rigs_[rng_.below(static_cast<std::uint32_t>(rigs_.size()))]);
     return map_.add_keyframe(std::move(keyframe));
   }
 

@@ -276,20 +276,21 @@ void add_measured_range(const std::vector<Sight>& sights,
 }  // namespace
 
 PointObservation observe(const PointCloud& cloud,
-                         const Rig& rig,
+                         const std::shared_ptr<const Rig>& rig,
                          const Rigid3& world_from_rig,
                          const PointNoise& noise,
                          std::uint64_t frame) {
-  WAYMARK_CHECK(!rig.cameras.empty() && !cloud.landmarks.empty());
+  WAYMARK_CHECK(!rig->cameras.empty() && !cloud.landmarks.empty());
   WAYMARK_CHECK(noise.outlier_share >= 0.0 && noise.outlier_share < 1.0);
   Rng rng(noise.seed, frame);
-  const Camera& camera = *rig.cameras[0].camera;
-  Eye eye(cloud, camera, rig.cameras[0].cam_from_rig * world_from_rig.inverse());
+  const Camera& camera = *rig->cameras[0].camera;
+  Eye eye(cloud, camera, rig->cameras[0].cam_from_rig * world_from_rig.inverse());
   std::vector<Sight> sights = primary_sights(cloud, eye, camera, noise, rng);
   keep_valid(camera, sights);
 
   PointObservation result;
   auto features = std::make_shared<Features>();
+  features->rig = rig;
   features->num_primary = sights.size();
   append(camera, 0, sights, *features);
   for (const Sight& sight : sights) {
@@ -300,8 +301,8 @@ PointObservation observe(const PointCloud& cloud,
   features->partner.assign(sights.size(), kNoFeature);
   features->range_m.assign(sights.size(), 0.0f);
   features->inverse_range_sigma.assign(sights.size(), 0.0f);
-  if (rig.cameras.size() > 1) {
-    add_stereo(cloud, rig, world_from_rig, noise, rng, result, *features);
+  if (rig->cameras.size() > 1) {
+    add_stereo(cloud, *rig, world_from_rig, noise, rng, result, *features);
   } else if (noise.inverse_range_sigma > 0.0) {
     add_measured_range(sights, noise.inverse_range_sigma, rng, *features);
   }

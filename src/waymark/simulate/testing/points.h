@@ -68,7 +68,7 @@ struct PointObservation {
 /// landmarks that both see get a partner in camera 1 and a range. The result depends on (seed,
 /// frame), never on earlier calls.
 PointObservation observe(const PointCloud& cloud,
-                         const Rig& rig,
+                         const std::shared_ptr<const Rig>& rig,
                          const Rigid3& world_from_rig,
                          const PointNoise& noise,
                          std::uint64_t frame);

@@ -85,7 +85,6 @@ class TownMapMaker {
     keyframe.frame = FrameId{id.value};
     keyframe.timestamp_ns = kFramePeriodNs * id.value;
     keyframe.submap = SubmapId{static_cast<std::uint32_t>(parts_.submaps.size() - 1)};
-    keyframe.rig = result_.rig;
     keyframe.features = frame.features;
     keyframe.rig_from_world = estimate(frame.world_from_rig, id).inverse();
     result_.world_from_rig.push_back(frame.world_from_rig);

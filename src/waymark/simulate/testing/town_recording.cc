@@ -272,6 +272,7 @@ TownFrame TownRecording::frame(std::uint32_t index) const {
   TownFrame frame;
   frame.world_from_rig = stand.world_from_rig;
   auto features = std::make_shared<Features>();
+  features->rig = rig_;
   features->num_primary = seen.size();
   features->partner.assign(seen.size(), kNoFeature);
   features->range_m.assign(seen.size(), 0.0f);

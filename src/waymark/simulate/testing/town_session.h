@@ -13,7 +13,7 @@
 
 #include "waymark/loop/global_mapper.h"
 #include "waymark/simulate/testing/town_recording.h"
-#include "waymark/track/tracker.h"
+#include "waymark/track/testing/tracked.h"
 
 namespace waymark {
 
@@ -32,7 +32,7 @@ class TownSession {
 
   /// first_ns: timestamp of the first frame; one comes every kFramePeriodNs.
   TownSession(std::shared_ptr<const Rig> rig, bool has_range, std::int64_t first_ns = 0)
-      : tracker_(rig, has_range, TrackingSettings{}, 1),
+      : tracker_(has_range, TrackingSettings{}, 1),
         mapper_(rig, MappingSettings{}, LoopSettings{}, {.refine = "off"}, 1),
         visible_(mapper_.snapshot()),
         first_ns_(first_ns) {}
@@ -47,14 +47,13 @@ class TownSession {
     });
   }
 
-  TrackOutcome track(const TownFrame& seen) {
-    StageTimes times;
+  Tracked track(const TownFrame& seen) {
     const std::int64_t timestamp_ns = first_ns_ + kFramePeriodNs * num_frames_;
     const Frame frame{FrameId{num_frames_}, timestamp_ns, seen.features};
     ++num_frames_;
-    TrackOutcome outcome;
+    Tracked outcome;
     times_ = {};
-    add_time(times_.track_s, [&] { outcome = tracker_.track(frame, visible_, times); });
+    add_time(times_.track_s, [&] { outcome.message = tracker_.track(frame, visible_, outcome); });
     if (!outcome.message) return outcome;
     add_time(times_.map_s, [&] {
       std::visit([&](const auto& message) { mapper_.add(message); }, *outcome.message);

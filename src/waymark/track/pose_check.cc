@@ -1,0 +1,74 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/track/pose_check.h"
+
+#include <algorithm>
+
+#include "waymark/track/last_frame.h"
+#include "waymark/track/local_map.h"
+
+namespace waymark {
+namespace {
+
+/// Of 1465 predictions in recordings of 10 to 30 frames per second one was off by more than 0.08
+/// (docs/decisions/track.md).
+constexpr double kMaxSurprise = 0.1;
+/// Poses nearer to each other are the same.
+constexpr double kMaxSameDistance = 0.03;
+/// Of the feature's level: what poses and landmarks that are right may be off by.
+constexpr float kMaxErrorPx = 8.0f;
+
+}  // namespace
+
+double distance_from(const Rigid3& other, const Map& map, const LocatedFrame& located) {
+  const Rigid3& found = located.rig_from_world;
+  const double way = (found.origin_in_source() - other.origin_in_source()).norm();
+  return found.rotation.angularDistance(other.rotation) +
+         way * median_inverse_range(map, found, located.landmarks);
+}
+
+double part_in_place(const Features& features,
+                     const Map& map,
+                     std::span<const LandmarkId> alike,
+                     const Rigid3& rig_from_world) {
+  const int num_alike = num_valid(alike);
+  if (num_alike == 0) return 1.0;
+  const Rigid3 cam_from_world = features.rig->cameras[0].cam_from_rig * rig_from_world;
+  int num_in_place = 0;
+  for (std::uint32_t i = 0; i < alike.size(); ++i) {
+    if (!alike[i].is_valid()) continue;
+    const Eigen::Vector3d point = cam_from_world * map.landmarks().at(alike[i]).position_in_world;
+    const Measurement measured = features.measurement(i);
+    const Eigen::Vector3f off = point.normalized().cast<float>() - measured.bearing;
+    num_in_place += (measured.level_pixel_from_bearing * off).norm() < kMaxErrorPx;
+  }
+  return static_cast<double>(num_in_place) / num_alike;
+}
+
+void PoseCheck::begin(const std::optional<Rigid3>& predicted) {
+  predicted_ = predicted;
+  rejected_.clear();
+  refusal_.reset();
+}
+
+bool PoseCheck::is_verified(const Features& features,
+                            const Map& map,
+                            const LocatedFrame& located,
+                            FrameLocator& locator) {
+  if (predicted_ && distance_from(*predicted_, map, located) < kMaxSurprise) return true;
+  const auto is_same = [&](const Rigid3& other) {
+    return distance_from(other, map, located) < kMaxSameDistance;
+  };
+  if (std::ranges::any_of(rejected_, is_same)) return true;
+  const Keyframe& beside = map.keyframes().at(main_observer(map, located.landmarks));
+  const std::vector<LandmarkId> alike = locator.find_alike(features, beside);
+  const double part = part_in_place(features, map, alike, located.rig_from_world);
+  if (part >= kMinPartInPlace) return true;
+  rejected_.push_back(located.rig_from_world);
+  refusal_ = {.reason = FrameReason::kNotVerified,
+              .num_matches = located.num_matches,
+              .num_inliers = located.num_inliers};
+  return false;
+}
+
+}  // namespace waymark
