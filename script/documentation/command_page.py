@@ -39,7 +39,7 @@ def commands(program, command=()):
             section = line
         elif section == "Subcommands:" and re.match(r"^  \w", line):
             below.append(line.split()[0])
-        elif section == "Options:" and OPTION.match(line):
+        elif section.endswith(":") and OPTION.match(line):  # Options stand in groups of their own names.
             names.add(OPTION.match(line)[1])
         elif section == "Positionals:" and POSITIONAL.match(line):
             names.add(POSITIONAL.match(line)[1])
