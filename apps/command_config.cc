@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "commands.h"
+#include "python_tool.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
@@ -28,7 +29,7 @@ int print_settings(bool is_markdown) {
 
 int check_settings(const std::vector<std::filesystem::path>& files) {
   std::vector<std::string> notes;
-  const std::vector<ConfigSource> sources = read_config_files(files, notes);
+  const std::vector<ConfigSource> sources = read_config_files(files, notes, read_settings_by_tool);
   for (const std::string& note : notes) print_result("note: {}\n", note);
   const ConfigNode config = merge_configs(sources);
   Settings settings;
@@ -45,7 +46,7 @@ int check_settings(const std::vector<std::filesystem::path>& files) {
 using CalibrationReader = CameraChain (*)(const ConfigSource& source);
 
 CameraChain read_any(const ConfigSource& source) {
-  if (auto chain = read_foreign_cameras(source)) return *std::move(chain);
+  if (auto chain = read_foreign_cameras(source, read_settings_by_tool)) return *std::move(chain);
   throw InputError(source.name,
                    "is no calibration of another program that is known, expected one of those in "
                    "docs/calibration.md");
@@ -80,7 +81,7 @@ void add_config_command(CLI::App& program, Command& command) {
                                  {"ros", read_ros_calibration},
                                  {"colmap", read_colmap_calibration},
                                  {"nerfstudio", read_nerfstudio_calibration},
-                                 {"orbslam", read_slam_settings},
+                                 {"orbslam", read_settings_by_tool},
                                  {"any", read_any}},
                                 "FILE is a calibration of opencv, ros (or two, of a pair), colmap, "
                                 "nerfstudio, orbslam, or of any program that is known: print a "

@@ -17,6 +17,7 @@
 #include "commands.h"
 #include "numbers.h"
 #include "paths.h"
+#include "python_tool.h"
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
@@ -125,6 +126,7 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
 }
 
 void add_input_options(CLI::App& command, SessionOptions& options) {
+  options.read_slam_settings = read_settings_by_tool;
   add_reading_options(command, options.input, options.reading);
   command.option_defaults()->group("Cameras and settings");
   reads(command.add_option(

@@ -16,7 +16,6 @@
 
 #include "commands.h"
 #include "paths.h"
-#include "python_tool.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
@@ -111,7 +110,6 @@ int main(int argc, char** argv) {
   signal(SIGPIPE, SIG_IGN);
   signal(SIGXFSZ, SIG_IGN);
   waymark::silence_libraries();
-  waymark::set_slam_settings_reader(waymark::read_settings_by_tool);
   try {
     const int status = waymark::run_program({argv + 1, argv + argc});
     if (status == waymark::kDone || status == waymark::kNoPose) waymark::check_standard_output();

@@ -22,7 +22,6 @@
 #include "waymark/base/config.h"
 #include "waymark/base/regular_file.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/exchange/config_file.h"
 #include "waymark/image/feature_geometry.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/mapping/appearance.h"
@@ -206,12 +205,6 @@ CameraChain make_calibration(const py::dict& camchain,
   return chain;
 }
 
-CameraChain read_in_python(const ConfigSource& source) {
-  const py::gil_scoped_acquire held;
-  const py::object read = py::module_::import("waymark.importing_settings").attr("read");
-  return read(py::bytes(source.name), py::bytes(source.text)).cast<CameraChain>();
-}
-
 }  // namespace
 
 void bind_importing(py::module_& module) {
@@ -250,7 +243,6 @@ void bind_importing(py::module_& module) {
   module.def("_write_file", [](const py::object& path, const std::string& text) {
     write_file_atomically(path_argument("path", path), text);
   });
-  set_slam_settings_reader(&read_in_python);
 }
 
 }  // namespace waymark::python

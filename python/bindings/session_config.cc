@@ -43,10 +43,16 @@ bool is_path(py::handle value) {
   return py::isinstance<py::str>(value) || py::hasattr(value, "__fspath__");
 }
 
+CameraChain read_slam_settings(const ConfigSource& source) {
+  const py::object read = py::module_::import("waymark.importing_settings").attr("read");
+  return read(py::bytes(source.name), py::bytes(source.text)).cast<CameraChain>();
+}
+
 void add_files(const std::vector<std::filesystem::path>& paths,
                std::vector<ConfigSource>& sources) {
   std::vector<std::string> notes;
-  std::ranges::move(read_config_files(paths, notes), std::back_inserter(sources));
+  std::ranges::move(read_config_files(paths, notes, read_slam_settings),
+                    std::back_inserter(sources));
 }
 
 void add_sources(py::handle cameras, std::vector<ConfigSource>& sources, int nesting = 0) {

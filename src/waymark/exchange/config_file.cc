@@ -17,8 +17,6 @@ namespace {
 /// transforms.json lists every frame.
 constexpr std::size_t kMaxJsonBytes = std::size_t{256} << 20;
 
-SlamSettingsReader slam_settings_reader = nullptr;
-
 /// Whether keys are of Camera or Camera1, in sections or flat.
 bool is_slam_settings(const ConfigNode& root) {
   return root.kind == ConfigNode::Kind::kMap &&
@@ -35,10 +33,7 @@ ConfigSource read_calibration_source(const std::filesystem::path& path) {
   return {path.string(), read_text_file(path, "transforms.json of nerfstudio", kMaxJsonBytes)};
 }
 
-void set_slam_settings_reader(SlamSettingsReader reader) { slam_settings_reader = reader; }
-
-CameraChain read_slam_settings(const ConfigSource& source) {
-  if (slam_settings_reader != nullptr) return slam_settings_reader(source);
+CameraChain refuse_slam_settings(const ConfigSource& source) {
   throw InputError(
       source.name,
       fmt::format("has settings of OpenVSLAM or ORB-SLAM, expected a camchain: waymark "
@@ -46,14 +41,16 @@ CameraChain read_slam_settings(const ConfigSource& source) {
                   source.name));
 }
 
-std::optional<CameraChain> read_foreign_cameras(const ConfigSource& source) {
+std::optional<CameraChain> read_foreign_cameras(const ConfigSource& source,
+                                                SlamSettingsReader read_slam_settings) {
   if (auto chain = read_foreign_calibration(source)) return chain;
   if (!is_slam_settings(parse_config(without_opencv_header(source)))) return std::nullopt;
   return read_slam_settings(source);
 }
 
 std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::path> paths,
-                                            std::vector<std::string>& notes) {
+                                            std::vector<std::string>& notes,
+                                            SlamSettingsReader read_slam_settings) {
   std::vector<ConfigSource> sources;
   std::string of_camera;            // The last file of a camera of another program.
   std::optional<ConfigSource> ros;  // The same, of ROS, which may be one of a pair.
@@ -62,7 +59,8 @@ std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::pat
     ConfigSource source = read_calibration_source(path);
     const bool is_ros = is_ros_calibration(source);
     const bool is_pair = is_ros && ros;
-    const auto chain = is_pair ? read_ros_pair(*ros, source) : read_foreign_cameras(source);
+    const auto chain =
+        is_pair ? read_ros_pair(*ros, source) : read_foreign_cameras(source, read_slam_settings);
     if (!chain) {
       sources.push_back(std::move(source));
       continue;
@@ -91,8 +89,10 @@ std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::pat
   return sources;
 }
 
-ConfigSource read_config_file(const std::filesystem::path& path, std::vector<std::string>& notes) {
-  return read_config_files({&path, 1}, notes).front();
+ConfigSource read_config_file(const std::filesystem::path& path,
+                              std::vector<std::string>& notes,
+                              SlamSettingsReader read_slam_settings) {
+  return read_config_files({&path, 1}, notes, read_slam_settings).front();
 }
 
 }  // namespace waymark

@@ -18,28 +18,28 @@ namespace waymark {
 ConfigSource read_calibration_source(const std::filesystem::path& path);
 
 /// Reads the cameras of settings of OpenVSLAM, stella_vslam, ORB-SLAM2 and 3, which are named by
-/// their path. Throws InputError.
+/// their path. Throws InputError. A tool in Python does it (waymark.importing_settings).
 using SlamSettingsReader = CameraChain (*)(const ConfigSource& source);
 
-/// Who reads them from now on, which a tool in Python does (waymark.importing_settings); null, as
-/// by default: nobody. To be called before there are threads.
-void set_slam_settings_reader(SlamSettingsReader reader);
-
-/// The cameras of a file of these. InputError that names the command which converts it where nobody
-/// reads it, and for one that is malformed.
-CameraChain read_slam_settings(const ConfigSource& source);
+/// Where that tool is not at hand: InputError that names the command which converts them.
+CameraChain refuse_slam_settings(const ConfigSource& source);
 
 /// The cameras of a calibration or settings file of another program, recognised by its content:
-/// those of read_foreign_calibration() and read_slam_settings(). Nothing for what is none of them,
+/// those of read_foreign_calibration() and of SLAM programs. Nothing for what is none of them,
 /// such as a camchain. InputError for one that is malformed.
-std::optional<CameraChain> read_foreign_cameras(const ConfigSource& source);
+std::optional<CameraChain> read_foreign_cameras(
+    const ConfigSource& source, SlamSettingsReader read_slam_settings = refuse_slam_settings);
 
 /// A file of cameras and settings as `-c` takes it: YAML of ours as it is; one of another program
 /// turned into a camchain. What of it was passed over is appended to notes. Throws InputError.
-ConfigSource read_config_file(const std::filesystem::path& path, std::vector<std::string>& notes);
+ConfigSource read_config_file(const std::filesystem::path& path,
+                              std::vector<std::string>& notes,
+                              SlamSettingsReader read_slam_settings = refuse_slam_settings);
 /// Several of them. Two cameras of ROS become the pair that they are of; else what comes later
 /// takes the place of what came before, which notes say of other programs' files.
-std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::path> paths,
-                                            std::vector<std::string>& notes);
+std::vector<ConfigSource> read_config_files(
+    std::span<const std::filesystem::path> paths,
+    std::vector<std::string>& notes,
+    SlamSettingsReader read_slam_settings = refuse_slam_settings);
 
 }  // namespace waymark

@@ -91,17 +91,15 @@ TEST(ConfigFile, OfASlamProgramIsLeftToWhoReadsIt) {
                            "%YAML:1.0\nCamera1.fx: 400\n",
                            "Camera.fx: 400\n"}) {
     const ConfigSource source{"slam.yaml", text};
-    set_slam_settings_reader(nullptr);
     EXPECT_THAT(input_error_of([&] { read_foreign_cameras(source); }),
                 HasSubstr("slam.yaml: has settings of OpenVSLAM or ORB-SLAM, expected a camchain: "
                           "waymark import --settings slam.yaml -o camchain.yaml"));
-    set_slam_settings_reader([](const ConfigSource& read) {
+    const SlamSettingsReader reader = [](const ConfigSource& read) {
       CameraChain chain;
       chain.notes.push_back(read.name);
       return chain;
-    });
-    EXPECT_THAT(read_foreign_cameras(source).value().notes, ElementsAre("slam.yaml"));
-    set_slam_settings_reader(nullptr);
+    };
+    EXPECT_THAT(read_foreign_cameras(source, reader).value().notes, ElementsAre("slam.yaml"));
   }
 }
 

@@ -15,7 +15,6 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/camera/resized_camera.h"
-#include "waymark/exchange/config_file.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
@@ -31,7 +30,8 @@ ConfigNode read_configuration(const SessionOptions& options, std::vector<std::st
         "--config",
         fmt::format("is given {} times, expected at most {}", options.configs.size(), kMaxConfigs));
   }
-  std::vector<ConfigSource> sources = read_config_files(options.configs, notes);
+  std::vector<ConfigSource> sources =
+      read_config_files(options.configs, notes, options.read_slam_settings);
   for (const std::string& assignment : options.assignments) {
     sources.push_back(ConfigSource::from_assignment(assignment));
   }

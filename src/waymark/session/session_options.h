@@ -10,6 +10,7 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/calibrate/calibrate.h"
+#include "waymark/exchange/config_file.h"
 #include "waymark/input/input.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/system/settings.h"
@@ -22,8 +23,9 @@ struct SessionOptions {
   std::filesystem::path input;
   std::vector<std::filesystem::path> configs;  ///< Cameras and settings, later ones override.
   std::vector<std::string> assignments;        ///< KEY=VALUE, override the files.
-  std::filesystem::path map_in;                ///< Map to go on in; empty: a new one.
-  InputOptions reading;                        ///< The calibration is filled in.
+  SlamSettingsReader read_slam_settings = refuse_slam_settings;  ///< Of what is among the files.
+  std::filesystem::path map_in;  ///< Map to go on in; empty: a new one.
+  InputOptions reading;          ///< The calibration is filled in.
   Timing timing = Timing::kLockstep;
   std::optional<int> seed;  ///< Overrides the settings.
   /// Instead of what the configuration or the input says of the cameras, before --rotate and
