@@ -45,7 +45,7 @@ class ViewPublisher {
  private:
   using Clock = std::chrono::steady_clock;
 
-  void note_frames(const System& system, const FrameImages& input, const TrackingResult& result);
+  void note_frames(const FrameImages& input, const TrackingResult& result);
   void count(const FrameStatus& newest);
   void measure(const TrackingResult& result);
   void note_calibration(const System& system);
