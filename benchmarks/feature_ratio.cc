@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "waymark/base/median.h"
-#include "waymark/image/extractor.h"
+#include "waymark/features/extractor.h"
 
 namespace {
 

@@ -36,9 +36,9 @@
 #include "waymark/base/rng.h"
 #include "waymark/evaluate/association.h"
 #include "waymark/exchange/trajectory.h"
+#include "waymark/features/features.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/image/features.h"
-#include "waymark/image/frame_builder.h"
 #include "waymark/input/input.h"
 #include "waymark/place/place_index.h"
 

@@ -10,8 +10,8 @@
 
 #include "memory.h"
 #include "waymark/map/correction.h"
+#include "waymark/place/map_snapshot.h"
 #include "waymark/simulate/testing/town_map.h"
-#include "waymark/track/map_snapshot.h"
 
 namespace waymark {
 

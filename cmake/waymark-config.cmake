@@ -1,5 +1,5 @@
 # find_package(waymark) gives waymark::waymark, which is all of it, and its modules one by one:
-# waymark::base geometry camera image marker map match place optimize track mapping loop bag input mapfile
+# waymark::base geometry camera image features marker map match place solver optimize track mapping loop bag input mapfile
 # exchange system session view simulate evaluate.
 include(CMakeFindDependencyMacro)
 find_dependency(Threads)

@@ -13,7 +13,7 @@
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/exchange/config_file.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/input/image_times.h"
 

@@ -11,8 +11,8 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/features/depth.h"
 #include "waymark/image/convert.h"
-#include "waymark/image/depth.h"
 #include "waymark/input/input.h"
 #include "waymark/system/settings.h"
 #include "waymark/system/system.h"

@@ -22,7 +22,7 @@
 #include "waymark/base/config.h"
 #include "waymark/base/regular_file.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/mapping/appearance.h"
 

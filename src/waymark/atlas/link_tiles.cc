@@ -14,7 +14,7 @@
 #include "waymark/geometry/alignment.h"
 #include "waymark/loop/global_mapper.h"
 #include "waymark/map/parts.h"
-#include "waymark/track/map_snapshot.h"
+#include "waymark/place/map_snapshot.h"
 
 namespace waymark {
 namespace {

@@ -6,7 +6,7 @@
 #include <filesystem>
 #include <vector>
 
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/map/map.h"
 
 namespace waymark {

@@ -14,9 +14,9 @@
 #include "waymark/base/median.h"
 #include "waymark/calibrate/lens.h"
 #include "waymark/camera/tangent.h"
+#include "waymark/features/frame_builder.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/geometry/two_view.h"
-#include "waymark/image/frame_builder.h"
-#include "waymark/image/pyramid.h"
 #include "waymark/match/appearance.h"
 
 namespace waymark {

@@ -9,7 +9,7 @@
 
 #include "waymark/calibrate/lens.h"
 #include "waymark/camera/camera.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/image/image.h"
 
 namespace waymark {

@@ -9,8 +9,8 @@
 #include <map>
 #include <vector>
 
-#include "waymark/image/pyramid.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/features/pyramid.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/input/decode.h"
 #include "waymark/mapping/associate.h"
 

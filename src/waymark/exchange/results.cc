@@ -97,7 +97,7 @@ Json to_json(const std::vector<RunAdvice>& advice) {
 std::string picture_fields(const FrameRecord& frame) {
   std::string text = ",";
   if (frame.num_features) text += fmt::format("{}", *frame.num_features);
-  const PictureFigures& picture = frame.picture;
+  const ImageStatistics& picture = frame.picture;
   if (!picture.is_known) return text + ",,,";
   return text +
          fmt::format(",{},{},{}", picture.brightness, picture.contrast, picture.blur_percent);

@@ -19,7 +19,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/exchange/trajectory.h"
-#include "waymark/image/picture_figures.h"
+#include "waymark/image/image_statistics.h"
 
 namespace waymark {
 
@@ -36,7 +36,7 @@ struct FrameRecord : FrameStatus {
   bool is_relocalized = false;  ///< Whether the camera was found again after a loss.
   /// Of camera 0; nothing for a frame that was not processed.
   std::optional<std::uint16_t> num_features;
-  PictureFigures picture;  ///< Of the image of camera 0.
+  ImageStatistics picture;  ///< Of the image of camera 0.
 
   /// Takes the times of all stages over.
   void set_stages(std::span<const double> times_ms);

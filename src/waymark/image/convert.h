@@ -5,8 +5,8 @@
 #include <array>
 #include <cstdint>
 
-#include "waymark/image/depth.h"
 #include "waymark/image/image.h"
+#include "waymark/image/settings.h"
 
 namespace waymark {
 

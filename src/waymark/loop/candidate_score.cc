@@ -4,8 +4,8 @@
 
 #include <algorithm>
 
+#include "waymark/base/adaptive_threshold.h"
 #include "waymark/loop/find.h"
-#include "waymark/track/enough.h"
 
 namespace waymark {
 namespace {
@@ -201,7 +201,7 @@ void CandidateScorer::count_sightings(const Map& map, ScoredCandidate& scored) {
     const Sightings sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
     scored.is_confirmed = static_cast<int>(sightings.num_found) >=
-                              enough_of(kMinFoundToConfirm, features.num_corners()) &&
+                              adaptive_threshold(kMinFoundToConfirm, features.num_corners()) &&
                           sightings.share() >= kMinShareToConfirm;
     if (scored.is_confirmed) break;
   }

@@ -18,8 +18,8 @@
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
 #include "waymark/mapping/markers.h"
+#include "waymark/place/map_snapshot.h"
 #include "waymark/place/place_index.h"
-#include "waymark/track/map_snapshot.h"
 
 namespace waymark {
 

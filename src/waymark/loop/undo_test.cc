@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/image/hamming.h"
+#include "waymark/features/hamming.h"
 #include "waymark/loop/close.h"
 #include "waymark/loop/loop_pose_graph.h"
 #include "waymark/loop/odometry.h"

@@ -6,12 +6,12 @@
 #include <cmath>
 #include <utility>
 
+#include "waymark/base/adaptive_threshold.h"
 #include "waymark/base/median.h"
 #include "waymark/camera/rig.h"
 #include "waymark/loop/ambiguity.h"
 #include "waymark/loop/drift.h"
 #include "waymark/loop/find.h"
-#include "waymark/track/enough.h"
 
 namespace waymark {
 namespace {
@@ -41,7 +41,7 @@ bool meets(const Map& map, const ScoredCandidate& scored, const Demand& demand) 
   const LoopCandidate& candidate = scored.candidate;
   const std::size_t num_features = num_features_of(map, candidate.query, candidate.match);
   const auto is_enough = [&](std::size_t count, int full) {
-    return static_cast<int>(count) >= enough_of(full, num_features);
+    return static_cast<int>(count) >= adaptive_threshold(full, num_features);
   };
   const Sightings both{scored.in_query.num_found + scored.in_match.num_found,
                        scored.in_query.num_visible + scored.in_match.num_visible};
@@ -128,7 +128,7 @@ std::vector<ScoredCandidate> LoopVerifier::score_alike(const Map& map,
                                                        KeyframeId query) {
   std::vector<ScoredCandidate> found;
   for (const KeyframeId match : find_alike(map, places, query)) {
-    const int least = enough_of(kOfLoops.num_inliers, num_features_of(map, query, match));
+    const int least = adaptive_threshold(kOfLoops.num_inliers, num_features_of(map, query, match));
     std::optional<ScoredCandidate> scored =
         scorer_.score(map, query, match, static_cast<std::size_t>(least));
     if (scored && meets(map, *scored, kOfLoops)) found.push_back(std::move(*scored));

@@ -17,9 +17,9 @@
 #include "waymark/base/cow_table.h"
 #include "waymark/base/id.h"
 #include "waymark/camera/rig.h"
+#include "waymark/features/features.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/sim3.h"
-#include "waymark/image/features.h"
 #include "waymark/marker/marker.h"
 
 namespace waymark {

@@ -6,8 +6,8 @@
 #include <memory>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_reader.h"
 

@@ -16,7 +16,7 @@
 
 #include "waymark/base/id.h"
 #include "waymark/camera/camera.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 
 namespace waymark {
 

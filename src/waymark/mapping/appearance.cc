@@ -7,8 +7,8 @@
 #include <span>
 
 #include "waymark/base/median.h"
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/hamming.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/hamming.h"
 
 namespace waymark {
 namespace {

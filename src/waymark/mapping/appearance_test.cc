@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/image/hamming.h"
+#include "waymark/features/hamming.h"
 #include "waymark/track/testing/map.h"
 
 namespace waymark {

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/mapping/associate.h"
 
-#include "waymark/image/range_precision.h"
+#include "waymark/features/range_precision.h"
 
 namespace waymark {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "waymark/map/map.h"
-#include "waymark/track/messages.h"
+#include "waymark/map/messages.h"
 
 namespace waymark {
 

@@ -4,7 +4,7 @@
 
 #include <gtest/gtest.h>
 
-#include "waymark/image/range_precision.h"
+#include "waymark/features/range_precision.h"
 #include "waymark/track/testing/map.h"
 
 namespace waymark {

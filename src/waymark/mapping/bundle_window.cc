@@ -11,7 +11,7 @@
 #include "waymark/mapping/depth_offset.h"
 #include "waymark/mapping/marker_bundle.h"
 #include "waymark/mapping/readout.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {

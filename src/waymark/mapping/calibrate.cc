@@ -9,7 +9,7 @@
 #include <utility>
 
 #include "waymark/mapping/camera_measurements.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {

@@ -9,8 +9,8 @@
 #include <memory>
 
 #include "waymark/camera/tangent.h"
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/pyramid.h"
 
 namespace waymark {
 namespace {

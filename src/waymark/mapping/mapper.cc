@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/mapping/appearance.h"
 #include "waymark/mapping/bundle_window.h"
 #include "waymark/mapping/fuse.h"

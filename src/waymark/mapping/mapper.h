@@ -6,13 +6,13 @@
 #include <vector>
 
 #include "waymark/map/map.h"
+#include "waymark/map/messages.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/mapping/cull.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/match/epipolar.h"
 #include "waymark/match/projection.h"
-#include "waymark/track/messages.h"
 
 namespace waymark {
 

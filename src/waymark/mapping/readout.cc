@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/image/rolling_shutter.h"
+#include "waymark/features/rolling_shutter.h"
 #include "waymark/mapping/camera_measurements.h"
 #include "waymark/mapping/linear_calibration.h"
 

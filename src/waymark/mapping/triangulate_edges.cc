@@ -6,7 +6,7 @@
 #include <cmath>
 #include <optional>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 
 namespace waymark {
 namespace {

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/track/testing/map.h"
 
 namespace waymark {

@@ -4,7 +4,7 @@
 
 #include <algorithm>
 
-#include "waymark/image/hamming.h"
+#include "waymark/features/hamming.h"
 
 namespace waymark {
 

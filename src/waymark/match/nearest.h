@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 
 namespace waymark {
 

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "waymark/image/hamming.h"
+#include "waymark/features/hamming.h"
 #include "waymark/match/nearest.h"
 
 namespace waymark {

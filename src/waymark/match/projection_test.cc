@@ -6,7 +6,7 @@
 
 #include <set>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/match/testing/scene.h"
 
 namespace waymark {

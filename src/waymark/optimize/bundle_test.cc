@@ -8,9 +8,9 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
-#include "waymark/optimize/schur_solver.h"
 #include "waymark/optimize/testing/ceres.h"
-#include "waymark/optimize/testing/scene.h"
+#include "waymark/solver/schur_solver.h"
+#include "waymark/solver/testing/scene.h"
 
 namespace waymark {
 namespace {

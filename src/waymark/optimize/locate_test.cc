@@ -6,7 +6,7 @@
 
 #include <limits>
 
-#include "waymark/optimize/testing/scene.h"
+#include "waymark/solver/testing/scene.h"
 
 namespace waymark {
 namespace {

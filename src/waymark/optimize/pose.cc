@@ -6,9 +6,9 @@
 #include <cmath>
 
 #include "waymark/base/median.h"
-#include "waymark/optimize/levenberg_marquardt.h"
-#include "waymark/optimize/pose_kernel.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/levenberg_marquardt.h"
+#include "waymark/solver/pose_kernel.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 

@@ -2,9 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "waymark/image/testing/allocation_count.h"
+#include "waymark/features/testing/allocation_count.h"
 #include "waymark/optimize/pose.h"
-#include "waymark/optimize/testing/scene.h"
+#include "waymark/solver/testing/scene.h"
 
 namespace waymark {
 namespace {

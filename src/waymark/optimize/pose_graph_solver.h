@@ -12,10 +12,10 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/thread_pool.h"
-#include "waymark/optimize/levenberg_marquardt.h"
 #include "waymark/optimize/pose_graph.h"
 #include "waymark/optimize/pose_graph_system.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/levenberg_marquardt.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 

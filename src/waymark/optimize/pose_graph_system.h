@@ -13,9 +13,9 @@
 #include <vector>
 
 #include "waymark/base/thread_pool.h"
-#include "waymark/optimize/block_cholesky.h"
-#include "waymark/optimize/elimination_order.h"
 #include "waymark/optimize/pose_graph.h"
+#include "waymark/solver/block_cholesky.h"
+#include "waymark/solver/elimination_order.h"
 
 namespace waymark {
 

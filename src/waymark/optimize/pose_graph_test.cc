@@ -11,7 +11,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/optimize/testing/scene.h"
+#include "waymark/solver/testing/scene.h"
 
 namespace waymark {
 namespace {

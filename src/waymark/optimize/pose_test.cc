@@ -9,7 +9,7 @@
 #include <limits>
 
 #include "waymark/base/check.h"
-#include "waymark/optimize/testing/scene.h"
+#include "waymark/solver/testing/scene.h"
 
 namespace waymark {
 namespace {

@@ -11,8 +11,8 @@
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/optimize/levenberg_marquardt.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/levenberg_marquardt.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {

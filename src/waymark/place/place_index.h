@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "waymark/base/id.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/place/place_segment.h"
 
 namespace waymark {

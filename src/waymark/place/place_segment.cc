@@ -9,7 +9,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
-#include "waymark/image/hamming.h"
+#include "waymark/features/hamming.h"
 
 namespace waymark {
 namespace {

@@ -12,7 +12,7 @@
 #include <vector>
 
 #include "waymark/base/id.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 
 namespace waymark {
 

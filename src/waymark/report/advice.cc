@@ -275,7 +275,7 @@ void add_pictures(std::span<const FrameRecord> frames, TroubleFigures& seen) {
   std::vector<double> brightness, contrast, blur, features, tracked_blur;
   for (const FrameRecord& frame : frames) {
     if (!was_looked_at(frame)) continue;
-    const PictureFigures& picture = frame.picture;
+    const ImageStatistics& picture = frame.picture;
     if (!is_weak_frame(frame)) {
       if (picture.is_known) tracked_blur.push_back(picture.blur_percent);
       continue;

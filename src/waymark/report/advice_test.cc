@@ -35,7 +35,7 @@ std::vector<std::string> causes_after(const Spoil& spoil) {
 }
 
 /// Frames are lost for want of matches, with such images.
-std::vector<std::string> causes_with(PictureFigures picture, int num_features = 1000) {
+std::vector<std::string> causes_with(ImageStatistics picture, int num_features = 1000) {
   return causes_after([&](FrameTable& table, RunSummary&) {
     lose(table, 100, 200);
     for (std::uint32_t i = 100; i < 200; ++i) {

@@ -94,8 +94,8 @@ Enum named(const RowReader& row, std::size_t at, Enum last) {
                                documentation("docs/results.md")));
 }
 
-PictureFigures parse_picture(const RowReader& row, const FrameColumns& columns) {
-  PictureFigures picture;
+ImageStatistics parse_picture(const RowReader& row, const FrameColumns& columns) {
+  ImageStatistics picture;
   const auto brightness = whole(row, columns, "brightness", 255.0);
   const auto contrast = whole(row, columns, "contrast", 255.0);
   const auto blur = whole(row, columns, "blur", 100.0);

@@ -53,7 +53,7 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   record.is_relocalized = result.is_relocalized;
   record.num_features =
       static_cast<std::uint16_t>(std::min<std::uint32_t>(result.num_features, UINT16_MAX));
-  record.picture = measure_picture(frame.images.at(0).view());
+  record.picture = measure_image(frame.images.at(0).view());
   record.set_stages(result.stages.ms);
   return record;
 }

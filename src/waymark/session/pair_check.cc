@@ -9,7 +9,7 @@
 #include <cmath>
 #include <utility>
 
-#include "waymark/image/range_precision.h"
+#include "waymark/features/range_precision.h"
 
 namespace waymark {
 namespace {

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "waymark/camera/rig.h"
-#include "waymark/image/features.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/features.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/image/image.h"
 
 namespace waymark {

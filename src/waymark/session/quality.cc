@@ -9,7 +9,7 @@
 
 #include "waymark/base/text.h"
 #include "waymark/mapping/associate.h"
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {

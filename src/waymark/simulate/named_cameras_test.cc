@@ -9,7 +9,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/testing/camera_test.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
 

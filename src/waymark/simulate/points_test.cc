@@ -10,7 +10,7 @@
 #include <set>
 
 #include "waymark/camera/perspective.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/simulate/motion.h"
 
 namespace waymark {

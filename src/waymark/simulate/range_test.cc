@@ -10,7 +10,7 @@
 #include <ostream>
 
 #include "waymark/camera/registry.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/render.h"

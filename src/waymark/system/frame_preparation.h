@@ -6,7 +6,7 @@
 #include <functional>
 #include <memory>
 
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/system/frames_ahead.h"
 #include "waymark/system/marker_finder.h"
 #include "waymark/system/settings.h"

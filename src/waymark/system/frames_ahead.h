@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "waymark/base/work_ahead.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 
 namespace waymark {
 

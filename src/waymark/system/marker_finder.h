@@ -10,12 +10,12 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/map/map.h"
+#include "waymark/map/messages.h"
 #include "waymark/mapping/markers.h"
 #include "waymark/marker/detect.h"
 #include "waymark/marker/settings.h"
 #include "waymark/system/system.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/messages.h"
 #include "waymark/track/tracking_result.h"
 
 namespace waymark {

@@ -6,7 +6,7 @@
 #include <optional>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/mapping/bundle_window.h"
 
 namespace waymark {

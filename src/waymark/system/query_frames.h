@@ -6,7 +6,7 @@
 #include <memory>
 
 #include "waymark/camera/rig.h"
-#include "waymark/image/frame_builder.h"
+#include "waymark/features/frame_builder.h"
 #include "waymark/map/map.h"
 #include "waymark/system/marker_finder.h"
 #include "waymark/system/settings.h"

@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "waymark/image/settings.h"
+#include "waymark/features/settings.h"
 #include "waymark/loop/settings.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/marker/settings.h"

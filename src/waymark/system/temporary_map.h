@@ -4,10 +4,10 @@
 
 #include <memory>
 
+#include "waymark/map/messages.h"
 #include "waymark/mapping/associate.h"
 #include "waymark/match/epipolar.h"
-#include "waymark/track/map_snapshot.h"
-#include "waymark/track/messages.h"
+#include "waymark/place/map_snapshot.h"
 
 namespace waymark {
 

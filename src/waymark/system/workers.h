@@ -13,8 +13,8 @@
 #include "waymark/base/mailbox.h"
 #include "waymark/base/timing.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/track/map_snapshot.h"
-#include "waymark/track/messages.h"
+#include "waymark/map/messages.h"
+#include "waymark/place/map_snapshot.h"
 
 namespace waymark {
 

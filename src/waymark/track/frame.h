@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "waymark/base/id.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/marker/marker.h"
 
 namespace waymark {

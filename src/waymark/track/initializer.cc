@@ -5,11 +5,11 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/base/adaptive_threshold.h"
 #include "waymark/base/median.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/range_precision.h"
 #include "waymark/geometry/two_view.h"
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/range_precision.h"
-#include "waymark/track/enough.h"
 #include "waymark/track/matched_pair.h"
 #include "waymark/track/search_radius.h"
 
@@ -40,7 +40,7 @@ double search_radius_px(const Frame& frame) {
 }
 
 int min_landmarks(const Features& features) {
-  return enough_of(kMinLandmarks, features.num_corners());
+  return adaptive_threshold(kMinLandmarks, features.num_corners());
 }
 
 /// Of a pair: the image that offers less counts.

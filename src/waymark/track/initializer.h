@@ -10,12 +10,12 @@
 #include <vector>
 
 #include "waymark/base/frame_state.h"
+#include "waymark/map/messages.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
 #include "waymark/match/rotation_alignment.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/messages.h"
 #include "waymark/track/rest.h"
 
 namespace waymark {

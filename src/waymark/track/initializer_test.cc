@@ -9,7 +9,7 @@
 #include <functional>
 #include <set>
 
-#include "waymark/image/range_precision.h"
+#include "waymark/features/range_precision.h"
 #include "waymark/track/testing/map.h"
 
 namespace waymark {

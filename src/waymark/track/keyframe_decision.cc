@@ -8,7 +8,7 @@
 
 #include "waymark/base/median.h"
 #include "waymark/camera/pixel_angles.h"
-#include "waymark/image/range_precision.h"
+#include "waymark/features/range_precision.h"
 
 namespace waymark {
 namespace {

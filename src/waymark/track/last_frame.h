@@ -9,9 +9,9 @@
 
 #include "waymark/geometry/rigid3.h"
 #include "waymark/map/map.h"
+#include "waymark/map/messages.h"
 #include "waymark/match/landmark_set.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/messages.h"
 
 namespace waymark {
 

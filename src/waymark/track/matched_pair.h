@@ -6,8 +6,8 @@
 #include <span>
 #include <vector>
 
+#include "waymark/features/features.h"
 #include "waymark/geometry/two_view.h"
-#include "waymark/image/features.h"
 #include "waymark/match/appearance.h"
 
 namespace waymark {

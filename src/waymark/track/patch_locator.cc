@@ -7,8 +7,8 @@
 #include <numeric>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/image/small_image.h"
 
 namespace waymark {

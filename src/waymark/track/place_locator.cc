@@ -7,8 +7,8 @@
 #include <span>
 #include <utility>
 
+#include "waymark/base/adaptive_threshold.h"
 #include "waymark/optimize/locate.h"
-#include "waymark/track/enough.h"
 #include "waymark/track/place_confidence.h"
 
 namespace waymark {
@@ -75,7 +75,7 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
   attempt_.failure = FrameReason::kTooFewInliers;
   std::optional<LocatedFrame> located = find_consensus(features, map, stream, std::move(landmarks));
   if (!located) return std::nullopt;
-  const int enough = enough_of(kMinInliers, features.num_corners());
+  const int enough = adaptive_threshold(kMinInliers, features.num_corners());
   const std::array<std::pair<double, int>, 2> rounds = {
       {{kFirstRadiusPx, enough / 2}, {kSecondRadiusPx, enough}}};
   for (const auto& [radius_px, min_inliers] : rounds) {

@@ -10,7 +10,7 @@
 
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/rig.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/map/map.h"
 #include "waymark/track/frame_locator.h"
 

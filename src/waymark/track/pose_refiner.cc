@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "waymark/image/pyramid.h"
-#include "waymark/image/rolling_shutter.h"
+#include "waymark/features/pyramid.h"
+#include "waymark/features/rolling_shutter.h"
 
 namespace waymark {
 namespace {

@@ -6,7 +6,7 @@
 #include <array>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {

@@ -9,17 +9,17 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/base/stage_times.h"
 #include "waymark/match/rotation_alignment.h"
+#include "waymark/place/map_snapshot.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/last_frame.h"
 #include "waymark/track/local_map.h"
-#include "waymark/track/map_snapshot.h"
 #include "waymark/track/patch_locator.h"
 #include "waymark/track/pose_check.h"
 #include "waymark/track/relocalizer.h"
 #include "waymark/track/settings.h"
-#include "waymark/track/stage_times.h"
 
 namespace waymark {
 

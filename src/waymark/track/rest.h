@@ -6,7 +6,7 @@
 #include <span>
 
 #include "waymark/camera/camera.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/match/appearance.h"
 
 namespace waymark {

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <vector>
 
-#include "waymark/track/messages.h"
+#include "waymark/map/messages.h"
 
 namespace waymark {
 

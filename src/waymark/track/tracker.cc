@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/track/keyframe_decision.h"
 
 namespace waymark {

@@ -6,10 +6,10 @@
 #include <string_view>
 #include <vector>
 
+#include "waymark/place/map_snapshot.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/initializer.h"
 #include "waymark/track/last_frame.h"
-#include "waymark/track/map_snapshot.h"
 #include "waymark/track/pose_search.h"
 #include "waymark/track/scale_keeper.h"
 #include "waymark/track/sent_ids.h"

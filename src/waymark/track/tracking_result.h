@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "waymark/base/frame_state.h"
-#include "waymark/track/messages.h"
-#include "waymark/track/stage_times.h"
+#include "waymark/base/stage_times.h"
+#include "waymark/map/messages.h"
 
 namespace waymark {
 

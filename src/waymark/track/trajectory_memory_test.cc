@@ -5,7 +5,7 @@
 #include <gtest/gtest.h>
 
 #include "waymark/camera/perspective.h"
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/track/testing/map.h"
 
 namespace waymark {

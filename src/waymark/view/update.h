@@ -11,14 +11,14 @@
 #include <vector>
 
 #include "waymark/base/frame_state.h"
+#include "waymark/base/stage_times.h"
 #include "waymark/camera/calibration.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/image/image.h"
 #include "waymark/map/align.h"
 #include "waymark/map/map.h"
+#include "waymark/map/messages.h"
 #include "waymark/mapfile/map_file.h"
-#include "waymark/track/messages.h"
-#include "waymark/track/stage_times.h"
 
 // What travels between the session's thread and the viewer's. Values only; what is shared is
 // immutable.

@@ -12,7 +12,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/image/feature_geometry.h"
+#include "waymark/features/feature_geometry.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/appearance.h"
 

@@ -8,7 +8,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/map/map.h"
 
 namespace waymark::testing {

@@ -8,7 +8,7 @@
 #include <memory>
 #include <vector>
 
-#include "waymark/optimize/residual.h"
+#include "waymark/solver/residual.h"
 
 namespace waymark::testing {
 

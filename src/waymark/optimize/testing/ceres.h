@@ -5,7 +5,7 @@
 #include <cstdint>
 #include <span>
 
-#include "waymark/optimize/schur_solver.h"
+#include "waymark/solver/schur_solver.h"
 
 namespace waymark::testing {
 

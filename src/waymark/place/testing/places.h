@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "waymark/base/rng.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 
 namespace waymark {
 

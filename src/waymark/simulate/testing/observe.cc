@@ -10,8 +10,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/camera/tangent.h"
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/pyramid.h"
 #include "waymark/simulate/testing/points.h"
 
 namespace waymark {

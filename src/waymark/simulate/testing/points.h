@@ -9,7 +9,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/rig.h"
-#include "waymark/image/features.h"
+#include "waymark/features/features.h"
 #include "waymark/simulate/world.h"
 
 namespace waymark {

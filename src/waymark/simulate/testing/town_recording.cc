@@ -8,8 +8,8 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/image/feature_geometry.h"
-#include "waymark/image/pyramid.h"
+#include "waymark/features/feature_geometry.h"
+#include "waymark/features/pyramid.h"
 
 namespace waymark {
 

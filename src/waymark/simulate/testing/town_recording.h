@@ -8,8 +8,8 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/rig.h"
+#include "waymark/features/features.h"
 #include "waymark/geometry/rigid3.h"
-#include "waymark/image/features.h"
 #include "waymark/simulate/testing/town.h"
 
 namespace waymark {
