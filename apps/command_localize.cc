@@ -130,10 +130,10 @@ SessionResults localize_tiles(const LocalizeOptions& options,
   return results;
 }
 
-void write_all(const LocalizeOptions& options,
-               PreparedInput& prepared,
-               SessionResults& results,
-               Reporter& reporter) {
+void write_outputs(const LocalizeOptions& options,
+                   PreparedInput& prepared,
+                   SessionResults& results,
+                   Reporter& reporter) {
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(Timing::kInline);
   results.summary.seed = static_cast<std::uint64_t>(prepared.settings.seed);
@@ -249,7 +249,7 @@ int localize(LocalizeOptions options, Reporter& reporter) {
                                ? localize_tiles(options, *searched.atlas, prepared, reporter)
                                : localize_all(options, searched.map, prepared, reporter);
   if (!options.session.reading.images.empty()) print_poses(results);
-  write_all(options, prepared, results, reporter);
+  write_outputs(options, prepared, results, reporter);
   return *results.summary.localized == 0 ? kNoPose : kDone;
 }
 

@@ -20,14 +20,14 @@
 #include "waymark/base/disk_memory.h"
 #include "waymark/report/advice.h"
 #include "waymark/report/report.h"
-#include "waymark/session/another_pass.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
-#include "waymark/session/image_keeper.h"
-#include "waymark/session/input_ahead.h"
+#include "waymark/session/input_prefetch.h"
+#include "waymark/session/keyframe_image_cache.h"
 #include "waymark/session/live_input.h"
 #include "waymark/session/overlay_video.h"
 #include "waymark/session/quality.h"
+#include "waymark/session/second_pass.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"
 
@@ -73,8 +73,8 @@ SessionResults map_input(Session& session,
                          OverlayVideo* overlay,
                          bool reads_ahead,
                          Reporter& reporter) {
-  CalibrationWatch watch(session,
-                         [&reporter](const std::string& mistake) { reporter.warning(mistake); });
+  CalibrationMonitor watch(session,
+                           [&reporter](const std::string& mistake) { reporter.warning(mistake); });
   watch.compare_with(session.system->map());
   SessionHooks hooks;
   hooks.watch = &watch;
@@ -138,11 +138,11 @@ bool has_ended_early(const SessionResults& results, const LiveControl* live) {
 }
 
 /// The calibration with which the input is to be mapped once more, if it is.
-std::optional<AnotherPass> begin_again(const Session& session, const RunOptions& options) {
+std::optional<SecondPass> begin_again(const Session& session, const RunOptions& options) {
   const bool is_paced = options.pace > 0.0 || options.session.timing == Timing::kRealtime;
   // A map to go on in is another one by now where it is saved to the same file.
   if (is_paced || !options.session.map_in.empty()) return std::nullopt;
-  return calibration_for_another_pass(session);
+  return calibration_for_second_pass(session);
 }
 
 /// Adds what an earlier pass told and took.
@@ -241,13 +241,13 @@ std::optional<int> map_once(const RunOptions& options,
   const bool reads_ahead = options.session.timing == Timing::kLockstep && options.pace == 0.0 &&
                            !session.input->info().is_live;
   const bool decodes_ahead = reads_ahead && session.input->can_decode_apart();
-  InputAhead ahead(*session.input);
+  InputPrefetch ahead(*session.input);
   TimedInput input(decodes_ahead ? ahead : *session.input,
                    options.pace,
                    options.session.timing == Timing::kRealtime,
                    is_interrupted,
                    [&is_paused] { return is_paused.load(std::memory_order_relaxed); });
-  ImageKeeper images(
+  KeyframeImageCache images(
       input.get(), [&] { return session.system->map(); }, std::move(session.images));
   Autosave autosave(options.map_out,
                     has_map_out && !first ? options.autosave_s : 0.0,  // There is a whole map.

@@ -9,7 +9,7 @@
 #include "waymark/calibrate/calibrate.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/frame_feed.h"
-#include "waymark/session/image_keeper.h"
+#include "waymark/session/keyframe_image_cache.h"
 #include "waymark/system/system.h"
 #include "waymark/view/publisher.h"
 #include "waymark/view/viewer.h"
@@ -20,7 +20,7 @@ namespace waymark {
 struct ControlledParts {
   System& system;
   Autosave& autosave;
-  ImageKeeper& images;
+  KeyframeImageCache& images;
   std::atomic<bool>& is_paused;  ///< Read by the thread that reads the input, too.
 };
 

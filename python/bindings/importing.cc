@@ -118,7 +118,7 @@ class MapBuilder {
         }
       }
     }
-    map_.count_sightings(id, counts[0], counts[1]);
+    map_.count_visibility(id, counts[0], counts[1]);
     map_.set_appearance(id, describe_landmark(map_, id));
     return true;
   }

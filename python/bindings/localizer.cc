@@ -34,7 +34,7 @@ class PythonLocalizer {
     return localizer_.track(input);
   }
 
-  TrackingResult locate(const ImageArguments& images, const std::optional<PoseHint>& hint) {
+  TrackingResult locate(const ImageArguments& images, const std::optional<PosePrior>& hint) {
     const Turn turn(is_taken_, "Localizer");
     const FrameArguments frame(images, config_.setup, config_.settings.depth);
     const ReleasedGil released;
@@ -53,11 +53,11 @@ class PythonLocalizer {
   bool is_taken_ = false;
 };
 
-std::optional<PoseHint> hint_argument(const PythonMap& map,
-                                      const py::object& world_from_rig,
-                                      const py::object& submap) {
+std::optional<PosePrior> hint_argument(const PythonMap& map,
+                                       const py::object& world_from_rig,
+                                       const py::object& submap) {
   if (world_from_rig.is_none()) return std::nullopt;
-  PoseHint hint;
+  PosePrior hint;
   hint.world_from_rig = pose_argument("hint", world_from_rig);
   const std::int64_t id = integer_argument("submap", submap);
   if (id < 0 || id >= static_cast<std::int64_t>(map.map().submaps().size())) {

@@ -96,13 +96,13 @@ MarkerTable markers(const PythonMap& self) {
           array_of(std::move(is_surveyed))};
 }
 
-SightingTable marker_sightings(const PythonMap& self) {
+SightingTable marker_observations(const PythonMap& self) {
   std::vector<std::uint32_t> keyframes, ids;
   std::vector<std::uint8_t> cameras;
   std::vector<float> pixels;
   self.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     if (!keyframe.markers) return;
-    for (const MarkerSighting& sighting : *keyframe.markers) {
+    for (const MarkerObservation& sighting : *keyframe.markers) {
       keyframes.push_back(id.value);
       ids.push_back(static_cast<std::uint32_t>(sighting.id));
       cameras.push_back(sighting.camera);
@@ -205,8 +205,9 @@ void bind_markers(py::module_& module) {
       .get("is_surveyed",
            "uint8 array (N,): 1 where it was said to be there and holds the map.",
            &MarkerTable::is_surveyed);
-  Class<SightingTable>(
-      module, "MarkerSightings", "What keyframes see of markers, as arrays of the same length N.")
+  Class<SightingTable>(module,
+                       "MarkerObservations",
+                       "What keyframes see of markers, as arrays of the same length N.")
       .def("__len__", [](const SightingTable& self) { return self.ids.size(); })
       .get("keyframes", "uint32 array (N,): ids, ascending.", &SightingTable::keyframes)
       .get("ids", "uint32 array (N,): numbers of the markers.", &SightingTable::ids)
@@ -226,10 +227,10 @@ void bind_map_tables(Class<PythonMap, std::shared_ptr<PythonMap>>& map, py::modu
   map.def("keyframes", &keyframes, "keyframes(self)\n--\n\nAll keyframes: Keyframes (copies).")
       .def("landmarks", &landmarks, "landmarks(self)\n--\n\nAll landmarks: Landmarks (copies).")
       .def("markers", &markers, "markers(self)\n--\n\nMarkers that are known: Markers (copies).")
-      .def("marker_sightings", &marker_sightings, R"(marker_sightings(self)
+      .def("marker_observations", &marker_observations, R"(marker_observations(self)
 --
 
-Markers as the keyframes see them, known or not: MarkerSightings (copies).)")
+Markers as the keyframes see them, known or not: MarkerObservations (copies).)")
       .def("covisibility", &covisibility, R"(covisibility(self)
 --
 

@@ -20,7 +20,7 @@ out are read-only.
 from ._waymark import (NO_ID, Atlas, AtlasLocalizer, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
                        Features, FrameDetails, Input, InputError, InputFrame, Keyframe,
                        Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
-                       MarkerSightings, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
+                       MarkerObservations, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
                        __version__, calibrate, evaluate, info, open_input, read_depth_image, read_grey_image, report)
 from .importing import import_map, import_settings
 
@@ -28,7 +28,7 @@ __all__ = [
     "NO_ID", "Atlas", "AtlasLocalizer", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
     "FrameDetails", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
     "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "Markers",
-    "MarkerSightings", "MergedMap", "OutputError",
+    "MarkerObservations", "MergedMap", "OutputError",
     "Statistics", "Submap", "System", "TrackingResult", "Trajectory", "Viewer", "__version__",
     "calibrate", "evaluate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
     "read_grey_image", "report",

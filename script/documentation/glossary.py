@@ -14,7 +14,6 @@ WORD = re.compile(r"[A-Z]+(?![a-z])|[A-Z]?[a-z]+")
 TYPE = re.compile(r"\s*(?:template <.*>\s*)?(?:struct|class|union|enum(?: class)?) (?:alignas\(.*?\) )?([A-Z]\w*)(?: final)?\s*"
                   r"(?::[^:].*|\{.*)?$")
 ACCESS = re.compile(r" (public|protected|private):$")
-TO_BE_REPLACED = "# Words to be replaced"
 
 
 def words_of(name):
@@ -29,20 +28,16 @@ def glossary(root):
 
 
 def read_terms(root):
-    """The words that stay and those that are to be replaced, each with its line, and what is wrong with the list."""
-    stay, replace, faults, before = {}, {}, [], ""
-    words = stay
+    """The words, and what is wrong with the list."""
+    words, faults, before = set(), [], ""
     for line, text in enumerate((root / TERMS).read_text(encoding="utf-8").split("\n"), 1):
-        word, _, comment = (part.strip() for part in text.partition("#"))
-        if text.startswith(TO_BE_REPLACED):
-            words, before = replace, ""
-        elif word:
+        word = text.partition("#")[0].strip()
+        if word:
             if word <= before:
                 faults.append(f"{TERMS}:{line}: {word} is not in its place, expected sorted words")
-            if words is replace and not comment:
-                faults.append(f"{TERMS}:{line}: {word} has no comment that says what replaces it")
-            words[word], before = line, word
-    return stay, replace, faults
+            words.add(word)
+            before = word
+    return words, faults
 
 
 def file_names(root):
@@ -71,10 +66,8 @@ def is_among(word, words):
 
 
 def check_glossary(root=ROOT):
-    stay, replace, faults = read_terms(root)
-    known, unused = glossary(root) | set(stay), set(replace)
-    for file, line, name in (*file_names(root), *public_types(root)):
-        unused -= set(words_of(name))
-        faults += [f"{file}:{line}: {word} of {name} is neither in the glossary of docs/concepts.md nor in {TERMS}"
-                   for word in words_of(name) if not is_among(word, known) and word not in replace]
-    return faults + [f"{TERMS}:{replace[word]}: no name has {word} any more" for word in sorted(unused)]
+    terms, faults = read_terms(root)
+    known = glossary(root) | terms
+    return faults + [f"{file}:{line}: {word} of {name} is neither in the glossary of docs/concepts.md nor in {TERMS}"
+                     for file, line, name in (*file_names(root), *public_types(root))
+                     for word in words_of(name) if not is_among(word, known)]

@@ -96,7 +96,7 @@ class AtlasLocalizer::Impl {
   std::size_t num_opened() const { return tiles_.num_opened(); }
   std::size_t num_tiles_seen() const { return tiles_.num_tiles_seen(); }
   TrackingResult track(const FrameImages& images);
-  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint);
+  TrackingResult locate(const FrameImages& images, const std::optional<PosePrior>& hint);
 
  private:
   std::uint64_t seed() const { return static_cast<std::uint64_t>(settings_.seed); }
@@ -107,8 +107,8 @@ class AtlasLocalizer::Impl {
                        const Map& tile,
                        const LocatedFrame& located,
                        KeyframeId candidate);
-  std::optional<FoundInTile> search_near(const Frame& frame, const PoseHint& hint);
-  std::vector<std::uint32_t> tiles_near(const PoseHint& hint) const;
+  std::optional<FoundInTile> search_near(const Frame& frame, const PosePrior& hint);
+  std::vector<std::uint32_t> tiles_near(const PosePrior& hint) const;
   void note(const FrameStatus& diagnosis);
   bool should_look(const TrackingResult& result);
   /// The stream goes on in another tile, where this frame was found.
@@ -170,7 +170,7 @@ std::optional<FoundInTile> AtlasLocalizer::Impl::search(const Frame& frame) {
   return best;
 }
 
-std::vector<std::uint32_t> AtlasLocalizer::Impl::tiles_near(const PoseHint& hint) const {
+std::vector<std::uint32_t> AtlasLocalizer::Impl::tiles_near(const PosePrior& hint) const {
   std::vector<std::pair<double, std::uint32_t>> near;
   const std::vector<AtlasTile>& tiles = atlas_.contents().tiles;
   for (std::uint32_t i = 0; i < tiles.size(); ++i) {
@@ -188,7 +188,7 @@ std::vector<std::uint32_t> AtlasLocalizer::Impl::tiles_near(const PoseHint& hint
 }
 
 std::optional<FoundInTile> AtlasLocalizer::Impl::search_near(const Frame& frame,
-                                                             const PoseHint& hint) {
+                                                             const PosePrior& hint) {
   for (const std::uint32_t index : tiles_near(hint)) {
     const std::shared_ptr<const Map> tile = tiles_.get(index);
     const Sim3 pose = row(index).atlas_from_tile.inverse() * Sim3(hint.world_from_rig);
@@ -213,7 +213,7 @@ void AtlasLocalizer::Impl::fill_in(const FoundInTile& found, TrackingResult& res
 }
 
 TrackingResult AtlasLocalizer::Impl::locate(const FrameImages& images,
-                                            const std::optional<PoseHint>& hint) {
+                                            const std::optional<PosePrior>& hint) {
   TrackingResult result;
   const Frame frame = frames_.build(images, {}, result);
   StageTimer timer(result.stages, Stage::kRecover);
@@ -291,7 +291,7 @@ AtlasLocalizer::~AtlasLocalizer() = default;
 const Atlas& AtlasLocalizer::atlas() const { return impl_->atlas(); }
 TrackingResult AtlasLocalizer::track(const FrameImages& images) { return impl_->track(images); }
 TrackingResult AtlasLocalizer::locate(const FrameImages& images,
-                                      const std::optional<PoseHint>& hint) {
+                                      const std::optional<PosePrior>& hint) {
   return impl_->locate(images, hint);
 }
 std::size_t AtlasLocalizer::num_opened() const { return impl_->num_opened(); }

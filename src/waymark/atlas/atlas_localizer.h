@@ -42,7 +42,7 @@ class AtlasLocalizer {
 
   /// An image by itself: looked for near the hint, if there is one (its sub-map is a part of the
   /// atlas), and anywhere where it is not. Leaves the stream alone.
-  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint = {});
+  TrackingResult locate(const FrameImages& images, const std::optional<PosePrior>& hint = {});
 
   /// How often a tile was read from its file, and how many were.
   std::size_t num_opened() const;

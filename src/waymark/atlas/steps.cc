@@ -7,8 +7,8 @@
 #include <map>
 #include <utility>
 
-#include "waymark/atlas/cut.h"
 #include "waymark/atlas/link_tiles.h"
+#include "waymark/atlas/partition.h"
 #include "waymark/base/check.h"
 #include "waymark/system/query_frames.h"
 
@@ -16,7 +16,7 @@ namespace waymark {
 namespace {
 
 /// What is known of a tile without opening it.
-AtlasTile describe_tile(const CutTile& cut) {
+AtlasTile describe_tile(const PartitionTile& cut) {
   AtlasTile tile;
   const Map& map = cut.map;
   tile.submap = cut.submap.value;
@@ -36,7 +36,7 @@ AtlasTile describe_tile(const CutTile& cut) {
   return tile;
 }
 
-KeyframeImages images_of(const StoredMap& stored, const CutTile& tile) {
+KeyframeImages images_of(const StoredMap& stored, const PartitionTile& tile) {
   KeyframeImages images;
   for (std::uint32_t i = 0; i < tile.keyframes.size(); ++i) {
     const auto at = stored.images.find(tile.keyframes[i]);
@@ -63,11 +63,11 @@ CutRecording cut_recording(Atlas& atlas,
                            const std::string& name,
                            std::size_t max_keyframes) {
   check_models(*stored.map, name);
-  CutMap cut = cut_map(*stored.map, max_keyframes);
+  PartitionedMap cut = partition_map(*stored.map, max_keyframes);
   CutRecording result;
   AtlasContents& contents = result.contents;
   contents.recordings.push_back({checksum, name, 0});
-  for (CutTile& part : cut.tiles) {
+  for (PartitionTile& part : cut.tiles) {
     AtlasTile& tile = contents.tiles.emplace_back(describe_tile(part));
     StoredMap file;
     file.map = part.map.freeze();

@@ -7,17 +7,17 @@
 namespace waymark {
 namespace {
 
-TEST(EnoughTest, AsksForAllWhereTheImageOffersPlenty) {
+TEST(AdaptiveThreshold, AsksForAllWhereTheImageOffersPlenty) {
   EXPECT_EQ(adaptive_threshold(80, 400), 80);
   EXPECT_EQ(adaptive_threshold(80, 100'000), 80);
 }
 
-TEST(EnoughTest, AsksForAFifthWhereItOffersLess) {
+TEST(AdaptiveThreshold, AsksForAFifthWhereItOffersLess) {
   EXPECT_EQ(adaptive_threshold(80, 300), 60);
   EXPECT_EQ(adaptive_threshold(30, 100), 20);
 }
 
-TEST(EnoughTest, NeverAsksForLessThanHalf) {
+TEST(AdaptiveThreshold, NeverAsksForLessThanHalf) {
   EXPECT_EQ(adaptive_threshold(80, 0), 40);
   EXPECT_EQ(adaptive_threshold(25, 3), 13);
 }

@@ -10,7 +10,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/base/write_fully.h"
+#include "waymark/base/write_all.h"
 
 namespace waymark {
 namespace {
@@ -52,7 +52,7 @@ void AppendFile::take_back() noexcept {
 
 void AppendFile::flush() {
   const std::uint64_t size = flushed_bytes_ + buffer_.size();
-  const int error = write_fully(descriptor_, buffer_);
+  const int error = write_all(descriptor_, buffer_);
   flushed_bytes_ = size;  // At most: taking back cuts whatever there is.
   buffer_.clear();
   if (error != 0) fail("be written", error);

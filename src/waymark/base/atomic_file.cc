@@ -15,7 +15,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
-#include "waymark/base/write_fully.h"
+#include "waymark/base/write_all.h"
 
 namespace waymark {
 namespace {
@@ -95,7 +95,7 @@ void AtomicFile::commit() {
 }
 
 void AtomicFile::flush() {
-  if (const int error = write_fully(descriptor_, buffer_)) fail("be written", error);
+  if (const int error = write_all(descriptor_, buffer_)) fail("be written", error);
   buffer_.clear();
 }
 

@@ -14,7 +14,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/base/write_fully.h"
+#include "waymark/base/write_all.h"
 
 namespace waymark {
 namespace {

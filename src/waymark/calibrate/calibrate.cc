@@ -10,8 +10,8 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/calibrate/compete.h"
-#include "waymark/calibrate/look.h"
+#include "waymark/calibrate/image_circle.h"
+#include "waymark/calibrate/model_selection.h"
 #include "waymark/calibrate/refine.h"
 #include "waymark/camera/registry.h"
 #include "waymark/image/convert.h"

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/calibrate/compete.h"
+#include "waymark/calibrate/model_selection.h"
 #include "waymark/camera/camera.h"
 #include "waymark/map/map.h"
 

@@ -11,7 +11,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/evaluate/association.h"
-#include "waymark/evaluate/clocks.h"
+#include "waymark/evaluate/time_offset.h"
 #include "waymark/geometry/rigid3.h"
 
 namespace waymark {

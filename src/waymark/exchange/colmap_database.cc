@@ -99,8 +99,8 @@ using ViewMatches = std::map<ViewPair, std::vector<std::uint32_t>>;
 ViewMatches match_views(const ExportScene& scene) {
   ViewMatches matches;
   for (const ExportPoint& point : scene.points) {
-    std::vector<ExportSighting> track = point.sightings;
-    std::ranges::sort(track, {}, &ExportSighting::view);
+    std::vector<ExportObservation> track = point.sightings;
+    std::ranges::sort(track, {}, &ExportObservation::view);
     for (std::size_t a = 0; a < track.size(); ++a) {
       const std::size_t end = std::min(track.size(), a + 1 + kMaxPartners);
       for (std::size_t b = a + 1; b < end; ++b) {
@@ -127,7 +127,7 @@ std::array<double, 9> essential_matrix(const Rigid3& b_from_a) {
 void add_cameras(sqlite3* base,
                  const std::filesystem::path& path,
                  const ExportScene& scene,
-                 ColmapNumbers numbers) {
+                 ColmapIds numbers) {
   Insertion cameras(base, "INSERT INTO cameras VALUES (?, ?, ?, ?, ?, 1)", path);
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
     const ColmapCamera camera = colmap_camera(scene.cameras[i]);
@@ -143,7 +143,7 @@ void add_cameras(sqlite3* base,
 void add_images(sqlite3* base,
                 const std::filesystem::path& path,
                 const ExportScene& scene,
-                ColmapNumbers numbers) {
+                ColmapIds numbers) {
   Insertion images(base, "INSERT INTO images (image_id, name, camera_id) VALUES (?, ?, ?)", path);
   Insertion keypoints(base, "INSERT INTO keypoints VALUES (?, ?, 2, ?)", path);
   std::vector<float> pixels;
@@ -169,7 +169,7 @@ void add_images(sqlite3* base,
 void add_pairs(sqlite3* base,
                const std::filesystem::path& path,
                const ExportScene& scene,
-               ColmapNumbers numbers) {
+               ColmapIds numbers) {
   Insertion matches(base, "INSERT INTO matches VALUES (?, ?, 2, ?)", path);
   Insertion pairs(
       base, "INSERT INTO two_view_geometries VALUES (?, ?, 2, ?, ?, ?, ?, ?, ?, ?)", path);
@@ -219,8 +219,8 @@ std::vector<bool> find_connected(const ExportScene& scene) {
 void take_sightings(ExportScene& scene, const std::vector<bool>& is_kept) {
   for (ExportPoint& point : scene.points) {
     const auto num_kept = std::ranges::count_if(
-        point.sightings, [&](const ExportSighting& seen) { return is_kept[seen.view]; });
-    std::erase_if(point.sightings, [&](const ExportSighting& seen) {
+        point.sightings, [&](const ExportObservation& seen) { return is_kept[seen.view]; });
+    std::erase_if(point.sightings, [&](const ExportObservation& seen) {
       if (is_kept[seen.view] && num_kept >= 2) return false;
       scene.views[seen.view].points[seen.feature] = kNoPoint;
       return true;
@@ -262,7 +262,7 @@ ColmapDatabase::ColmapDatabase(const std::filesystem::path& path) : path_(path) 
 
 ColmapDatabase::~ColmapDatabase() = default;
 
-void ColmapDatabase::add(const ExportScene& scene, ColmapNumbers numbers) {
+void ColmapDatabase::add(const ExportScene& scene, ColmapIds numbers) {
   add_cameras(base_.get(), path_, scene, numbers);
   add_images(base_.get(), path_, scene, numbers);
   add_pairs(base_.get(), path_, scene, numbers);

@@ -33,7 +33,7 @@ class ColmapDatabase {
   ColmapDatabase& operator=(const ColmapDatabase&) = delete;
 
   /// Adds a model that is written with the same numbers.
-  void add(const ExportScene& scene, ColmapNumbers numbers);
+  void add(const ExportScene& scene, ColmapIds numbers);
   /// Once, at the end; without it there is nothing in the file.
   void finish();
 

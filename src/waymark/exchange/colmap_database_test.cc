@@ -69,8 +69,8 @@ TEST(UnlinkLooseViews, LeavesFeaturesToViewsThatShareEnough) {
   EXPECT_EQ(scene.views[1].points, whole.views[1].points);
   // The last view sees few, and the points beyond number 20 are then seen by the first alone.
   for (std::size_t i = 0; i < scene.points.size(); ++i) {
-    std::vector<ExportSighting>& sightings = scene.points[i].sightings;
-    std::erase_if(sightings, [&](const ExportSighting& seen) {
+    std::vector<ExportObservation>& sightings = scene.points[i].sightings;
+    std::erase_if(sightings, [&](const ExportObservation& seen) {
       return (seen.view == 2 && i >= 5 && i < 21) || (seen.view == 1 && i > 20);
     });
   }

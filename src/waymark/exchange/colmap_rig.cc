@@ -10,7 +10,7 @@
 
 namespace waymark {
 
-std::string format_colmap_rig(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_colmap_rig(const ExportScene& scene, ColmapIds numbers) {
   std::set<std::pair<std::size_t, std::size_t>> used;  // Camera of the rig, camera of the scene.
   for (const ExportView& view : scene.views) used.emplace(view.rig_camera, view.camera);
   if (used.size() != 2 || used.rbegin()->first != 1) return "";

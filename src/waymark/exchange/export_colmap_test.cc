@@ -68,8 +68,9 @@ class ExportColmap : public ::testing::TestWithParam<std::pair<const char*, cons
 
 TEST_P(ExportColmap, IsReadBackAndReprojects) {
   const ExportScene scene = make_export_scene(small_map(GetParam().first), SubmapId{0});
-  for (const ReadModel& model : {testing::read_text(format_colmap(scene, ColmapForm::kText)),
-                                 testing::read_binary(format_colmap(scene, ColmapForm::kBinary))}) {
+  for (const ReadModel& model :
+       {testing::read_text(format_colmap(scene, ColmapFormat::kText)),
+        testing::read_binary(format_colmap(scene, ColmapFormat::kBinary))}) {
     ASSERT_EQ(model.cameras.size(), 1u);
     EXPECT_EQ(model.cameras.at(1).model, GetParam().second);
     EXPECT_EQ(model.cameras.at(1).width, 640u);
@@ -93,8 +94,8 @@ INSTANTIATE_TEST_SUITE_P(Cameras,
 TEST(ExportColmapFiles, AreWhereColmapLooksForThem) {
   const testing::TemporaryFolder folder;
   const ExportScene scene = make_export_scene(small_map("plain"), SubmapId{0});
-  write_colmap(folder.path() / "sparse/0", scene, ColmapForm::kBinary);
-  write_colmap(folder.path() / "sparse/0", scene, ColmapForm::kText);
+  write_colmap(folder.path() / "sparse/0", scene, ColmapFormat::kBinary);
+  write_colmap(folder.path() / "sparse/0", scene, ColmapFormat::kText);
   for (const char* name : {"cameras", "images", "points3D"}) {
     for (const char* suffix : {".txt", ".bin"}) {
       EXPECT_TRUE(exists(folder.path() / "sparse/0" / (std::string(name) + suffix)));

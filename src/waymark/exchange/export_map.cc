@@ -150,7 +150,7 @@ class ModelWriter {
       write_file_atomically(folder_ / numbered("transforms.json", number), json);
       return;
     }
-    const auto form = options_.is_text ? ColmapForm::kText : ColmapForm::kBinary;
+    const auto form = options_.is_text ? ColmapFormat::kText : ColmapFormat::kBinary;
     const std::filesystem::path model = folder_ / "sparse" / fmt::to_string(number);
     write_colmap(model, scene, form, numbers_);
     database_->add(scene, numbers_);
@@ -193,7 +193,7 @@ class ModelWriter {
   const std::filesystem::path folder_;
   std::optional<ColmapDatabase> database_;
   std::optional<RecordedImages> recording_;
-  ColmapNumbers numbers_;
+  ColmapIds numbers_;
   std::vector<SplitScene> splits_;
   MapExportCounts counts_;
 };

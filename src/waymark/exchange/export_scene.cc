@@ -143,7 +143,7 @@ class SceneBuilder {
     const std::size_t rig_camera = feature < num_primary ? 0 : 1;
     if (rig_camera > 0 && cameras_ == ExportCameras::kFirst) return;
     const auto view = first_view + static_cast<std::uint32_t>(rig_camera);
-    for (const ExportSighting& other : point.sightings) {
+    for (const ExportObservation& other : point.sightings) {
       if (other.view == view) return;
     }
     const std::optional<SightedPixel> sighted =
@@ -170,7 +170,7 @@ class SceneBuilder {
     }
     if (point.sightings.size() < 2) return;
     point.error_px /= static_cast<double>(point.sightings.size());
-    for (const ExportSighting& sighting : point.sightings) {
+    for (const ExportObservation& sighting : point.sightings) {
       ExportView& view = scene_.views[sighting.view];
       view.points[sighting.feature] = static_cast<std::uint32_t>(scene_.points.size());
       const Eigen::Vector3d position_in_view = view.cam_from_world * point.position_in_world;

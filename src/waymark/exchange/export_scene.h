@@ -35,7 +35,7 @@ struct ExportView {
 };
 
 /// A view that sees a point.
-struct ExportSighting {
+struct ExportObservation {
   std::uint32_t view = 0;     ///< Index in ExportScene::views.
   std::uint32_t feature = 0;  ///< Index in its pixels.
 };
@@ -47,7 +47,7 @@ struct ExportPoint {
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
   std::array<std::uint8_t, 3> color = {128, 128, 128};  ///< Red, green, blue.
   double error_px = 0.0;                                ///< Mean reprojection error.
-  std::vector<ExportSighting> sightings;                ///< Two at least, or none.
+  std::vector<ExportObservation> sightings;             ///< Two at least, or none.
   /// Mean unit vector towards the cameras that see it: the side of its surface that is seen.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };
@@ -64,7 +64,7 @@ struct ExportScene {
 enum class ExportCameras { kFirst, kAll };
 
 /// A sub-map in these terms; image files of several cameras are named "cam0/..." and "cam1/...".
-/// Sightings that are off by more than kMaxExportErrorPx are left out,
+/// VisibleShare that are off by more than kMaxExportErrorPx are left out,
 /// and points that are then seen by fewer than two views. What shows a point on an edge lies across
 /// the edge where it was measured and along it where the point should be seen. Points are coloured
 /// as the images show them where there are images (broken ones count as none), else grey.

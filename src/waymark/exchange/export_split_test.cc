@@ -38,7 +38,7 @@ std::string content_of(const std::filesystem::path& path) {
 
 /// Every sighting, with the pinhole camera and the pose that the model states.
 void expect_small_errors(const ExportScene& scene) {
-  const testing::ReadModel model = testing::read_text(format_colmap(scene, ColmapForm::kText));
+  const testing::ReadModel model = testing::read_text(format_colmap(scene, ColmapFormat::kText));
   std::size_t num_sightings = 0;
   for (const auto& [id, point] : model.points) {
     for (const auto& [image_id, feature] : point.track) {
@@ -93,8 +93,8 @@ TEST(ExportSplit, LeavesPerspectiveCamerasAlone) {
   const ExportScene whole = make_export_scene(testing::small_map("distorted"), SubmapId{0});
   const SplitScene same = split_scene(whole, 6, kRegistry);
   EXPECT_EQ(same.scene.views.size(), 3u);
-  EXPECT_EQ(format_colmap(same.scene, ColmapForm::kText).images,
-            format_colmap(whole, ColmapForm::kText).images);
+  EXPECT_EQ(format_colmap(same.scene, ColmapFormat::kText).images,
+            format_colmap(whole, ColmapFormat::kText).images);
   const testing::TemporaryFolder folder;
   const std::string jpeg = encode_jpeg(ColorImage(640, 480));
   write_split_images(folder / "images", folder / "masks", same, {{KeyframeId{1}, shared(jpeg)}});
@@ -254,7 +254,7 @@ TEST(Undistort, LeavesAndRefusesWhatItCannotChange) {
   const ExportScene plain = make_export_scene(testing::small_map("plain"), SubmapId{0});
   const SplitScene same = undistort_scene(plain, kRegistry);
   EXPECT_FALSE(same.parts[0]);  // The image stays as it is.
-  EXPECT_NE(format_colmap(same.scene, ColmapForm::kText).cameras.find(" PINHOLE "),
+  EXPECT_NE(format_colmap(same.scene, ColmapFormat::kText).cameras.find(" PINHOLE "),
             std::string::npos);
   EXPECT_THROW(undistort_scene(make_export_scene(map_around(), SubmapId{0}), kRegistry),
                InputError);

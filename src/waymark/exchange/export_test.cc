@@ -198,7 +198,7 @@ TEST(Export, RefusesWhatOthersHaveNot) {
   const Map map = testing::make_small_map(testing::camera_around(1280)).map();
   const ExportScene scene = make_export_scene(map, SubmapId{0});
   EXPECT_EQ(scene.points.size(), 30u);
-  EXPECT_THAT(testing::input_error_of([&] { format_colmap(scene, ColmapForm::kText); }),
+  EXPECT_THAT(testing::input_error_of([&] { format_colmap(scene, ColmapFormat::kText); }),
               ::testing::HasSubstr("--split-views"));
   EXPECT_THAT(testing::input_error_of([&] { format_nerfstudio(scene, {}); }),
               ::testing::HasSubstr("--split-views"));

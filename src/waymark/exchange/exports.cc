@@ -33,7 +33,7 @@ void append_little_endian(std::string& bytes, T value) {
   }
 }
 
-std::string format_cameras_text(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_cameras_text(const ExportScene& scene, ColmapIds numbers) {
   std::string text =
       "# Camera list with one line of data per camera:\n"
       "#   CAMERA_ID, MODEL, WIDTH, HEIGHT, PARAMS[]\n";
@@ -49,7 +49,7 @@ std::string format_cameras_text(const ExportScene& scene, ColmapNumbers numbers)
   return text;
 }
 
-std::string format_cameras_binary(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_cameras_binary(const ExportScene& scene, ColmapIds numbers) {
   std::string bytes;
   append_little_endian(bytes, std::uint64_t{scene.cameras.size()});
   for (std::size_t i = 0; i < scene.cameras.size(); ++i) {
@@ -68,7 +68,7 @@ std::int64_t point_number(const ExportScene& scene, std::uint32_t point) {
   return point == kNoPoint ? -1 : std::int64_t{scene.points[point].landmark.value} + 1;
 }
 
-std::string format_images_text(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_images_text(const ExportScene& scene, ColmapIds numbers) {
   std::string text =
       "# Image list with two lines of data per image:\n"
       "#   IMAGE_ID, QW, QX, QY, QZ, TX, TY, TZ, CAMERA_ID, NAME\n"
@@ -102,7 +102,7 @@ std::string format_images_text(const ExportScene& scene, ColmapNumbers numbers) 
   return text;
 }
 
-std::string format_images_binary(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_images_binary(const ExportScene& scene, ColmapIds numbers) {
   std::string bytes;
   append_little_endian(bytes, std::uint64_t{scene.views.size()});
   for (std::size_t i = 0; i < scene.views.size(); ++i) {
@@ -124,7 +124,7 @@ std::string format_images_binary(const ExportScene& scene, ColmapNumbers numbers
   return bytes;
 }
 
-std::string format_points_text(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_points_text(const ExportScene& scene, ColmapIds numbers) {
   std::string text =
       "# 3D point list with one line of data per point:\n"
       "#   POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[] as (IMAGE_ID, POINT2D_IDX)\n";
@@ -140,7 +140,7 @@ std::string format_points_text(const ExportScene& scene, ColmapNumbers numbers) 
                    point.color[1],
                    point.color[2],
                    point.error_px);
-    for (const ExportSighting& sighting : point.sightings) {
+    for (const ExportObservation& sighting : point.sightings) {
       fmt::format_to(std::back_inserter(text),
                      " {} {}",
                      numbers.first_image + sighting.view,
@@ -151,7 +151,7 @@ std::string format_points_text(const ExportScene& scene, ColmapNumbers numbers) 
   return text;
 }
 
-std::string format_points_binary(const ExportScene& scene, ColmapNumbers numbers) {
+std::string format_points_binary(const ExportScene& scene, ColmapIds numbers) {
   std::string bytes;
   append_little_endian(bytes, std::uint64_t{scene.points.size()});
   for (const ExportPoint& point : scene.points) {
@@ -160,7 +160,7 @@ std::string format_points_binary(const ExportScene& scene, ColmapNumbers numbers
     for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);
     append_little_endian(bytes, point.error_px);
     append_little_endian(bytes, std::uint64_t{point.sightings.size()});
-    for (const ExportSighting& sighting : point.sightings) {
+    for (const ExportObservation& sighting : point.sightings) {
       append_little_endian(bytes, numbers.first_image + sighting.view);
       append_little_endian(bytes, sighting.feature);
     }
@@ -200,8 +200,8 @@ ColmapCamera colmap_camera(const CameraDescription& camera) {
   return result;
 }
 
-ColmapModel format_colmap(const ExportScene& scene, ColmapForm form, ColmapNumbers numbers) {
-  if (form == ColmapForm::kText) {
+ColmapModel format_colmap(const ExportScene& scene, ColmapFormat form, ColmapIds numbers) {
+  if (form == ColmapFormat::kText) {
     return {format_cameras_text(scene, numbers),
             format_images_text(scene, numbers),
             format_points_text(scene, numbers)};
@@ -213,10 +213,10 @@ ColmapModel format_colmap(const ExportScene& scene, ColmapForm form, ColmapNumbe
 
 void write_colmap(const std::filesystem::path& folder,
                   const ExportScene& scene,
-                  ColmapForm form,
-                  ColmapNumbers numbers) {
+                  ColmapFormat form,
+                  ColmapIds numbers) {
   const ColmapModel model = format_colmap(scene, form, numbers);
-  const std::string suffix = form == ColmapForm::kText ? ".txt" : ".bin";
+  const std::string suffix = form == ColmapFormat::kText ? ".txt" : ".bin";
   make_output_folder(folder);
   write_file_atomically(folder / ("cameras" + suffix), model.cameras);
   write_file_atomically(folder / ("images" + suffix), model.images);

@@ -10,11 +10,11 @@
 namespace waymark {
 
 /// Both forms that COLMAP reads: .txt and .bin files.
-enum class ColmapForm { kText, kBinary };
+enum class ColmapFormat { kText, kBinary };
 
 /// What the first image and camera of a scene are called: several scenes that share a database
 /// have numbers of their own.
-struct ColmapNumbers {
+struct ColmapIds {
   std::uint32_t first_image = 1;   ///< Of the first view.
   std::uint32_t first_camera = 1;  ///< Of the first camera.
 };
@@ -39,19 +39,19 @@ struct ColmapCamera {
 ColmapCamera colmap_camera(const CameraDescription& camera);
 
 /// InputError like colmap_camera().
-ColmapModel format_colmap(const ExportScene& scene, ColmapForm form, ColmapNumbers numbers = {});
+ColmapModel format_colmap(const ExportScene& scene, ColmapFormat form, ColmapIds numbers = {});
 
 /// Writes cameras, images and points3D (.txt or .bin) into the folder. Throws OutputError, and
 /// InputError like format_colmap().
 void write_colmap(const std::filesystem::path& folder,
                   const ExportScene& scene,
-                  ColmapForm form,
-                  ColmapNumbers numbers = {});
+                  ColmapFormat form,
+                  ColmapIds numbers = {});
 
 /// The cameras of a stereo rig for rig_bundle_adjuster, as the documentation of COLMAP 3.8 has it:
 /// camera i took the images whose names begin with "camI/". Empty unless the views are those of one
 /// rig of two cameras.
-std::string format_colmap_rig(const ExportScene& scene, ColmapNumbers numbers = {});
+std::string format_colmap_rig(const ExportScene& scene, ColmapIds numbers = {});
 
 /// What belongs to a transforms.json, as it names it: relative to itself.
 struct NerfstudioPaths {

@@ -211,7 +211,7 @@ class BagInput : public Input {
 
   /// Of images of 16 bits.
   void find_levels() {
-    LevelMeter meter;
+    GreyRangeEstimator meter;
     const std::size_t num_looked = std::min(frames_.frames.size(), kNumLevelFrames);
     for (std::size_t i = 0; i < num_looked; ++i) {
       const BagFrame& frame = frames_.frames[i * frames_.frames.size() / num_looked];
@@ -224,7 +224,7 @@ class BagInput : public Input {
     if (levels_ != Levels{}) notes_.push_back(levels_.describe());
   }
 
-  void add_levels(const ImageTopic& topic, const BagMessage& message, LevelMeter& meter) {
+  void add_levels(const ImageTopic& topic, const BagMessage& message, GreyRangeEstimator& meter) {
     const bool may_be_wide = topic.encoding.find("16") != std::string::npos ||
                              topic.encoding.find("png") != std::string::npos;
     if (!may_be_wide) return;

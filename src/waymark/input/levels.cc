@@ -24,14 +24,14 @@ std::string Levels::describe() const {
   return fmt::format("16-bit images: {:.0f} is black, {:.0f} white", black, white);
 }
 
-LevelMeter::LevelMeter() : counts_(static_cast<std::size_t>(kNumbers)) {}
+GreyRangeEstimator::GreyRangeEstimator() : counts_(static_cast<std::size_t>(kNumbers)) {}
 
-void LevelMeter::add(const BasicImage<std::uint16_t>& image) {
+void GreyRangeEstimator::add(const BasicImage<std::uint16_t>& image) {
   for (const std::uint16_t value : image.values) ++counts_[value];
   num_pixels_ += image.values.size();
 }
 
-Levels LevelMeter::levels() const {
+Levels GreyRangeEstimator::levels() const {
   if (num_pixels_ == 0) return {};
   const auto quantile = [&](double share) {
     const double wanted = share * static_cast<double>(num_pixels_);

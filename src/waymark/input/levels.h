@@ -24,9 +24,9 @@ struct Levels {
 /// steady. Cameras of 10 or 12 bits and thermal ones use a small part of what 16 bits can say;
 /// where less than a quarter is used, but for the darkest and brightest thousandth, that becomes
 /// all.
-class LevelMeter {
+class GreyRangeEstimator {
  public:
-  LevelMeter();
+  GreyRangeEstimator();
   /// Takes an image into account.
   void add(const BasicImage<std::uint16_t>& image);
   /// Of the images so far.

@@ -22,13 +22,13 @@ Levels levels_between(int low, int high) {
     image.values[i] = static_cast<std::uint16_t>(
         low + static_cast<int>(i) * (high - low) / static_cast<int>(image.values.size() - 1));
   }
-  LevelMeter meter;
+  GreyRangeEstimator meter;
   meter.add(image);
   return meter.levels();
 }
 
 TEST(Levels, AreThoseOf16BitsWhereMuchOfThemIsUsed) {
-  EXPECT_EQ(LevelMeter().levels(), Levels{});
+  EXPECT_EQ(GreyRangeEstimator().levels(), Levels{});
   EXPECT_EQ(levels_between(0, 65535), Levels{});
   EXPECT_EQ(levels_between(1000, 20000), Levels{});
   EXPECT_EQ(Levels{}.describe(), "");
@@ -51,7 +51,7 @@ TEST(Levels, PassOverAFewPixelsThatAreDead) {
     image.values[i] = static_cast<std::uint16_t>(7000 + i % 1000);
   image.values[17] = 65535;
   image.values[18] = 0;
-  LevelMeter meter;
+  GreyRangeEstimator meter;
   meter.add(image);
   EXPECT_NEAR(meter.levels().white, 8050, 10.0);
 }

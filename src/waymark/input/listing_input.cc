@@ -178,7 +178,7 @@ void ListingInput::read_depth(const ListedFrame& listed, InputFrame& frame) cons
 
 /// Of images of 16 bits, as the first one seen is.
 void ListingInput::find_levels() {
-  LevelMeter meter;
+  GreyRangeEstimator meter;
   const std::size_t num_looked = std::min(listing_.frames.size(), kNumLevelFrames);
   for (std::size_t i = 0; i < num_looked; ++i) {
     for (const auto& path : listing_.frames[i * listing_.frames.size() / num_looked].images) {

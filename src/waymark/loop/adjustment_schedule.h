@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include "waymark/loop/adjustment_pace.h"
+#include "waymark/loop/adjustment_interval.h"
 #include "waymark/mapping/global_adjustment.h"
 #include "waymark/mapping/mapper.h"
 
@@ -69,7 +69,7 @@ class AdjustmentSchedule {
     pace_.hurry();
   }
 
-  AdjustmentPace pace_;
+  AdjustmentInterval pace_;
   SubmapId unadjusted_;  ///< Whose loops are closed by a pose graph only; invalid if none.
   std::size_t next_calibration_ = kFirstCalibration;  ///< Keyframes of the map when it is due.
   std::uint32_t num_closures_ = 0;

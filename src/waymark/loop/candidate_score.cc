@@ -62,7 +62,7 @@ std::optional<ScoredCandidate> CandidateScorer::score(const Map& map,
   scored.candidate.match = match;
   if (!estimate(map, scored.candidate)) return std::nullopt;
   if (scored.candidate.num_inliers < min_inliers) return std::nullopt;
-  count_sightings(map, scored);
+  count_visibility(map, scored);
   return scored;
 }
 
@@ -147,10 +147,10 @@ LandmarkMatches CandidateScorer::match_by_projection(const Map& map, LoopCandida
   return matches;
 }
 
-Sightings CandidateScorer::look_for(const Map& map,
-                                    std::span<const KeyframeId> sources,
-                                    KeyframeId target,
-                                    const Rigid3& target_from_world) {
+VisibleShare CandidateScorer::look_for(const Map& map,
+                                       std::span<const KeyframeId> sources,
+                                       KeyframeId target,
+                                       const Rigid3& target_from_world) {
   std::vector<LandmarkId> ids;
   for (KeyframeId source : sources) {
     const auto& seen = map.keyframes().at(source).landmarks;
@@ -179,7 +179,7 @@ Sightings CandidateScorer::look_for(const Map& map,
   return {found.num_matches, static_cast<std::size_t>(num_visible)};
 }
 
-void CandidateScorer::count_sightings(const Map& map, ScoredCandidate& scored) {
+void CandidateScorer::count_visibility(const Map& map, ScoredCandidate& scored) {
   const LoopCandidate& candidate = scored.candidate;
   const Rigid3 query_from_world = map.keyframes().at(candidate.query).rig_from_world;
   const Rigid3 match_from_world = map.keyframes().at(candidate.match).rig_from_world;
@@ -198,7 +198,7 @@ void CandidateScorer::count_sightings(const Map& map, ScoredCandidate& scored) {
     const Features& features = *map.keyframes().at(id).features;
     const Rigid3 id_from_query = map.keyframes().at(id).rig_from_world * query_from_world.inverse();
     const Sim3 id_from_match = Sim3(id_from_query) * candidate.query_from_match;
-    const Sightings sightings =
+    const VisibleShare sightings =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
     scored.is_confirmed = static_cast<int>(sightings.num_found) >=
                               adaptive_threshold(kMinFoundToConfirm, features.num_corners()) &&

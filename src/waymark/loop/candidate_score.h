@@ -16,7 +16,7 @@
 namespace waymark {
 
 /// How much of what should be seen is seen.
-struct Sightings {
+struct VisibleShare {
   std::size_t num_found = 0;
   std::size_t num_visible = 0;
 
@@ -29,8 +29,8 @@ struct Sightings {
 /// A loop candidate and what speaks for it.
 struct ScoredCandidate {
   LoopCandidate candidate;
-  Sightings in_query;  ///< Landmarks around the match in the query.
-  Sightings in_match;  ///< Landmarks around the query in the match.
+  VisibleShare in_query;  ///< Landmarks around the match in the query.
+  VisibleShare in_match;  ///< Landmarks around the query in the match.
   /// Whether another keyframe near the query sees the place, too, where this candidate puts it.
   bool is_confirmed = false;
 };
@@ -54,11 +54,11 @@ class CandidateScorer {
   LandmarkMatches match_by_appearance(const Map& map, KeyframeId query, KeyframeId match);
   std::optional<SimilarityEstimate> estimate(const Map& map, LoopCandidate& candidate);
   LandmarkMatches match_by_projection(const Map& map, LoopCandidate& candidate);
-  Sightings look_for(const Map& map,
-                     std::span<const KeyframeId> sources,
-                     KeyframeId target,
-                     const Rigid3& target_from_world);
-  void count_sightings(const Map& map, ScoredCandidate& scored);
+  VisibleShare look_for(const Map& map,
+                        std::span<const KeyframeId> sources,
+                        KeyframeId target,
+                        const Rigid3& target_from_world);
+  void count_visibility(const Map& map, ScoredCandidate& scored);
 
   std::uint64_t seed_;
   AppearanceMatcher appearance_;

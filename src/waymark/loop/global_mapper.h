@@ -42,7 +42,7 @@ class GlobalMapper {
   void keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
-  /// The adjustment that a loop made necessary, see AdjustmentPace, or that may tell the
+  /// The adjustment that a loop made necessary, see AdjustmentInterval, or that may tell the
   /// calibration; nothing where there is none.
   std::optional<AdjustmentTask> take_task() { return schedule_.take(mapper_); }
   /// Whether there is one that a loop made necessary.

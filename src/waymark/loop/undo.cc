@@ -69,7 +69,7 @@ void split(Map& map, LandmarkId id, const Motions& motions, DirtyLandmarks& dirt
       const LandmarkId own = map.add_landmark(whole.submap, position, part.front().keyframe);
       for (const Observation& seen : part) map.observe(seen.keyframe, seen.feature, own);
       map.set_appearance(own, whole.appearance);
-      map.count_sightings(own, whole.num_visible, whole.num_found);
+      map.count_visibility(own, whole.num_visible, whole.num_found);
       dirty.insert(own);
     } else {
       others.assign(rest.begin() + 1, rest.end());

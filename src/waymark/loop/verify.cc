@@ -43,8 +43,8 @@ bool meets(const Map& map, const ScoredCandidate& scored, const Demand& demand) 
   const auto is_enough = [&](std::size_t count, int full) {
     return static_cast<int>(count) >= adaptive_threshold(full, num_features);
   };
-  const Sightings both{scored.in_query.num_found + scored.in_match.num_found,
-                       scored.in_query.num_visible + scored.in_match.num_visible};
+  const VisibleShare both{scored.in_query.num_found + scored.in_match.num_found,
+                          scored.in_query.num_visible + scored.in_match.num_visible};
   return is_enough(candidate.num_inliers, demand.num_inliers) &&
          is_enough(scored.in_query.num_found, demand.num_found) &&
          is_enough(scored.in_match.num_found, demand.num_found) && both.share() >= kMinShare &&

@@ -8,8 +8,8 @@
 
 namespace waymark {
 
-CowTable<KeyframeId, Covisibility> Map::count_covisibility() const {
-  CowTable<KeyframeId, Covisibility> counted;
+CopyOnWriteTable<KeyframeId, Covisibility> Map::count_covisibility() const {
+  CopyOnWriteTable<KeyframeId, Covisibility> counted;
   std::vector<std::uint32_t> num_shared(keyframes_.end_id().value, 0);
   keyframes_.for_each([&](KeyframeId id, const Keyframe& keyframe) {
     std::vector<LandmarkId> seen = keyframe.landmarks;

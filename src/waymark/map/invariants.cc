@@ -216,7 +216,7 @@ void find_broken_odometry(const Map& map, Findings& findings) {
 }
 
 void find_broken_covisibility(const Map& map,
-                              const CowTable<KeyframeId, Covisibility>& counted,
+                              const CopyOnWriteTable<KeyframeId, Covisibility>& counted,
                               Findings& findings) {
   counted.for_each([&](KeyframeId id, const Covisibility& covisibility) {
     if (map.covisible(id) != covisibility.edges) {

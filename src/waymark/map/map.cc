@@ -293,7 +293,7 @@ void Map::set_appearance(LandmarkId id, const Appearance& appearance) {
   landmarks_.edit(id).appearance = appearance;
 }
 
-void Map::count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found) {
+void Map::count_visibility(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found) {
   Landmark& landmark = landmarks_.edit(id);
   landmark.num_visible += num_visible;
   landmark.num_found += num_found;

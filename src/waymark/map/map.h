@@ -14,7 +14,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/base/cow_table.h"
+#include "waymark/base/copy_on_write_table.h"
 #include "waymark/base/id.h"
 #include "waymark/camera/rig.h"
 #include "waymark/features/features.h"
@@ -38,7 +38,7 @@ struct Keyframe {
   RigMotion motion;                          ///< At its time, as far as it is known.
   std::vector<LandmarkId> landmarks;         ///< One per feature, invalid where none.
   /// Markers that it sees; null where there are none or none were looked for.
-  std::shared_ptr<const MarkerSightings> markers = nullptr;
+  std::shared_ptr<const MarkerObservations> markers = nullptr;
 
   /// The cameras that measured its features.
   const Rig& rig() const { return *features->rig; }
@@ -177,7 +177,7 @@ struct MapParts {
     LandmarkId survivor;  ///< The one it was merged into.
   };
   /// How a keyframe lay to its parent.
-  struct NotedOdometry {
+  struct StoredOdometry {
     KeyframeId id;      ///< Of the keyframe, which may be gone.
     OdometryNode node;  ///< As it was noted.
   };
@@ -187,7 +187,7 @@ struct MapParts {
   std::vector<ErasedKeyframe> erased_keyframes;  ///< Ascending.
   std::vector<MergedLandmark> merged_landmarks;  ///< Ascending; that are gone.
   std::vector<LoopEdge> loop_edges;              ///< As Map::measured_loop_edges() gives them.
-  std::vector<NotedOdometry> odometry;           ///< Ascending.
+  std::vector<StoredOdometry> odometry;          ///< Ascending.
   std::vector<MapMarker> markers;                ///< By number.
   KeyframeId end_keyframe;                       ///< One past the largest id ever given.
   LandmarkId end_landmark;                       ///< The same.
@@ -220,9 +220,9 @@ class Map {
   std::shared_ptr<const Map> freeze();
 
   /// The living keyframes, by id.
-  const CowTable<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
+  const CopyOnWriteTable<KeyframeId, Keyframe>& keyframes() const { return keyframes_; }
   /// The living landmarks, by id.
-  const CowTable<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
+  const CopyOnWriteTable<LandmarkId, Landmark>& landmarks() const { return landmarks_; }
   /// All sub-maps by id, joined ones, too.
   const std::vector<Submap>& submaps() const { return submaps_; }
   /// Covisible keyframes of a living keyframe, ascending by id.
@@ -230,13 +230,13 @@ class Map {
     return covisibility_.at(id).edges;
   }
   /// Covisible keyframes of every living keyframe.
-  const CowTable<KeyframeId, Covisibility>& covisibility() const { return covisibility_; }
+  const CopyOnWriteTable<KeyframeId, Covisibility>& covisibility() const { return covisibility_; }
   /// Where each keyframe that is gone went.
-  const CowTable<KeyframeId, KeyframeForwarding>& keyframe_forwarding() const {
+  const CopyOnWriteTable<KeyframeId, KeyframeForwarding>& keyframe_forwarding() const {
     return keyframe_forwarding_;
   }
   /// What landmarks were merged into, for at least kRemembersMerged frames after that.
-  const CowTable<LandmarkId, LandmarkForwarding>& landmark_forwarding() const {
+  const CopyOnWriteTable<LandmarkId, LandmarkForwarding>& landmark_forwarding() const {
     return landmark_forwarding_;
   }
   /// The landmark that an id stands for now, through merges; invalid if erased or merged long ago.
@@ -248,7 +248,7 @@ class Map {
   /// The same, lengths in the units before any correction. For writers of files.
   const std::vector<LoopEdge>& measured_loop_edges() const { return loop_edges_; }
   /// Where keyframes lay before any loop moved them, as far as it was noted; of erased ones, too.
-  const CowTable<KeyframeId, OdometryNode>& odometry() const { return odometry_; }
+  const CopyOnWriteTable<KeyframeId, OdometryNode>& odometry() const { return odometry_; }
   /// The markers that hold the map in metres, by number; one may be there once per sub-map.
   const std::vector<MapMarker>& markers() const { return markers_; }
   /// Where a marker is, in metres in the frame of its sub-map.
@@ -304,7 +304,7 @@ class Map {
   /// Notes how the rig moved at a keyframe; its features stay as they are.
   void set_motion(KeyframeId id, const RigMotion& motion) { keyframes_.edit(id).motion = motion; }
   /// Sets the markers that a keyframe sees; null: none.
-  void set_sightings(KeyframeId id, std::shared_ptr<const MarkerSightings> markers) {
+  void set_markers(KeyframeId id, std::shared_ptr<const MarkerObservations> markers) {
     keyframes_.edit(id).markers = std::move(markers);
   }
   /// Takes the place of all markers there were.
@@ -325,7 +325,7 @@ class Map {
   /// Sets what a landmark looks like.
   void set_appearance(LandmarkId id, const Appearance& appearance);
   /// Adds to the counts of how often a landmark should have been and was seen.
-  void count_sightings(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found);
+  void count_visibility(LandmarkId id, std::uint32_t num_visible, std::uint32_t num_found);
 
   /// Recomputes everything derived from scratch; empty if sound, else what is wrong first.
   std::string broken_invariants() const;
@@ -338,14 +338,14 @@ class Map {
   void change_covisibility(KeyframeId a, KeyframeId b, int change);
   std::shared_ptr<const Features> kept(std::shared_ptr<const Features> features) const;
   /// From scratch; what is associated but not there is passed over.
-  CowTable<KeyframeId, Covisibility> count_covisibility() const;
+  CopyOnWriteTable<KeyframeId, Covisibility> count_covisibility() const;
 
-  CowTable<KeyframeId, Keyframe> keyframes_;
-  CowTable<LandmarkId, Landmark> landmarks_;
-  CowTable<KeyframeId, Covisibility> covisibility_;
-  CowTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
-  CowTable<LandmarkId, LandmarkForwarding> landmark_forwarding_;
-  CowTable<KeyframeId, OdometryNode> odometry_;
+  CopyOnWriteTable<KeyframeId, Keyframe> keyframes_;
+  CopyOnWriteTable<LandmarkId, Landmark> landmarks_;
+  CopyOnWriteTable<KeyframeId, Covisibility> covisibility_;
+  CopyOnWriteTable<KeyframeId, KeyframeForwarding> keyframe_forwarding_;
+  CopyOnWriteTable<LandmarkId, LandmarkForwarding> landmark_forwarding_;
+  CopyOnWriteTable<KeyframeId, OdometryNode> odometry_;
   std::shared_ptr<std::pmr::memory_resource> feature_memory_;  ///< Null: where they come from.
   FrameId newest_frame_{0};                                    ///< Of all keyframes that ever were.
   std::vector<Submap> submaps_;

@@ -206,7 +206,7 @@ class RandomEditor {
       case Edit::kSetAppearance:
         return map.set_appearance(landmark, {{rng_.next()}, random_point(), 0.1}), true;
       case Edit::kCountSightings:
-        return map.count_sightings(landmark, 2, 1), true;
+        return map.count_visibility(landmark, 2, 1), true;
       default:
         apply_correction(map, {{{keyframe, random_pose(), 1.5}}, {{landmark, random_point()}}});
         return true;

@@ -29,7 +29,7 @@ struct FilledPose {
 };
 
 /// How often the tracker should have seen a landmark since the last keyframe, and did.
-struct Sighting {
+struct LandmarkVisibility {
   LandmarkId landmark;            ///< Which one.
   std::uint32_t num_visible = 0;  ///< Frames in which it should have been seen.
   std::uint32_t num_found = 0;    ///< Frames in which it was.
@@ -37,13 +37,13 @@ struct Sighting {
 
 /// The tracker asks the mapper to add a frame to the map.
 struct NewKeyframe {
-  FrameId frame;                                             ///< Which one.
-  std::int64_t timestamp_ns = 0;                             ///< Of its images.
-  RelativePose pose;                                         ///< Moves with the map.
-  std::shared_ptr<const Features> features;                  ///< Never null.
-  std::vector<LandmarkId> landmarks;                         ///< Per feature, invalid where none.
-  std::vector<Sighting> sightings;                           ///< Ascending by landmark.
-  std::shared_ptr<const MarkerSightings> markers = nullptr;  ///< That it sees; null: none.
+  FrameId frame;                              ///< Which one.
+  std::int64_t timestamp_ns = 0;              ///< Of its images.
+  RelativePose pose;                          ///< Moves with the map.
+  std::shared_ptr<const Features> features;   ///< Never null.
+  std::vector<LandmarkId> landmarks;          ///< Per feature, invalid where none.
+  std::vector<LandmarkVisibility> sightings;  ///< Ascending by landmark.
+  std::shared_ptr<const MarkerObservations> markers = nullptr;  ///< That it sees; null: none.
 };
 
 /// A point of a new sub-map and the primary feature that sees it in each of its keyframes.
@@ -54,11 +54,11 @@ struct InitialLandmark {
 
 /// A keyframe of a new sub-map.
 struct InitialKeyframe {
-  FrameId frame;                                             ///< Which one.
-  std::int64_t timestamp_ns = 0;                             ///< Of its images.
-  Rigid3 rig_from_world;                                     ///< In the frame of the new sub-map.
-  std::shared_ptr<const Features> features;                  ///< Never null.
-  std::shared_ptr<const MarkerSightings> markers = nullptr;  ///< That it sees; null: none.
+  FrameId frame;                             ///< Which one.
+  std::int64_t timestamp_ns = 0;             ///< Of its images.
+  Rigid3 rig_from_world;                     ///< In the frame of the new sub-map.
+  std::shared_ptr<const Features> features;  ///< Never null.
+  std::shared_ptr<const MarkerObservations> markers = nullptr;  ///< That it sees; null: none.
 };
 
 /// The tracker starts a sub-map: one keyframe where there is stereo or depth, else two.

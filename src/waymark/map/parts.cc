@@ -157,7 +157,7 @@ Map Map::restore(MapParts parts) {
   for (const MapParts::ErasedKeyframe& erased : parts.erased_keyframes) {
     map.keyframe_forwarding_.put(erased.id, erased.forwarding);
   }
-  for (const MapParts::NotedOdometry& noted : parts.odometry) {
+  for (const MapParts::StoredOdometry& noted : parts.odometry) {
     map.odometry_.put(noted.id, noted.node);
   }
   for (const MapParts::MergedLandmark& merged : parts.merged_landmarks) {

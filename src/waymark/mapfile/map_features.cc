@@ -148,7 +148,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, std::shared_ptr
   return features;
 }
 
-std::shared_ptr<const MarkerSightings> read_markers(MapRecord& record, const Rig& rig) {
+std::shared_ptr<const MarkerObservations> read_markers(MapRecord& record, const Rig& rig) {
   if (!record.has("marker")) return nullptr;
   const auto numbers = record.array<std::uint32_t>("marker", std::nullopt);
   const std::size_t count = numbers.size();
@@ -159,9 +159,9 @@ std::shared_ptr<const MarkerSightings> read_markers(MapRecord& record, const Rig
   const auto pixels = record.array<Eigen::Vector2f>("marker_pixel", 4 * count);
   const auto bearings = record.array<Eigen::Vector3f>("marker_bearing", 4 * count);
   const auto slopes = record.array<Matrix23f>("marker_pixel_from_bearing", 4 * count, kSlopeRange);
-  auto sightings = std::make_shared<MarkerSightings>(count);
+  auto sightings = std::make_shared<MarkerObservations>(count);
   for (std::size_t i = 0; i < count; ++i) {
-    MarkerSighting& sighting = (*sightings)[i];
+    MarkerObservation& sighting = (*sightings)[i];
     if (numbers[i] > kMaxMarkerNumber || cameras[i] >= rig.cameras.size()) {
       record.fail(fmt::format("has marker {} of camera {}, expected one up to {} of {} cameras",
                               numbers[i],

@@ -130,9 +130,9 @@ StoredMap map_with_markers() {
   MapParts parts = take_apart(*stored.map);
   for (auto& [id, keyframe] : parts.keyframes) {
     if (id.value % 3 != 0) continue;
-    auto sightings = std::make_shared<MarkerSightings>(2);
+    auto sightings = std::make_shared<MarkerObservations>(2);
     for (std::size_t i = 0; i < 2; ++i) {
-      MarkerSighting& sighting = (*sightings)[i];
+      MarkerObservation& sighting = (*sightings)[i];
       sighting.id = static_cast<int>(i) + 7;
       for (std::size_t corner = 0; corner < 4; ++corner) {
         sighting.pixels[corner] = {10.0f * static_cast<float>(corner), 0.25f};

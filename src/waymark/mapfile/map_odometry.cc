@@ -55,9 +55,9 @@ void write_odometry(MapRecordWriter& writer, const Map& map, const std::vector<K
   }
 }
 
-std::vector<MapParts::NotedOdometry> read_odometry(MapRecord& record,
-                                                   KeyframeId end,
-                                                   KeyframeId& last) {
+std::vector<MapParts::StoredOdometry> read_odometry(MapRecord& record,
+                                                    KeyframeId end,
+                                                    KeyframeId& last) {
   const auto ids = record.ascending_ids("keyframe", kKeyframesPerRecord, end, last);
   const std::size_t count = ids.size();
   const auto parents = record.array<KeyframeId>("parent", count);
@@ -65,7 +65,7 @@ std::vector<MapParts::NotedOdometry> read_odometry(MapRecord& record,
   const auto translations = record.array<Eigen::Vector3d>("translation", count, kLengthRange);
   const auto scales = record.array<double>("scale", count, kScaleRange);
   const auto depths = record.array<double>("depth", count, kDepthRange);
-  std::vector<MapParts::NotedOdometry> rows;
+  std::vector<MapParts::StoredOdometry> rows;
   for (std::size_t i = 0; i < count; ++i) {
     const Eigen::Quaterniond rotation(rotations[i]);
     if (!(std::abs(rotation.norm() - 1.0) <= kMaxNormError)) {

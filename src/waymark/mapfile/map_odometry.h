@@ -18,8 +18,8 @@ void write_odometry(MapRecordWriter& writer, const Map& map, const std::vector<K
 
 /// What a record holds, ascending, of keyframes below `end` and above `last`, the last one of the
 /// records before, which it moves on. InputError for what cannot be.
-std::vector<MapParts::NotedOdometry> read_odometry(MapRecord& record,
-                                                   KeyframeId end,
-                                                   KeyframeId& last);
+std::vector<MapParts::StoredOdometry> read_odometry(MapRecord& record,
+                                                    KeyframeId end,
+                                                    KeyframeId& last);
 
 }  // namespace waymark

@@ -304,7 +304,7 @@ void MapReader::read_loop_edge(MapRecord& record) {
 }
 
 void MapReader::read_odometry(MapRecord& record) {
-  for (const MapParts::NotedOdometry& noted :
+  for (const MapParts::StoredOdometry& noted :
        waymark::read_odometry(record, parts_.end_keyframe, last_noted_)) {
     put(record, parts_.odometry, noted);
   }

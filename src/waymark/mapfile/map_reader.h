@@ -18,7 +18,7 @@ std::shared_ptr<const Features> read_features(MapRecord& record, std::shared_ptr
 
 /// Reads the markers that a keyframe of a rig sees; null where it has none. Throws InputError for
 /// what cannot be.
-std::shared_ptr<const MarkerSightings> read_markers(MapRecord& record, const Rig& rig);
+std::shared_ptr<const MarkerObservations> read_markers(MapRecord& record, const Rig& rig);
 
 /// Gathers a map from the records of version 1, which come in the order of kinds that
 /// docs/map-format.md gives, and the changes of its journal. What one record says is checked here;

@@ -49,13 +49,13 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   writer.add_array("inverse_range_sigma", features.inverse_range_sigma, kNotNegative);
 }
 
-void add_markers(MapRecordWriter& writer, const MarkerSightings& sightings) {
+void add_markers(MapRecordWriter& writer, const MarkerObservations& sightings) {
   std::vector<std::uint32_t> numbers;
   std::vector<std::uint8_t> cameras;
   std::vector<Eigen::Vector2f> pixels;
   std::vector<Eigen::Vector3f> bearings;
   std::vector<Matrix23f> slopes;
-  for (const MarkerSighting& sighting : sightings) {
+  for (const MarkerObservation& sighting : sightings) {
     numbers.push_back(static_cast<std::uint32_t>(sighting.id));
     cameras.push_back(sighting.camera);
     pixels.insert(pixels.end(), sighting.pixels.begin(), sighting.pixels.end());

@@ -90,8 +90,8 @@ TEST_F(Cull, ProbationErasesWhatIsRarelyFound) {
   RecentLandmarks recent_landmarks;
   recent_landmarks.add(landmarks_[0], 4);
   recent_landmarks.add(landmarks_[1], 4);
-  map_.count_sightings(landmarks_[0], 20, 4);
-  map_.count_sightings(landmarks_[1], 20, 5);
+  map_.count_visibility(landmarks_[0], 20, 4);
+  map_.count_visibility(landmarks_[1], 20, 5);
   recent_landmarks.review(map_, 5, dirty_);
   EXPECT_FALSE(map_.landmarks().contains(landmarks_[0]));
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[1]));
@@ -116,7 +116,7 @@ TEST_F(Cull, ProbationEndsForThoseThatStoodTheTest) {
   RecentLandmarks recent_landmarks;
   recent_landmarks.add(landmarks_[0], 1);
   recent_landmarks.review(map_, 4, dirty_);
-  map_.count_sightings(landmarks_[0], 100, 0);
+  map_.count_visibility(landmarks_[0], 100, 0);
   recent_landmarks.review(map_, 5, dirty_);
   EXPECT_TRUE(map_.landmarks().contains(landmarks_[0]));
 }

@@ -109,10 +109,10 @@ void Mapper::look_for_readout(KeyframeId newest) {
 }
 
 KeyframeId Mapper::insert(const NewKeyframe& message) {
-  for (const Sighting& sighting : message.sightings) {
+  for (const LandmarkVisibility& sighting : message.sightings) {
     const LandmarkId landmark = map_.resolve(sighting.landmark);
     if (landmark.is_valid()) {
-      map_.count_sightings(landmark, sighting.num_visible, sighting.num_found);
+      map_.count_visibility(landmark, sighting.num_visible, sighting.num_found);
     }
   }
   Keyframe keyframe;
@@ -138,7 +138,7 @@ KeyframeId Mapper::insert(const NewKeyframe& message) {
 }
 
 void Mapper::set_measurements(const std::shared_ptr<const Features>& features,
-                              const std::shared_ptr<const MarkerSightings>& markers,
+                              const std::shared_ptr<const MarkerObservations>& markers,
                               Keyframe& keyframe) const {
   keyframe.motion = features->motion;
   const bool is_up_to_date = features->rig == calibration_.rig;
@@ -155,7 +155,7 @@ void Mapper::set_calibration(const KnownCalibration& calibration) {
   for (const KeyframeId id : seen_so) {
     const Keyframe& keyframe = map_.keyframes().at(id);
     map_.recompute_keyframe(id, recompute(*keyframe.features, calibration.rig, keyframe.motion));
-    map_.set_sightings(id, recompute(map_.keyframes().at(id).markers, *calibration.rig));
+    map_.set_markers(id, recompute(map_.keyframes().at(id).markers, *calibration.rig));
     for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
       if (landmark.is_valid()) dirty_.insert(landmark);
     }

@@ -62,7 +62,7 @@ class Mapper {
   KeyframeId insert(const NewKeyframe& message);
   /// Puts in what was measured, by the calibration of now.
   void set_measurements(const std::shared_ptr<const Features>& features,
-                        const std::shared_ptr<const MarkerSightings>& markers,
+                        const std::shared_ptr<const MarkerObservations>& markers,
                         Keyframe& keyframe) const;
   void look_for_readout(KeyframeId newest);
   void set_calibration(const KnownCalibration& calibration);

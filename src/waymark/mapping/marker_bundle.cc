@@ -17,7 +17,7 @@ constexpr double kSquareSigma = 1e-3;
 
 struct MarkerInKeyframe {
   std::uint32_t pose;
-  const MarkerSighting* marker;
+  const MarkerObservation* marker;
 };
 
 std::vector<MarkerInKeyframe> list_sightings(const Map& map,
@@ -28,7 +28,7 @@ std::vector<MarkerInKeyframe> list_sightings(const Map& map,
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     const Keyframe& keyframe = map.keyframes().at(keyframes[i]);
     if (!keyframe.markers || keyframe.submap != submap) continue;
-    for (const MarkerSighting& marker : *keyframe.markers) {
+    for (const MarkerObservation& marker : *keyframe.markers) {
       if (marker.id == of_map.id) sightings.push_back({static_cast<std::uint32_t>(i), &marker});
     }
   }
@@ -61,7 +61,7 @@ Measurement corner_measurement(const Rig& rig, std::size_t corner, double side) 
   return measured;
 }
 
-Measurement sighting_measurement(const MarkerSighting& marker, std::size_t corner) {
+Measurement sighting_measurement(const MarkerObservation& marker, std::size_t corner) {
   return {marker.camera,
           marker.bearings[corner],
           marker.pixel_from_bearing[corner] / static_cast<float>(kCornerSigmaPx)};

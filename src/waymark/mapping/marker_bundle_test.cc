@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "waymark/mapping/markers.h"
-#include "waymark/marker/testing/sightings.h"
+#include "waymark/marker/testing/observations.h"
 
 namespace waymark {
 namespace {
@@ -33,7 +33,7 @@ class MarkerBundleTest : public ::testing::Test {
       keyframe.rig_from_world = {truth.rotation, kWrongScale * truth.translation};
       keyframe.features = features;
       if (k > 0) keyframe.parent = KeyframeId{static_cast<std::uint32_t>(k - 1)};
-      keyframe.markers = std::make_shared<const MarkerSightings>(MarkerSightings{
+      keyframe.markers = std::make_shared<const MarkerObservations>(MarkerObservations{
           testing::make_sighting(4, truth * hung_, kSide, 0.05, static_cast<std::uint64_t>(k))});
       keyframes_.push_back(map_.add_keyframe(std::move(keyframe)));
       truth_.push_back(truth);

@@ -17,7 +17,7 @@ std::map<int, std::vector<MarkerView>> list_views(const Map& map, SubmapId subma
   std::map<int, std::vector<MarkerView>> views;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     if (keyframe.submap != submap || !keyframe.markers) return;
-    for (const MarkerSighting& sighting : *keyframe.markers) {
+    for (const MarkerObservation& sighting : *keyframe.markers) {
       const Rigid3& cam_from_rig = keyframe.rig().cameras[sighting.camera].cam_from_rig;
       views[sighting.id].push_back(
           {cam_from_rig * keyframe.rig_from_world, keyframe.timestamp_ns, &sighting});
@@ -35,7 +35,7 @@ KeyframeId reference_of(const Map& map, SubmapId submap, int id, const Eigen::Ve
   double least = 0.0;
   map.keyframes().for_each([&](KeyframeId keyframe_id, const Keyframe& keyframe) {
     if (keyframe.submap != submap || !keyframe.markers) return;
-    if (!std::ranges::count(*keyframe.markers, id, &MarkerSighting::id)) return;
+    if (!std::ranges::count(*keyframe.markers, id, &MarkerObservation::id)) return;
     const double distance = (keyframe.rig_from_world * position).norm();
     if (nearest.is_valid() && distance >= least) return;
     nearest = keyframe_id;
@@ -87,7 +87,7 @@ void note_markers(Map& map,
     if (map.submap_of(marker) != submap) markers.push_back(marker);
   }
   for (const SurveyedMarker& surveyed : survey.markers) {
-    if (surveyed.verdict != MarkerVerdict::kSound) continue;
+    if (surveyed.verdict != MarkerStatus::kSound) continue;
     const Sim3 placed = world_from_map * surveyed.map_from_marker;
     Rigid3 world_from_marker(placed.rotation, placed.translation);
     MapMarker marker;

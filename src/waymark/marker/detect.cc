@@ -11,7 +11,7 @@
 
 #include "waymark/camera/tangent.h"
 #include "waymark/image/opencv_image.h"
-#include "waymark/marker/outline.h"
+#include "waymark/marker/corner_refinement.h"
 #include "waymark/marker/pattern_fit.h"
 
 namespace waymark {
@@ -42,14 +42,14 @@ bool is_clockwise(const Corners& corners) {
   return a.x() * b.y() - a.y() * b.x() > 0.0;
 }
 
-std::optional<MarkerSighting> sighting_of(int id,
-                                          const Corners& corners,
-                                          const Camera& camera,
-                                          std::uint8_t camera_index) {
+std::optional<MarkerObservation> sighting_of(int id,
+                                             const Corners& corners,
+                                             const Camera& camera,
+                                             std::uint8_t camera_index) {
   constexpr std::array<float, 4> kLevelScales = {1.0f, 1.0f, 1.0f, 1.0f};
   TangentComputer computer;
   const TangentArrays& tangents = computer.compute(camera, corners, kLevelScales);
-  MarkerSighting sighting;
+  MarkerObservation sighting;
   sighting.id = id;
   sighting.camera = camera_index;
   for (std::size_t i = 0; i < 4; ++i) {
@@ -100,10 +100,10 @@ bool are_near(const Corners& expected, const Corners& found) {
 
 }  // namespace
 
-MarkerSightings MarkerDetector::detect(ImageView image,
-                                       const Camera& camera,
-                                       std::uint8_t camera_index) const {
-  MarkerSightings sightings;
+MarkerObservations MarkerDetector::detect(ImageView image,
+                                          const Camera& camera,
+                                          std::uint8_t camera_index) const {
+  MarkerObservations sightings;
   if (image.width_px < 8 || image.height_px < 8) return sightings;
   std::vector<std::vector<cv::Point2f>> outlines;
   std::vector<int> ids;
@@ -116,21 +116,21 @@ MarkerSightings MarkerDetector::detect(ImageView image,
     Corners corners;
     for (std::size_t k = 0; k < 4; ++k) corners[k] = {outlines[i][k].x, outlines[i][k].y};
     if (!is_clockwise(corners)) continue;
-    const auto refined = refine_outline(image, camera, corners, family_.side_modules());
+    const auto refined = refine_marker_corners(image, camera, corners, family_.side_modules());
     if (!refined) continue;
     if (auto sighting = sighting_of(ids[i], *refined, camera, camera_index)) {
       sightings.push_back(*sighting);
     }
   }
-  std::ranges::stable_sort(sightings, {}, &MarkerSighting::id);
+  std::ranges::stable_sort(sightings, {}, &MarkerObservation::id);
   return sightings;
 }
 
-MarkerSightings MarkerDetector::confirm(ImageView image,
-                                        const Camera& camera,
-                                        std::uint8_t camera_index,
-                                        std::span<const ExpectedMarker> expected) const {
-  MarkerSightings sightings;
+MarkerObservations MarkerDetector::confirm(ImageView image,
+                                           const Camera& camera,
+                                           std::uint8_t camera_index,
+                                           std::span<const ExpectedMarker> expected) const {
+  MarkerObservations sightings;
   for (const ExpectedMarker& marker : expected) {
     if (marker.id < 0 || marker.id >= family_.size() || !(marker.side > 0.0)) continue;
     Rigid3 cam_from_marker = marker.cam_from_marker;
@@ -149,11 +149,11 @@ MarkerSightings MarkerDetector::confirm(ImageView image,
   return sightings;
 }
 
-std::shared_ptr<const MarkerSightings> recompute(
-    const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig) {
+std::shared_ptr<const MarkerObservations> recompute(
+    const std::shared_ptr<const MarkerObservations>& sightings, const Rig& rig) {
   if (!sightings) return nullptr;
-  auto anew = std::make_shared<MarkerSightings>();
-  for (const MarkerSighting& sighting : *sightings) {
+  auto anew = std::make_shared<MarkerObservations>();
+  for (const MarkerObservation& sighting : *sightings) {
     Corners corners;
     for (std::size_t i = 0; i < 4; ++i) corners[i] = sighting.pixels[i].cast<double>();
     const Camera& camera = *rig.cameras.at(sighting.camera).camera;

@@ -25,7 +25,7 @@ struct ExpectedMarker {
 
 /// Finds the markers of a family in images of any central camera. Candidates and numbers are
 /// OpenCV's (Garrido-Jurado et al. 2014); corners are measured anew as meetings of the outline's
-/// sides, see refine_outline(). The same image gives the same result.
+/// sides, see refine_marker_corners(). The same image gives the same result.
 class MarkerDetector {
  public:
   /// Of one family.
@@ -33,14 +33,14 @@ class MarkerDetector {
 
   /// The markers of an image of that camera, by id. Those whose corners are not all in the field of
   /// view or whose outline does not fit a square's are left out. camera_index: of the sightings.
-  MarkerSightings detect(ImageView image, const Camera& camera, std::uint8_t camera_index) const;
+  MarkerObservations detect(ImageView image, const Camera& camera, std::uint8_t camera_index) const;
 
   /// Those of expected markers that the image shows where they are expected, see fit_pattern(). As
   /// their numbers need not be read, they may be far smaller and seen from further aside.
-  MarkerSightings confirm(ImageView image,
-                          const Camera& camera,
-                          std::uint8_t camera_index,
-                          std::span<const ExpectedMarker> expected) const;
+  MarkerObservations confirm(ImageView image,
+                             const Camera& camera,
+                             std::uint8_t camera_index,
+                             std::span<const ExpectedMarker> expected) const;
 
   /// What is looked for.
   const MarkerFamily& family() const { return family_; }
@@ -51,7 +51,7 @@ class MarkerDetector {
 
 /// The same sightings as a rig that is calibrated otherwise measures their pixels, without those
 /// that it has no bearings of; null as it was.
-std::shared_ptr<const MarkerSightings> recompute(
-    const std::shared_ptr<const MarkerSightings>& sightings, const Rig& rig);
+std::shared_ptr<const MarkerObservations> recompute(
+    const std::shared_ptr<const MarkerObservations>& sightings, const Rig& rig);
 
 }  // namespace waymark

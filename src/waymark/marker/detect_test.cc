@@ -55,7 +55,7 @@ double corner_error_px(const MarkerDetector& detector,
                        const Image& image,
                        int id,
                        const Rigid3& cam_from_marker) {
-  for (const MarkerSighting& sighting : detector.detect(image.view(), camera, 0)) {
+  for (const MarkerObservation& sighting : detector.detect(image.view(), camera, 0)) {
     EXPECT_EQ(sighting.id, id);
     if (sighting.id == id) return std::sqrt(squared_error_px(sighting, cam_from_marker, kSide));
   }
@@ -139,7 +139,7 @@ TEST_P(ConfirmView, FindsWhatIsTooSmallOrTooSlantingToBeRead) {
         aside, view.focal_px * kSide / view.side_px, view.tilt_deg * kRadPerDegree, 0.4 * id);
     const Image image = photograph(*camera, detector.family(), id, pose, view.blur_px);
     const std::vector<ExpectedMarker> expected = {{id, kSide, about(pose, view.focal_px)}};
-    const MarkerSightings found = detector.confirm(image.view(), *camera, 1, expected);
+    const MarkerObservations found = detector.confirm(image.view(), *camera, 1, expected);
     ASSERT_EQ(found.size(), 1u);
     EXPECT_EQ(found[0].id, id);
     EXPECT_EQ(found[0].camera, 1);

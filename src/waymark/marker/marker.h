@@ -14,7 +14,7 @@ namespace waymark {
 
 /// A marker as one image shows it. Corners run clockwise as one looks at the marker: top left, top
 /// right, bottom right, bottom left of its upright print.
-struct MarkerSighting {
+struct MarkerObservation {
   int id = 0;                               ///< Its number within the family.
   std::uint8_t camera = 0;                  ///< Index in the rig.
   std::array<Eigen::Vector2f, 4> pixels;    ///< Of the corners, sub-pixel.
@@ -24,7 +24,7 @@ struct MarkerSighting {
 };
 
 /// All markers of a frame, by id, then as found.
-using MarkerSightings = std::vector<MarkerSighting>;
+using MarkerObservations = std::vector<MarkerObservation>;
 
 /// A corner in the frame of a marker: its middle is the origin, x points to the right of the print,
 /// y up, z out of it to who looks at it. side: of the black square, in any unit.

@@ -33,11 +33,11 @@ struct Witness {
 std::vector<Witness> list_witnesses(const KnownMarkers& known, std::span<SurveyedMarker> markers) {
   std::vector<Witness> witnesses;
   for (SurveyedMarker& marker : markers) {
-    if (marker.verdict != MarkerVerdict::kSound) continue;
+    if (marker.verdict != MarkerStatus::kSound) continue;
     marker.expected = known.size_of(marker.id);
-    if (!(marker.expected > 0.0)) marker.verdict = MarkerVerdict::kNoSize;
-    if (marker.side_sigma > kMaxSideSigma) marker.verdict = MarkerVerdict::kFewViews;
-    if (marker.verdict != MarkerVerdict::kSound) continue;
+    if (!(marker.expected > 0.0)) marker.verdict = MarkerStatus::kNoSize;
+    if (marker.side_sigma > kMaxSideSigma) marker.verdict = MarkerStatus::kFewViews;
+    if (marker.verdict != MarkerStatus::kSound) continue;
     witnesses.push_back({&marker,
                          std::log(marker.expected / marker.map_from_marker.scale),
                          std::hypot(marker.side_sigma, kLeastSideSigma)});
@@ -157,7 +157,7 @@ std::optional<SurveyFit> fit_sound_survey(const KnownMarkers& known,
     SurveyedMarker& wrong = *markers[left_out];
     const Eigen::Vector3d there = best->world_from_map * wrong.map_from_marker.translation;
     wrong.found = (there - known.pose_of(wrong.id)->translation).norm();
-    wrong.verdict = MarkerVerdict::kMisplaced;
+    wrong.verdict = MarkerStatus::kMisplaced;
     markers.erase(markers.begin() + static_cast<std::ptrdiff_t>(left_out));
     fit = best;
   }
@@ -176,7 +176,7 @@ std::optional<MarkerFrame> fit_marker_frame(const KnownMarkers& known,
   for (const Witness& witness : witnesses) {
     SurveyedMarker& marker = *witness.marker;
     if (!agreed || !agree(witness.log_scale, agreed->log_scale, witness.sigma)) {
-      marker.verdict = MarkerVerdict::kWrongSize;
+      marker.verdict = MarkerStatus::kWrongSize;
       marker.found = agreed ? std::exp(agreed->log_scale) * marker.map_from_marker.scale : 0.0;
       continue;
     }
@@ -203,21 +203,21 @@ std::optional<MarkerFrame> fit_marker_frame(const KnownMarkers& known,
   return frame;
 }
 
-std::string to_string(MarkerVerdict verdict) {
+std::string to_string(MarkerStatus verdict) {
   switch (verdict) {
-    case MarkerVerdict::kSound:
+    case MarkerStatus::kSound:
       return "used";
-    case MarkerVerdict::kFewViews:
+    case MarkerStatus::kFewViews:
       return "few views";
-    case MarkerVerdict::kMoved:
+    case MarkerStatus::kMoved:
       return "moved";
-    case MarkerVerdict::kTwice:
+    case MarkerStatus::kTwice:
       return "twice";
-    case MarkerVerdict::kWrongSize:
+    case MarkerStatus::kWrongSize:
       return "wrong size";
-    case MarkerVerdict::kMisplaced:
+    case MarkerStatus::kMisplaced:
       return "misplaced";
-    case MarkerVerdict::kNoSize:
+    case MarkerStatus::kNoSize:
       return "no size";
   }
   return "unknown";
@@ -238,28 +238,28 @@ std::string to_string(MarkerFrame::Basis basis) {
 std::string describe_fault(const SurveyedMarker& marker) {
   const std::string name = fmt::format("marker {}", marker.id);
   switch (marker.verdict) {
-    case MarkerVerdict::kSound:
+    case MarkerStatus::kSound:
       return "";
-    case MarkerVerdict::kFewViews:
+    case MarkerStatus::kFewViews:
       return fmt::format("{}: seen in {} keyframes, too few or too much alike to tell where it is",
                          name,
                          marker.num_views);
-    case MarkerVerdict::kMoved:
+    case MarkerStatus::kMoved:
       return fmt::format("{}: was moved, it is elsewhere from {:.3f} s on; left out",
                          name,
                          1e-9 * static_cast<double>(marker.changed_ns));
-    case MarkerVerdict::kTwice:
+    case MarkerStatus::kTwice:
       return name + ": is there twice; left out";
-    case MarkerVerdict::kWrongSize:
+    case MarkerStatus::kWrongSize:
       if (!(marker.found > 0.0)) return name + ": the sizes of markers contradict each other";
       return fmt::format("{}: its side is {:.4f} m by the others, {:.4f} m was said; left out",
                          name,
                          marker.found,
                          marker.expected);
-    case MarkerVerdict::kMisplaced:
+    case MarkerStatus::kMisplaced:
       return fmt::format(
           "{}: is {:.3f} m away from its surveyed place; left out", name, marker.found);
-    case MarkerVerdict::kNoSize:
+    case MarkerStatus::kNoSize:
       return name + ": nothing says how large it is; left out";
   }
   return "";

@@ -15,7 +15,7 @@ constexpr double kLeastCosine = 0.05;
 
 /// The frame of a camera that looks at the middle of the square, with its upper side level: any
 /// part of any image is then as of a perspective camera.
-Eigen::Quaterniond turn_ahead(const MarkerSighting& sighting) {
+Eigen::Quaterniond turn_ahead(const MarkerObservation& sighting) {
   const auto bearing = [&](std::size_t i) { return sighting.bearings[i].cast<double>().eval(); };
   const Eigen::Vector3d ahead = (bearing(0) + bearing(1) + bearing(2) + bearing(3)).normalized();
   const Eigen::Vector3d right = bearing(1) + bearing(2) - bearing(0) - bearing(3);
@@ -40,7 +40,7 @@ Rigid3 rigid_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
 
 }  // namespace
 
-double squared_error_px(const MarkerSighting& sighting,
+double squared_error_px(const MarkerObservation& sighting,
                         const Rigid3& cam_from_marker,
                         double side) {
   double sum = 0.0;
@@ -54,7 +54,7 @@ double squared_error_px(const MarkerSighting& sighting,
   return sum / 4.0;
 }
 
-double mean_side_px(const MarkerSighting& sighting) {
+double mean_side_px(const MarkerObservation& sighting) {
   float sum = 0.0f;
   for (std::size_t i = 0; i < 4; ++i) {
     // By bearings: pixels jump at the seam of 360 degree images.
@@ -65,7 +65,7 @@ double mean_side_px(const MarkerSighting& sighting) {
   return sum / 4.0;
 }
 
-std::vector<Rigid3> square_poses(const MarkerSighting& sighting, double side) {
+std::vector<Rigid3> square_poses(const MarkerObservation& sighting, double side) {
   const Eigen::Quaterniond ahead_from_cam = turn_ahead(sighting);
   if (!ahead_from_cam.coeffs().allFinite()) return {};
   std::vector<cv::Point3d> corners;

@@ -4,7 +4,7 @@
 
 #include <gmock/gmock.h>
 
-#include "waymark/marker/testing/sightings.h"
+#include "waymark/marker/testing/observations.h"
 
 namespace waymark {
 namespace {
@@ -26,7 +26,7 @@ TEST(SquarePoseTest, OneOfTheTwoPosesIsThatFromWhichItWasSeen) {
 
 TEST(SquarePoseTest, TheOtherPoseOfASmallMarkerFitsNearlyAsWell) {
   const Rigid3 pose = look_at_marker({0.0, 0.0, 1.0}, 8.0, 0.4, 0.0);
-  const MarkerSighting sighting = make_sighting(2, pose, 0.2);
+  const MarkerObservation sighting = make_sighting(2, pose, 0.2);
   const auto found = square_poses(sighting, 0.2);
   ASSERT_EQ(found.size(), 2u);
   EXPECT_GT((found[0].rotation.inverse() * found[1].rotation).vec().norm(), 0.2);
@@ -34,7 +34,7 @@ TEST(SquarePoseTest, TheOtherPoseOfASmallMarkerFitsNearlyAsWell) {
 }
 
 TEST(SquarePoseTest, CornersOnALineGiveNoPoseThatIsNotFinite) {
-  MarkerSighting sighting = make_sighting(2, look_at_marker({0, 0, 1}, 2.0, 0.0, 0.0), 0.2);
+  MarkerObservation sighting = make_sighting(2, look_at_marker({0, 0, 1}, 2.0, 0.0, 0.0), 0.2);
   for (std::size_t i = 0; i < 4; ++i) {
     sighting.bearings[i] = Eigen::Vector3f(0.01f * static_cast<float>(i), 0.0f, 1.0f).normalized();
   }

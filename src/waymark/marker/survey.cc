@@ -61,7 +61,7 @@ void add_corner(const MarkerView& view,
                 std::size_t i,
                 const Sim3& map_from_marker,
                 Equations& sum) {
-  const MarkerSighting& sighting = *view.sighting;
+  const MarkerObservation& sighting = *view.sighting;
   const Eigen::Vector3d corner = marker_corner(i, 1.0);
   const Eigen::Vector3d in_cam = view.cam_from_map * (map_from_marker * corner);
   const double range = std::max(in_cam.norm(), 1e-12);
@@ -122,7 +122,7 @@ Equations refine(const Views& views, int max_iterations, Sim3& map_from_marker) 
   return now;
 }
 
-Eigen::Vector3d middle_bearing(const MarkerSighting& sighting) {
+Eigen::Vector3d middle_bearing(const MarkerObservation& sighting) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
   for (const Eigen::Vector3f& bearing : sighting.bearings) sum += bearing.cast<double>();
   return sum.normalized();
@@ -256,7 +256,7 @@ void judge_other_places(const Views& others, const Views& chosen, SurveyedMarker
       return a.front()->timestamp_ns > b.back()->timestamp_ns;
     };
     const bool is_in_turn = later(there, chosen) || later(chosen, there);
-    marker.verdict = is_in_turn ? MarkerVerdict::kMoved : MarkerVerdict::kTwice;
+    marker.verdict = is_in_turn ? MarkerStatus::kMoved : MarkerStatus::kTwice;
     marker.changed_ns = std::max(there.front()->timestamp_ns, chosen.front()->timestamp_ns);
     return;
   }
@@ -281,7 +281,7 @@ SurveyedMarker survey_marker(int id, std::span<const MarkerView> all) {
   Views views;
   for (const MarkerView& view : all) views.push_back(&view);
   marker.num_views = count_moments(views);
-  if (is_twice_in_an_image(views)) marker.verdict = MarkerVerdict::kTwice;
+  if (is_twice_in_an_image(views)) marker.verdict = MarkerStatus::kTwice;
   if (marker.num_views < kMinViews) return marker;
   const std::vector<Hypothesis> hypotheses = list_hypotheses(views);
   if (hypotheses.empty()) return marker;
@@ -296,13 +296,13 @@ SurveyedMarker survey_marker(int id, std::span<const MarkerView> all) {
   const Matrix7d covariance = equations.information.ldlt().solve(Matrix7d::Identity()) *
                               std::pow(std::max(sigma_px, kCornerSigmaPx), 2);
   marker.side_sigma = covariance(6, 6) > 0.0 ? std::sqrt(covariance(6, 6)) : 1.0;
-  if (marker.verdict == MarkerVerdict::kTwice) return marker;
+  if (marker.verdict == MarkerStatus::kTwice) return marker;
   Views others;
   for (const MarkerView* view : views) {
     if (std::ranges::find(chosen, view) == chosen.end()) others.push_back(view);
   }
   if (is_ambiguous(chosen, marker.map_from_marker, equations.cost, hypotheses)) return marker;
-  marker.verdict = MarkerVerdict::kSound;
+  marker.verdict = MarkerStatus::kSound;
   judge_other_places(others, chosen, marker);
   return marker;
 }

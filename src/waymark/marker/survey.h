@@ -18,13 +18,13 @@ namespace waymark {
 
 /// A marker seen from a place of a map.
 struct MarkerView {
-  Rigid3 cam_from_map;                       ///< In units of the map.
-  std::int64_t timestamp_ns = 0;             ///< Of the image.
-  const MarkerSighting* sighting = nullptr;  ///< Not null; outlives the view.
+  Rigid3 cam_from_map;                          ///< In units of the map.
+  std::int64_t timestamp_ns = 0;                ///< Of the image.
+  const MarkerObservation* sighting = nullptr;  ///< Not null; outlives the view.
 };
 
 /// What came of a marker.
-enum class MarkerVerdict : std::uint8_t {
+enum class MarkerStatus : std::uint8_t {
   kSound,      ///< All fits.
   kFewViews,   ///< Seen too little, or from one side only, so that two poses may be.
   kMoved,      ///< It was in one place first and in another later.
@@ -36,8 +36,8 @@ enum class MarkerVerdict : std::uint8_t {
 
 /// A marker in a map.
 struct SurveyedMarker {
-  int id = 0;                                        ///< Its number.
-  MarkerVerdict verdict = MarkerVerdict::kFewViews;  ///< Only what is sound is used.
+  int id = 0;                                      ///< Its number.
+  MarkerStatus verdict = MarkerStatus::kFewViews;  ///< Only what is sound is used.
   Sim3 map_from_marker;         ///< Of a square of side 1: its scale is the side in map units.
   double side_sigma = 0.0;      ///< Of the side, as a part of it.
   double rms_px = 0.0;          ///< Of the corners, of the views that fit.
@@ -79,6 +79,6 @@ std::string describe_fault(const SurveyedMarker& marker);
 std::string to_string(MarkerFrame::Basis basis);
 
 /// One word or two: "used", "few views", "moved", "twice", "wrong size", "misplaced", "no size".
-std::string to_string(MarkerVerdict verdict);
+std::string to_string(MarkerStatus verdict);
 
 }  // namespace waymark

@@ -8,7 +8,7 @@
 #include <deque>
 #include <vector>
 
-#include "waymark/marker/testing/sightings.h"
+#include "waymark/marker/testing/observations.h"
 
 namespace waymark {
 namespace {
@@ -57,14 +57,14 @@ class Scene {
 
  private:
   double unit_;
-  std::deque<MarkerSighting> sightings_;
+  std::deque<MarkerObservation> sightings_;
 };
 
 TEST(SurveyMarkerTest, FindsPoseAndSizeInUnitsOfTheMap) {
   Scene scene(2.5);
   const Rigid3 truth = Scene::hung(0.4, 0.1);
   const SurveyedMarker marker = scene.survey(3, truth, 0.2);
-  EXPECT_EQ(marker.verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(marker.verdict, MarkerStatus::kSound);
   EXPECT_EQ(marker.num_fitting, 12u);
   EXPECT_NEAR(2.5 * marker.map_from_marker.scale, 0.2, 0.2 * 0.005);
   EXPECT_LT((2.5 * marker.map_from_marker.translation - truth.translation).norm(), 0.005);
@@ -77,12 +77,12 @@ TEST(SurveyMarkerTest, LeavesOutViewsThatAreWrong) {
   std::vector<MarkerView> views = scene.views(3, Scene::hung(0.4, 0.1), 0.2);
   views[4].cam_from_map.translation.x() += 0.3;
   const SurveyedMarker marker = survey_marker(3, views);
-  EXPECT_EQ(marker.verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(marker.verdict, MarkerStatus::kSound);
   EXPECT_EQ(marker.num_fitting, 11u);
 }
 
 TEST(SurveyMarkerTest, OneSmallSquareSeenFromOnePlaceStaysAmbiguous) {
-  std::deque<MarkerSighting> sightings;
+  std::deque<MarkerObservation> sightings;
   std::vector<MarkerView> views;
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(EIGEN_PI - 0.4, Eigen::Vector3d::UnitX()));
   for (int k = 0; k < 4; ++k) {
@@ -94,7 +94,7 @@ TEST(SurveyMarkerTest, OneSmallSquareSeenFromOnePlaceStaysAmbiguous) {
                                       7 + static_cast<std::uint64_t>(k)));
     views.push_back({camera, k, &sightings.back()});
   }
-  EXPECT_EQ(survey_marker(1, views).verdict, MarkerVerdict::kFewViews);
+  EXPECT_EQ(survey_marker(1, views).verdict, MarkerStatus::kFewViews);
 }
 
 TEST(SurveyMarkerTest, SeesThatAMarkerWasMoved) {
@@ -103,7 +103,7 @@ TEST(SurveyMarkerTest, SeesThatAMarkerWasMoved) {
   for (const MarkerView& view : scene.views(3, Scene::hung(-0.3, 0.2), 0.2, 7, 12))
     views.push_back(view);
   const SurveyedMarker marker = survey_marker(3, views);
-  EXPECT_EQ(marker.verdict, MarkerVerdict::kMoved);
+  EXPECT_EQ(marker.verdict, MarkerStatus::kMoved);
   EXPECT_EQ(marker.changed_ns, 7'000'000'000);
   EXPECT_THAT(describe_fault(marker),
               HasSubstr("marker 3: was moved, it is elsewhere from 7.000 s on"));
@@ -120,8 +120,8 @@ TEST(SurveyMarkerTest, SeesThatAMarkerIsThereTwice) {
     at_once.push_back(here[k]);
     if (k == 5) at_once.push_back(there[k]);
   }
-  EXPECT_EQ(survey_marker(3, in_turn).verdict, MarkerVerdict::kTwice);
-  EXPECT_EQ(survey_marker(3, at_once).verdict, MarkerVerdict::kTwice);
+  EXPECT_EQ(survey_marker(3, in_turn).verdict, MarkerStatus::kTwice);
+  EXPECT_EQ(survey_marker(3, at_once).verdict, MarkerStatus::kTwice);
   EXPECT_THAT(describe_fault(survey_marker(3, at_once)), HasSubstr("is there twice"));
 }
 
@@ -129,7 +129,7 @@ TEST(SurveyMarkerTest, SeesThatAMarkerIsThereTwice) {
 TEST(SurveyMarkerTest, ImagesOfAPairCountOnce) {
   Scene scene;
   const Rigid3 truth = Scene::hung(0.4, 0.1);
-  std::deque<MarkerSighting> right;
+  std::deque<MarkerObservation> right;
   std::vector<MarkerView> views;
   for (const MarkerView& left : scene.views(3, truth, 0.2)) {
     views.push_back(left);
@@ -140,10 +140,10 @@ TEST(SurveyMarkerTest, ImagesOfAPairCountOnce) {
     views.push_back({right_from_map, left.timestamp_ns, &right.back()});
   }
   const SurveyedMarker marker = survey_marker(3, views);
-  EXPECT_EQ(marker.verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(marker.verdict, MarkerStatus::kSound);
   EXPECT_EQ(marker.num_views, 12u);
   EXPECT_EQ(marker.num_fitting, 12u);
-  EXPECT_EQ(survey_marker(3, std::span(views).first(4)).verdict, MarkerVerdict::kFewViews);
+  EXPECT_EQ(survey_marker(3, std::span(views).first(4)).verdict, MarkerStatus::kFewViews);
 }
 
 KnownMarkers six_of(double size_m) {
@@ -181,10 +181,10 @@ TEST(MarkerFrameTest, LeavesOutTheOneOfSixWhoseSizeIsWrong) {
   const auto frame = fit_marker_frame(six_of(0.2), false, markers);
   ASSERT_TRUE(frame);
   EXPECT_NEAR(frame->world_from_map.scale, 2.5, 2.5 * 0.005);
-  EXPECT_EQ(markers[2].verdict, MarkerVerdict::kWrongSize);
+  EXPECT_EQ(markers[2].verdict, MarkerStatus::kWrongSize);
   EXPECT_NEAR(markers[2].found, 0.25, 0.002);
   EXPECT_THAT(describe_fault(markers[2]), HasSubstr("m by the others, 0.2000 m was said"));
-  EXPECT_EQ(markers[3].verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(markers[3].verdict, MarkerStatus::kSound);
 }
 
 TEST(MarkerFrameTest, TwoThatContradictEachOtherTellNoScale) {
@@ -199,10 +199,10 @@ TEST(MarkerFrameTest, AMapInMetresKeepsItsScaleAndJudgesSizes) {
   Scene scene;
   std::vector<SurveyedMarker> markers = {scene.survey(4, Scene::hung(0.0, 0.0), 0.25)};
   fit_marker_frame(six_of(0.2), true, markers);
-  EXPECT_EQ(markers[0].verdict, MarkerVerdict::kWrongSize);
+  EXPECT_EQ(markers[0].verdict, MarkerStatus::kWrongSize);
   markers = {scene.survey(4, Scene::hung(0.0, 0.0), 0.2)};
   ASSERT_TRUE(fit_marker_frame(six_of(0.2), true, markers));
-  EXPECT_EQ(markers[0].verdict, MarkerVerdict::kSound);
+  EXPECT_EQ(markers[0].verdict, MarkerStatus::kSound);
 }
 
 TEST(MarkerFrameTest, SurveyedMarkersDefineTheFrameAndAMisplacedOneIsLeftOut) {
@@ -225,7 +225,7 @@ TEST(MarkerFrameTest, SurveyedMarkersDefineTheFrameAndAMisplacedOneIsLeftOut) {
       (frame->world_from_map * (Scene::camera(5).inverse().translation / 2.5) - there.translation)
           .norm(),
       0.03);
-  EXPECT_EQ(markers[3].verdict, MarkerVerdict::kMisplaced);
+  EXPECT_EQ(markers[3].verdict, MarkerStatus::kMisplaced);
   EXPECT_NEAR(markers[3].found, 0.4, 0.03);
 }
 

@@ -87,7 +87,7 @@ std::vector<ComparedFigure> figures_of_frames() {
   return {
       {"Verdict",
        [](const ComparedRun& one) {
-         const Verdict verdict =
+         const Assessment verdict =
              judge(one.run->table, one.run->summary, one.error ? &*one.error : nullptr);
          return badge(verdict.grade);
        }},

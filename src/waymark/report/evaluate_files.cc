@@ -10,8 +10,8 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/evaluate/clocks.h"
 #include "waymark/evaluate/report.h"
+#include "waymark/evaluate/time_offset.h"
 #include "waymark/report/run_folder.h"
 
 namespace waymark {

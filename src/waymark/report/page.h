@@ -6,7 +6,7 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/report/verdict.h"
+#include "waymark/report/assessment.h"
 
 namespace waymark {
 

@@ -11,13 +11,13 @@
 #include "waymark/base/text.h"
 #include "waymark/evaluate/association.h"
 #include "waymark/report/advice.h"
+#include "waymark/report/assessment.h"
 #include "waymark/report/documentation.h"
 #include "waymark/report/drawing.h"
 #include "waymark/report/evaluate_files.h"
 #include "waymark/report/page.h"
 #include "waymark/report/report.h"
 #include "waymark/report/timeline.h"
-#include "waymark/report/verdict.h"
 
 namespace waymark {
 namespace {
@@ -31,7 +31,7 @@ std::string paragraph(std::string_view style, std::string_view text) {
   return fmt::format("<p class=\"{}\">{}</p>\n", style, escaped(text));
 }
 
-std::string head_of(const RunFolder& run, const Verdict& verdict) {
+std::string head_of(const RunFolder& run, const Assessment& verdict) {
   const FrameCounts& counts = run.summary.counts;
   std::string why = "All that is judged is good.";
   if (verdict.grade != Grade::kGood) {
@@ -52,7 +52,7 @@ std::string head_of(const RunFolder& run, const Verdict& verdict) {
                                run.summary.setup));
 }
 
-std::string quality_section(const Verdict& verdict) {
+std::string quality_section(const Assessment& verdict) {
   std::vector<std::vector<std::string>> rows;
   for (const Judgement& judgement : verdict.judgements) {
     rows.push_back({escaped(judgement.name),
@@ -346,7 +346,7 @@ std::string format_report(const RunFolder& run, const TruePath* truth) {
   std::optional<Evaluation> compared;
   if (truth && !run.trajectories.front().empty()) compared = evaluate_run(run, *truth);
   const Evaluation* error = compared ? &*compared : nullptr;
-  const Verdict verdict = judge(run.table, run.summary, error);
+  const Assessment verdict = judge(run.table, run.summary, error);
   std::string body = head_of(run, verdict);
   body += quality_section(verdict);
   body += advice_section(run);

@@ -12,7 +12,7 @@ namespace waymark {
 Autosave::Autosave(std::filesystem::path path,
                    double interval_s,
                    std::string settings,
-                   const ImageKeeper& images)
+                   const KeyframeImageCache& images)
     : path_(std::move(path)),
       interval_(
           std::chrono::duration_cast<Clock::duration>(std::chrono::duration<double>(interval_s))),

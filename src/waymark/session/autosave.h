@@ -14,7 +14,7 @@
 #include "waymark/map/map.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/mapfile/map_journal.h"
-#include "waymark/session/image_keeper.h"
+#include "waymark/session/keyframe_image_cache.h"
 
 namespace waymark {
 
@@ -29,7 +29,7 @@ class Autosave {
   Autosave(std::filesystem::path path,
            double interval_s,
            std::string settings,
-           const ImageKeeper& images);
+           const KeyframeImageCache& images);
   /// Waits for the save under way.
   ~Autosave() = default;
 
@@ -53,7 +53,7 @@ class Autosave {
   const std::filesystem::path path_;
   const Clock::duration interval_;
   const std::string settings_;
-  const ImageKeeper& images_;
+  const KeyframeImageCache& images_;
   Clock::time_point last_start_ = Clock::now();
   MapJournal journal_;  // Of the save under way as long as there is one.
   std::future<void> under_way_;

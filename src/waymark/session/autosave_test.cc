@@ -30,7 +30,7 @@ class AutosaveTest : public ::testing::Test {
   testing::TemporaryFolder folder_;
   const std::filesystem::path path_ = folder_ / "maps" / "map.wmap";
   testing::MemoryInput input_{testing::small_frames(1)};
-  ImageKeeper images_{input_, [] { return Map().freeze(); }, {}};
+  KeyframeImageCache images_{input_, [] { return Map().freeze(); }, {}};
   const std::shared_ptr<const Map> first_ = some_map(1);
   const std::shared_ptr<const Map> second_ = some_map(2);
 

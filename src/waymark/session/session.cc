@@ -225,7 +225,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   results.summary = summarize(system, frames);
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.summary.loop_frames = list_loops(system, frames);
-  for (const KeptScale& kept : system.kept_scales()) {
+  for (const TransferredScale& kept : system.kept_scales()) {
     results.summary.scales.push_back({kept.submap.value, kept.before.value});
   }
   results.table = std::move(frames.table);

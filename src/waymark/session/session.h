@@ -14,7 +14,7 @@
 #include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
 #include "waymark/map/map.h"
-#include "waymark/session/calibration_watch.h"
+#include "waymark/session/calibration_monitor.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/system/localizer.h"
 #include "waymark/system/system.h"
@@ -46,7 +46,7 @@ struct SessionHooks {
   /// Hears of each frame that was fed.
   std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
-  CalibrationWatch* watch = nullptr;  ///< Its mistakes become part of the summary.
+  CalibrationMonitor* watch = nullptr;  ///< Its mistakes become part of the summary.
   /// Whether frames may be read before they are fed: not where they come at their own pace.
   bool reads_ahead = true;
 };

@@ -8,7 +8,7 @@
 #include <vector>
 
 #include "waymark/base/check.h"
-#include "waymark/simulate/paint.h"
+#include "waymark/simulate/texture_drawing.h"
 
 namespace waymark {
 namespace {

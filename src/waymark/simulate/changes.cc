@@ -148,7 +148,7 @@ class Changes {
   }
 
   void stand(const std::vector<Surface>& surfaces, double start_s, double end_s) {
-    Walk walk;
+    Pedestrian walk;
     walk.first_surface = static_cast<std::uint32_t>(world_.surfaces.size());
     world_.surfaces.insert(world_.surfaces.end(), surfaces.begin(), surfaces.end());
     walk.end_surface = static_cast<std::uint32_t>(world_.surfaces.size());

@@ -58,7 +58,7 @@ TEST_P(ChangesIn, AreSeenFromTheWayBothBeforeAndAfter) {
 
 TEST_P(ChangesIn, HappenBehindTheCamera) {
   int num_changes = 0;
-  for (const Walk& walk : world_->walks) {
+  for (const Pedestrian& walk : world_->walks) {
     const double change_s = walk.start_s > 0.0 ? walk.start_s : walk.end_s;
     EXPECT_GE(change_s, 0.5 * kDurationS);
     EXPECT_LT(change_s, kDurationS);
@@ -73,7 +73,7 @@ TEST_P(ChangesIn, KeepClearOfTheWay) {
   for (double t = 0.0; t < kDurationS; t += 0.2) {
     const std::vector<Surface> surfaces = world_->surfaces_at(t);
     const Eigen::Vector3d eye = motion_.world_from_rig(t).translation;
-    for (const Walk& walk : world_->walks) {
+    for (const Pedestrian& walk : world_->walks) {
       if (t < walk.start_s || t >= walk.end_s) continue;
       for (std::uint32_t i = walk.first_surface; i < walk.end_surface; ++i) {
         for (const double u : {0.0, 0.5, 1.0}) {

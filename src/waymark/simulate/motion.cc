@@ -48,7 +48,7 @@ struct Course {
   double spacing_m;
   double height_m;
   double look_around_deg;
-  Sway sway;
+  CameraShake sway;
   MotionKey start;  ///< With 1 m of free space around and 2 m ahead.
 };
 
@@ -69,8 +69,8 @@ std::vector<Vector2d> rounds_of_both_rooms() {
 }
 
 std::vector<Course> courses() {
-  const Sway hand{0.02, 1.2, 11};
-  const Sway wheels{0.01, 0.25, 12};
+  const CameraShake hand{0.02, 1.2, 11};
+  const CameraShake wheels{0.01, 0.25, 12};
   const std::vector<Vector2d> around_table = {{1.3, 1.2}, {4.7, 1.2}, {4.7, 3.8}, {1.3, 3.8}};
   const std::vector<Vector2d> ring = {{2.0, 1.75}, {6.2, 1.75}, {6.2, 5.45}, {2.0, 5.45}};
   const std::vector<Vector2d> aisle = {{4.0, 4.2}, {20.0, 4.2}, {20.0, 11.8}, {4.0, 11.8}};
@@ -251,15 +251,15 @@ std::vector<MotionKey> look_and_turn(const Course& course, double duration_s, do
   });
 }
 
-Sway no_sway(const Course&) { return {}; }
-Sway usual_sway(const Course& course) { return course.sway; }
+CameraShake no_sway(const Course&) { return {}; }
+CameraShake usual_sway(const Course& course) { return course.sway; }
 /// That of somebody who runs: up to 8 degrees at 1 Hz and less at up to 5 Hz.
-Sway shaking(const Course&) { return {0.01, 8.0, 13, 1.0}; }
+CameraShake shaking(const Course&) { return {0.01, 8.0, 13, 1.0}; }
 
 struct NamedMotion {
   std::string_view name;
   std::vector<MotionKey> (*keys)(const Course& course, double duration_s);
-  Sway (*sway)(const Course& course);
+  CameraShake (*sway)(const Course& course);
 };
 
 constexpr std::array<NamedMotion, 12> kMotions = {{
@@ -311,7 +311,7 @@ Rigid3 pose_of(const MotionKey& key) {
   return {(Eigen::Quaterniond(level) * Eigen::Quaterniond(roll)).normalized(), key.position};
 }
 
-Motion::Motion(std::vector<MotionKey> keys, double duration_s, const Sway& sway)
+Motion::Motion(std::vector<MotionKey> keys, double duration_s, const CameraShake& sway)
     : keys_(std::move(keys)), duration_s_(duration_s) {
   WAYMARK_CHECK(keys_.size() >= 4 && duration_s > 0.0);
   if (sway.position_m <= 0.0 && sway.angle_deg <= 0.0) return;

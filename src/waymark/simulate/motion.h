@@ -25,7 +25,7 @@ struct MotionKey {
 Rigid3 pose_of(const MotionKey& key);
 
 /// How much a hand or a step shakes the rig: amplitudes of a few sines over 2.3 octaves.
-struct Sway {
+struct CameraShake {
   double position_m = 0.0;  ///< Amplitude along each axis.
   double angle_deg = 0.0;   ///< Amplitude of yaw, pitch and roll.
   std::uint64_t seed = 0;   ///< Of frequencies and phases.
@@ -38,7 +38,7 @@ struct Sway {
 class Motion {
  public:
   /// At least four keys.
-  Motion(std::vector<MotionKey> keys, double duration_s, const Sway& sway = {});
+  Motion(std::vector<MotionKey> keys, double duration_s, const CameraShake& sway = {});
 
   /// Time from the first pose to the last.
   double duration_s() const { return duration_s_; }

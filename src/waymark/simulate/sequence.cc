@@ -10,7 +10,7 @@
 #include "waymark/simulate/changes.h"
 #include "waymark/simulate/markers.h"
 #include "waymark/simulate/operator.h"
-#include "waymark/simulate/walkers.h"
+#include "waymark/simulate/pedestrians.h"
 
 namespace waymark {
 namespace {
@@ -49,7 +49,7 @@ std::shared_ptr<const World> populated_world(const SequenceSpec& spec,
   auto populated = std::make_shared<World>(*world);
   markers = add_markers(spec.num_markers, motion, spec.seed, *populated);
   add_changes(spec.num_changes, motion, spec.seed, *populated);
-  add_walkers(spec.num_walkers, motion, spec.seed, *populated);
+  add_pedestrians(spec.num_walkers, motion, spec.seed, *populated);
   if (spec.has_operator) add_operator(motion, spec.seed, *populated);
   return populated;
 }

@@ -39,7 +39,7 @@ struct SequenceSpec {
   int num_frames = 200;           ///< Which also say how long the motion takes.
   ImageEffects effects;           ///< Of the frames that no span holds.
   std::vector<EffectSpan> spans;  ///< The first that holds a frame counts.
-  int num_walkers = 0;            ///< People who cross the view at any time, see add_walkers().
+  int num_walkers = 0;            ///< People who cross the view at any time, see add_pedestrians().
   bool has_operator = false;      ///< Somebody carries the camera above the head: add_operator().
   int num_changes = 0;            ///< Things that are gone or open later, see add_changes().
   int num_markers = 0;            ///< Square markers on the walls, see add_markers().

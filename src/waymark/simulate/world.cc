@@ -231,13 +231,13 @@ Vector3d surface_point(const Surface& surface, const Vector2d& uv) {
 std::vector<Surface> World::surfaces_at(double time_s) const {
   const Vector3d nowhere(0.0, 0.0, -1e6);
   std::vector<Surface> moved = surfaces;
-  for (const Walk& walk : walks) {
+  for (const Pedestrian& walk : walks) {
     const bool is_there = time_s >= walk.start_s && time_s < walk.end_s;
     const Vector3d at =
         is_there ? Vector3d(walk.start + (time_s - walk.start_s) * walk.velocity) : nowhere;
     for (std::uint32_t i = walk.first_surface; i < walk.end_surface; ++i) moved[i].origin += at;
   }
-  for (const Carried& part : carried) {
+  for (const DynamicObject& part : carried) {
     const Rigid3 world_from_part = part.world_from_part(time_s);
     for (std::uint32_t i = part.first_surface; i < part.end_surface; ++i) {
       moved[i].origin = world_from_part * moved[i].origin;

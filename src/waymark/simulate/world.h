@@ -120,7 +120,7 @@ struct WorldHit {
 
 /// Somebody who walks straight on, or something that stands still: surfaces that are there from one
 /// time to another.
-struct Walk {
+struct Pedestrian {
   std::uint32_t first_surface = 0;  ///< Indices in World::surfaces, where they stand at the origin.
   std::uint32_t end_surface = 0;    ///< One past the last of them.
   double start_s = 0.0;             ///< They are there from this time ...
@@ -130,7 +130,7 @@ struct Walk {
 };
 
 /// Surfaces fixed to something that moves, in whose axes they are given.
-struct Carried {
+struct DynamicObject {
   std::uint32_t first_surface = 0;                       ///< Indices in World::surfaces.
   std::uint32_t end_surface = 0;                         ///< One past the last of them.
   std::function<Rigid3(double time_s)> world_from_part;  ///< Defined at any time.
@@ -138,11 +138,11 @@ struct Carried {
 
 /// Textured analytic surfaces; z points up, the ground is near z = 0. Immutable once made.
 struct World {
-  std::string name;               ///< As make_world() knows it.
-  std::vector<Surface> surfaces;  ///< In no order.
-  std::vector<Texture> textures;  ///< That surfaces refer to by index.
-  std::vector<Walk> walks;        ///< Of surfaces that move, come or go.
-  std::vector<Carried> carried;   ///< Likewise; no surface is in both.
+  std::string name;                    ///< As make_world() knows it.
+  std::vector<Surface> surfaces;       ///< In no order.
+  std::vector<Texture> textures;       ///< That surfaces refer to by index.
+  std::vector<Pedestrian> walks;       ///< Of surfaces that move, come or go.
+  std::vector<DynamicObject> carried;  ///< Likewise; no surface is in both.
 
   /// The surfaces where they are at a time; those of walks that are not there lie below the world.
   std::vector<Surface> surfaces_at(double time_s) const;

@@ -6,7 +6,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/simulate/paint.h"
+#include "waymark/simulate/texture_drawing.h"
 #include "waymark/simulate/world.h"
 
 namespace waymark {

@@ -60,7 +60,7 @@ TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
     ASSERT_FALSE(sightings.empty());
     EXPECT_LE(sightings.size(), num_landmarks);
     std::uint32_t most = 0;
-    for (const Sighting& sighting : sightings) {
+    for (const LandmarkVisibility& sighting : sightings) {
       EXPECT_LE(sighting.num_found, kRest + 1 + static_cast<std::uint32_t>(i));
       most = std::max(most, sighting.num_visible);
     }

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "waymark/features/frame_builder.h"
-#include "waymark/system/frames_ahead.h"
+#include "waymark/system/frame_prefetch.h"
 #include "waymark/system/marker_finder.h"
 #include "waymark/system/settings.h"
 #include "waymark/track/frame.h"
@@ -53,7 +53,7 @@ class FramePreparation {
                                         StageTimes& times);
 
   FrameBuilder builder_;
-  FramesAhead ahead_;
+  FramePrefetch ahead_;
   const MarkerFinder marker_finder_;
   SubmapId watched_submap_;  ///< Of the last frame with a pose.
 };

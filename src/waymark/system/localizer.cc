@@ -56,11 +56,11 @@ class Localizer::Impl {
   Rig rig() const { return frames_.full_rig(); }
   std::vector<CalibrationEstimate> calibration() const;
   TrackingResult track(const FrameImages& images);
-  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint);
+  TrackingResult locate(const FrameImages& images, const std::optional<PosePrior>& hint);
 
  private:
   std::uint64_t seed() const { return static_cast<std::uint64_t>(settings_.seed); }
-  std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PoseHint>& hint);
+  std::optional<LocatedFrame> search(const Frame& frame, const std::optional<PosePrior>& hint);
   /// Makes do with temporary landmarks from when the map shows too little until it shows enough.
   void bridge_gaps(const TrackingResult& result,
                    std::optional<MapperMessage> message,
@@ -133,7 +133,7 @@ void Localizer::Impl::bridge_gaps(const TrackingResult& result,
 }
 
 TrackingResult Localizer::Impl::locate(const FrameImages& images,
-                                       const std::optional<PoseHint>& hint) {
+                                       const std::optional<PosePrior>& hint) {
   TrackingResult result;
   const Frame frame = frames_.build(images, {}, result);
   StageTimer timer(result.stages, Stage::kRecover);
@@ -159,7 +159,7 @@ TrackingResult Localizer::Impl::locate(const FrameImages& images,
 }
 
 std::optional<LocatedFrame> Localizer::Impl::search(const Frame& frame,
-                                                    const std::optional<PoseHint>& hint) {
+                                                    const std::optional<PosePrior>& hint) {
   if (hint) {
     const std::vector<KeyframeId> near = keyframes_near(
         *snapshot_.map, hint->submap, *frames_.rig(), hint->world_from_rig.inverse(), kMaxNearHint);
@@ -178,7 +178,7 @@ const Map& Localizer::map() const { return impl_->map(); }
 Rig Localizer::rig() const { return impl_->rig(); }
 std::vector<CalibrationEstimate> Localizer::calibration() const { return impl_->calibration(); }
 TrackingResult Localizer::track(const FrameImages& images) { return impl_->track(images); }
-TrackingResult Localizer::locate(const FrameImages& images, const std::optional<PoseHint>& hint) {
+TrackingResult Localizer::locate(const FrameImages& images, const std::optional<PosePrior>& hint) {
   return impl_->locate(images, hint);
 }
 

@@ -15,7 +15,7 @@
 namespace waymark {
 
 /// About where an image was taken, in the frame of a sub-map.
-struct PoseHint {
+struct PosePrior {
   Rigid3 world_from_rig;  ///< About; what keyframes near it show is looked for first.
   SubmapId submap{0};     ///< Whose frame it is in.
 };
@@ -53,7 +53,7 @@ class Localizer {
 
   /// An image by itself: looked for near the hint, if there is one, and anywhere where it is not.
   /// Leaves the stream alone.
-  TrackingResult locate(const FrameImages& images, const std::optional<PoseHint>& hint = {});
+  TrackingResult locate(const FrameImages& images, const std::optional<PosePrior>& hint = {});
 
  private:
   class Impl;

@@ -182,9 +182,9 @@ TEST(Localizer, FindsImagesInAnyOrderWithAndWithoutAHint) {
     EXPECT_GE(result.num_candidates, 1);
     Rigid3 about = scene().truth(i);
     about.translation += Eigen::Vector3d(0.1, -0.05, 0.1);
-    expect_pose(localizer.locate(grey, PoseHint{about, SubmapId{0}}), i);
+    expect_pose(localizer.locate(grey, PosePrior{about, SubmapId{0}}), i);
     about.translation += Eigen::Vector3d(100.0, 0.0, 0.0);  // A hint that leads astray.
-    expect_pose(localizer.locate(grey, PoseHint{about, SubmapId{0}}), i);
+    expect_pose(localizer.locate(grey, PosePrior{about, SubmapId{0}}), i);
   }
 }
 

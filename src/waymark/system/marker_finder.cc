@@ -27,36 +27,36 @@ MarkerFinder::MarkerFinder(const MarkerSettings& settings) {
   if (markers) detector_.emplace(MarkerFamily(markers->family, "markers.family"));
 }
 
-std::function<MarkerSightings()> MarkerFinder::search_in(const FrameImages& images,
-                                                         std::shared_ptr<const Rig> rig) const {
+std::function<MarkerObservations()> MarkerFinder::search_in(const FrameImages& images,
+                                                            std::shared_ptr<const Rig> rig) const {
   if (!detector_) return nullptr;
-  auto found = std::make_shared<std::optional<MarkerSightings>>();
+  auto found = std::make_shared<std::optional<MarkerObservations>>();
   return [this, found, views = views_of(images, *rig), rig] {
     if (*found) return **found;
     found->emplace();
     for (std::size_t i = 0; i < views.size(); ++i) {
-      const MarkerSightings seen =
+      const MarkerObservations seen =
           detector_->detect(views[i], *rig->cameras[i].camera, static_cast<std::uint8_t>(i));
       (*found)->insert((*found)->end(), seen.begin(), seen.end());
     }
-    std::ranges::stable_sort(**found, {}, &MarkerSighting::id);
+    std::ranges::stable_sort(**found, {}, &MarkerObservation::id);
     return **found;
   };
 }
 
-MarkerSightings MarkerFinder::confirm(const FrameImages& images,
-                                      const Rig& rig,
-                                      const Map& map,
-                                      const TrackingResult& result,
-                                      const MarkerSightings& read) const {
+MarkerObservations MarkerFinder::confirm(const FrameImages& images,
+                                         const Rig& rig,
+                                         const Map& map,
+                                         const TrackingResult& result,
+                                         const MarkerObservations& read) const {
   const Rigid3 rig_from_world = result.world_from_rig->inverse();
-  MarkerSightings all = read;
+  MarkerObservations all = read;
   const std::vector<ImageView> views = views_of(images, rig);
   for (std::size_t i = 0; i < views.size(); ++i) {
     const auto camera = static_cast<std::uint8_t>(i);
     std::vector<ExpectedMarker> expected;
     for (const MapMarker& marker : map.markers()) {
-      const bool is_read = std::ranges::any_of(read, [&](const MarkerSighting& sighting) {
+      const bool is_read = std::ranges::any_of(read, [&](const MarkerObservation& sighting) {
         return sighting.id == marker.id && sighting.camera == camera;
       });
       if (is_read || map.submap_of(marker) != result.submap) continue;
@@ -64,11 +64,11 @@ MarkerSightings MarkerFinder::confirm(const FrameImages& images,
       expected.push_back(
           {marker.id, marker.side_m, cam_from_world * map.world_from_marker(marker)});
     }
-    const MarkerSightings found =
+    const MarkerObservations found =
         detector_->confirm(views[i], *rig.cameras[i].camera, camera, expected);
     all.insert(all.end(), found.begin(), found.end());
   }
-  std::ranges::stable_sort(all, {}, &MarkerSighting::id);
+  std::ranges::stable_sort(all, {}, &MarkerObservation::id);
   return all;
 }
 
@@ -78,11 +78,11 @@ void MarkerFinder::add_markers(const Frame& frame,
                                const Map& map,
                                const TrackingResult& result,
                                MapperMessage& message) const {
-  MarkerSightings found = frame.find_markers();
+  MarkerObservations found = frame.find_markers();
   auto* keyframe = std::get_if<NewKeyframe>(&message);
   if (keyframe && result.world_from_rig) found = confirm(images, rig, map, result, found);
   if (found.empty()) return;
-  auto markers = std::make_shared<const MarkerSightings>(std::move(found));
+  auto markers = std::make_shared<const MarkerObservations>(std::move(found));
   if (keyframe) {
     keyframe->markers = std::move(markers);
     return;

@@ -38,8 +38,8 @@ class MarkerFinder {
 
   /// A search in the images of a frame, those of a pair both, done once when it is called first;
   /// the images must be there then. Empty where nothing is looked for.
-  std::function<MarkerSightings()> search_in(const FrameImages& images,
-                                             std::shared_ptr<const Rig> rig) const;
+  std::function<MarkerObservations()> search_in(const FrameImages& images,
+                                                std::shared_ptr<const Rig> rig) const;
 
   /// Notes with a keyframe the markers that its frame shows: those that can be read, and those of
   /// the map that are seen where they should be. result: of the frame.
@@ -51,11 +51,11 @@ class MarkerFinder {
                    MapperMessage& message) const;
 
  private:
-  MarkerSightings confirm(const FrameImages& images,
-                          const Rig& rig,
-                          const Map& map,
-                          const TrackingResult& result,
-                          const MarkerSightings& read) const;
+  MarkerObservations confirm(const FrameImages& images,
+                             const Rig& rig,
+                             const Map& map,
+                             const TrackingResult& result,
+                             const MarkerObservations& read) const;
 
   std::optional<MarkerDetector> detector_;
 };

@@ -51,8 +51,8 @@ class System::Impl {
     return visible_.calibration.rig ? visible_.calibration.rig : given_rig_;
   }
   std::vector<CalibrationEstimate> calibration() const;
-  std::vector<KeptScale> kept_scales() const {
-    return tracker_ ? tracker_->kept_scales(*map()) : std::vector<KeptScale>{};
+  std::vector<TransferredScale> kept_scales() const {
+    return tracker_ ? tracker_->kept_scales(*map()) : std::vector<TransferredScale>{};
   }
   const TrackingResult& result() const { return result_; }
   const Image& ego_mask() const { return preparation_.ego_mask(); }
@@ -193,7 +193,7 @@ void System::set_mapping(bool is_on) { impl_->set_mapping(is_on); }
 void System::reset() { impl_ = impl_->begin_anew(); }
 std::vector<TrajectoryFrame> System::trajectory() const { return impl_->trajectory(); }
 std::vector<FrameState> System::frame_states() const { return impl_->frame_states(); }
-std::vector<KeptScale> System::kept_scales() const { return impl_->kept_scales(); }
+std::vector<TransferredScale> System::kept_scales() const { return impl_->kept_scales(); }
 MarkerReport System::markers() const { return impl_->markers(); }
 Image System::ego_mask() const { return impl_->ego_mask(); }
 std::shared_ptr<const Rig> System::rig() const { return impl_->rig(); }

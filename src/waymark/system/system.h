@@ -18,8 +18,8 @@
 #include "waymark/map/map.h"
 #include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
-#include "waymark/track/kept_scale.h"
 #include "waymark/track/tracking_result.h"
+#include "waymark/track/transferred_scale.h"
 
 namespace waymark {
 
@@ -109,7 +109,7 @@ class System {
 
   /// In mono: parts of the map that began after a loss with the unit of length of another part.
   /// Those that were joined to it meanwhile are not among them.
-  std::vector<KeptScale> kept_scales() const;
+  std::vector<TransferredScale> kept_scales() const;
 
   /// The cameras as they are calibrated by now.
   std::shared_ptr<const Rig> rig() const;

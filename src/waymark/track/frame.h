@@ -21,7 +21,7 @@ struct Frame {
   std::shared_ptr<const Features> features;
   std::shared_ptr<const SmallImage> image = nullptr;  ///< Of camera 0; null where there is none.
   /// Looks for markers in its image, which takes its time; empty where none are looked for.
-  std::function<MarkerSightings()> find_markers = nullptr;
+  std::function<MarkerObservations()> find_markers = nullptr;
 };
 
 }  // namespace waymark

@@ -161,7 +161,7 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
 
 std::optional<Initialization> Initializer::start_from_two_views(const Frame& frame) {
   reason_ = FrameReason::kTooFewMatches;
-  Rest rest;  // Goes on with the next reference.
+  StationaryCamera rest;  // Goes on with the next reference.
   for (Reference& reference : references_) {
     match(reference, frame);
     reference.rest.update(

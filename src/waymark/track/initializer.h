@@ -16,7 +16,7 @@
 #include "waymark/match/rotation_alignment.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/rest.h"
+#include "waymark/track/stationary_camera.h"
 
 namespace waymark {
 
@@ -50,7 +50,7 @@ class Initializer {
     Frame frame;
     std::vector<Eigen::Vector2f> expected_pixels;  ///< Where its features were last seen.
     std::vector<FeatureMatch> matches;             ///< With the newest frame.
-    Rest rest = {};                                ///< Since that frame.
+    StationaryCamera rest = {};                    ///< Since that frame.
   };
 
   std::optional<Initialization> start_from_range(const Frame& frame);

@@ -29,11 +29,11 @@ constexpr std::array kEnds = {FrameReason::kNone,
 constexpr std::size_t kMaxNearMarker = 4;
 
 /// The poses that the markers of a frame leave open.
-std::vector<MarkerPose> poses_by_markers(const MarkerSightings& sightings,
+std::vector<MarkerPose> poses_by_markers(const MarkerObservations& sightings,
                                          const Rig& rig,
                                          const Map& map) {
   std::vector<MarkerPose> poses;
-  for (const MarkerSighting& sighting : sightings) {
+  for (const MarkerObservation& sighting : sightings) {
     if (sighting.camera >= rig.cameras.size()) continue;  // One camera of a pair is used.
     for (const MapMarker& marker : map.markers()) {
       if (marker.id != sighting.id) continue;

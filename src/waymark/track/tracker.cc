@@ -25,12 +25,12 @@ Tracker::Tracker(bool has_range, const TrackingSettings& settings, std::uint64_t
 void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
   purpose_ = purpose;
   mode_ = Mode::kLost;
-  ids_ = SentIds(map);
+  ids_ = PredictedIds(map);
 }
 
 void Tracker::continue_in(const Map& map, TrackingPurpose purpose) {
   purpose_ = purpose;
-  ids_ = SentIds(map, ids_.newest_frame());
+  ids_ = PredictedIds(map, ids_.newest_frame());
   sightings_.clear();
   search_.continue_in(map);
   const std::vector<KeyframeId>& around = search_.local_map().keyframes;
@@ -61,7 +61,7 @@ std::optional<MapperMessage> Tracker::track(const Frame& seen,
   return accept(frame, *std::move(located), result);
 }
 
-void Tracker::count_sightings(const Features& features, const LocatedFrame& located) {
+void Tracker::count_visibility(const Features& features, const LocatedFrame& located) {
   if (purpose_ == TrackingPurpose::kLocalizing) return;
   for (const LandmarkId id : located.visible) sightings_.count_visible(id);
   for (const LandmarkId id : primary_landmarks(features, located.landmarks)) {
@@ -88,7 +88,7 @@ std::optional<MapperMessage> Tracker::accept(const Frame& frame,
                                              LocatedFrame located,
                                              TrackingResult& result) {
   StageTimer timer(result.stages, Stage::kKeyframe);
-  count_sightings(*frame.features, located);
+  count_visibility(*frame.features, located);
   const KeyframeId reference_id = search_.local_map().reference;
   const Keyframe& reference = visible_.map->keyframes().at(reference_id);
   const RelativePose pose{reference_id,

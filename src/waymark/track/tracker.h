@@ -9,11 +9,11 @@
 #include "waymark/place/map_snapshot.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/initializer.h"
+#include "waymark/track/landmark_visibility.h"
 #include "waymark/track/last_frame.h"
 #include "waymark/track/pose_search.h"
-#include "waymark/track/scale_keeper.h"
-#include "waymark/track/sent_ids.h"
-#include "waymark/track/sightings.h"
+#include "waymark/track/predicted_ids.h"
+#include "waymark/track/scale_transfer.h"
 #include "waymark/track/tracking_result.h"
 
 namespace waymark {
@@ -45,7 +45,9 @@ class Tracker {
   RigMotion predict_motion() const;
 
   /// Parts of a map in mono that began after a loss in the units of the part before.
-  std::vector<KeptScale> kept_scales(const Map& map) const { return scale_keeper_.kept_in(map); }
+  std::vector<TransferredScale> kept_scales(const Map& map) const {
+    return scale_keeper_.kept_in(map);
+  }
 
   /// Tracks a frame; visible: the newest map that it may see, empty before the first sub-map. Fills
   /// in what becomes of it (stages are added to). Gives what the mapper is to take in, if the frame
@@ -62,7 +64,7 @@ class Tracker {
 
   PoseSearch::Context context();
   /// Of an accepted pose.
-  void count_sightings(const Features& features, const LocatedFrame& located);
+  void count_visibility(const Features& features, const LocatedFrame& located);
   bool is_keyframe(const Frame& frame, const LocatedFrame& located) const;
   std::optional<MapperMessage> accept(const Frame& frame,
                                       LocatedFrame located,
@@ -79,14 +81,14 @@ class Tracker {
   const TrackingSettings settings_;
   Initializer initializer_;
   PoseSearch search_;
-  ScaleKeeper scale_keeper_;
+  ScaleTransfer scale_keeper_;
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;
   int num_lost_ = 0;  ///< Frames since the loss.
   MapSnapshot visible_;
   LastFrame last_;
-  SentIds ids_;
-  SightingCounter sightings_;
+  PredictedIds ids_;
+  VisibilityCounter sightings_;
 };
 
 }  // namespace waymark

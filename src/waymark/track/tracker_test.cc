@@ -124,7 +124,7 @@ TEST_F(TrackerTest, AsksForKeyframesWithConsecutiveIdsAndTrueAssociations) {
     for (std::size_t k = 1; k < message.sightings.size(); ++k) {
       EXPECT_LT(message.sightings[k - 1].landmark, message.sightings[k].landmark);
     }
-    for (const Sighting& sighting : message.sightings) {
+    for (const LandmarkVisibility& sighting : message.sightings) {
       EXPECT_GT(sighting.num_visible + sighting.num_found, 0u);
     }
   }

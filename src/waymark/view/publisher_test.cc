@@ -208,7 +208,7 @@ TEST_F(Publisher, TellsTheFinalPosesAtTheEnd) {
   ASSERT_EQ(listener_.last().frames.size(), 4u);
   const std::vector<TrajectoryFrame> trajectory = session_.system().trajectory();
   for (std::size_t i = 0; i < 4; ++i) {
-    const FrameNote& note = listener_.last().frames[i];
+    const FrameSummary& note = listener_.last().frames[i];
     ASSERT_TRUE(note.final_pose);
     EXPECT_EQ(note.final_pose->matrix(), trajectory[i].world_from_rig.matrix());
   }

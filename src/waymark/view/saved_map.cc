@@ -12,10 +12,10 @@ namespace waymark {
 namespace {
 
 /// The keyframes stand for the trajectory.
-std::vector<FrameNote> note_keyframes(const Map& map) {
-  std::vector<FrameNote> notes;
+std::vector<FrameSummary> note_keyframes(const Map& map) {
+  std::vector<FrameSummary> notes;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    FrameNote note;
+    FrameSummary note;
     note.frame = keyframe.frame;
     note.timestamp_ns = keyframe.timestamp_ns;
     note.state = FrameState::kTracked;
@@ -23,7 +23,7 @@ std::vector<FrameNote> note_keyframes(const Map& map) {
     note.submap = keyframe.submap;
     notes.push_back(note);
   });
-  std::sort(notes.begin(), notes.end(), [](const FrameNote& a, const FrameNote& b) {
+  std::sort(notes.begin(), notes.end(), [](const FrameSummary& a, const FrameSummary& b) {
     return a.frame < b.frame;
   });
   return notes;

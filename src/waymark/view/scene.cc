@@ -51,7 +51,7 @@ struct Pose {
 
 bool is_known(KeyframeId id, const Map& map) { return id < map.keyframes().end_id(); }
 
-std::optional<Pose> pose_of(const FrameNote& note, const Map& map) {
+std::optional<Pose> pose_of(const FrameSummary& note, const Map& map) {
   if (note.final_pose) return Pose{*note.final_pose, note.submap};
   if (!note.pose || !is_known(note.pose->reference, map)) return std::nullopt;
   const Keyframe* keyframe = map.keyframes().find(map.resolve(note.pose->reference));
@@ -156,9 +156,9 @@ Message LandmarkLayer::encode(const Map& map, std::span<const LandmarkId> ids) c
   return writer.finish();
 }
 
-void TrajectoryLayer::take(const FrameNote& note) {
+void TrajectoryLayer::take(const FrameSummary& note) {
   if (notes_.empty()) start_ns_ = note.timestamp_ns;
-  const auto place = std::ranges::lower_bound(notes_, note.frame, {}, &FrameNote::frame);
+  const auto place = std::ranges::lower_bound(notes_, note.frame, {}, &FrameSummary::frame);
   const auto index = static_cast<std::uint32_t>(place - notes_.begin());
   if (place == notes_.end()) {
     notes_.push_back(note);
@@ -175,7 +175,7 @@ void TrajectoryLayer::take(const FrameNote& note) {
 }
 
 void TrajectoryLayer::file(std::uint32_t index, const Map& map) {
-  const FrameNote& note = notes_[index];
+  const FrameSummary& note = notes_[index];
   if (!note.pose || note.final_pose) return;
   if (!is_known(note.pose->reference, map)) {
     pending_.push_back(index);
@@ -202,11 +202,11 @@ void TrajectoryLayer::follow_keyframes(const Map& before, const Map& after) {
       });
 }
 
-void TrajectoryLayer::advance(std::span<const FrameNote> notes,
+void TrajectoryLayer::advance(std::span<const FrameSummary> notes,
                               const Map& before,
                               const Map& after,
                               std::vector<Message>& messages) {
-  for (const FrameNote& note : notes) take(note);
+  for (const FrameSummary& note : notes) take(note);
   follow_keyframes(before, after);
   for (const std::uint32_t index : std::exchange(pending_, {})) file(index, after);
   std::sort(changed_.begin(), changed_.end());

@@ -12,7 +12,7 @@ namespace waymark {
 namespace {
 
 template <class Id, class T>
-std::vector<Id> ids_of(const CowTable<Id, T>& table) {
+std::vector<Id> ids_of(const CopyOnWriteTable<Id, T>& table) {
   std::vector<Id> ids;
   table.for_each([&](Id id, const T&) { ids.push_back(id); });
   return ids;
@@ -125,8 +125,8 @@ class ChangingSession {
     }
   }
 
-  FrameNote note_frame() {
-    FrameNote note;
+  FrameSummary note_frame() {
+    FrameSummary note;
     note.frame = FrameId{num_frames_};
     note.timestamp_ns = 1'000'000'000 + num_frames_ * std::int64_t{50'000'000};
     note.tracking_ms = 12.5f;
@@ -140,8 +140,8 @@ class ChangingSession {
     return note;
   }
 
-  FrameNote fill_frame() {
-    FrameNote note;
+  FrameSummary fill_frame() {
+    FrameSummary note;
     note.frame = FrameId{rng_.below(num_frames_)};
     note.timestamp_ns = 1'000'000'000 + note.frame.value * std::int64_t{50'000'000};
     note.state = FrameState::kFilled;

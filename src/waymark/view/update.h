@@ -25,7 +25,7 @@
 namespace waymark {
 
 /// A frame of the trajectory and of the time line.
-struct FrameNote : FrameStatus {
+struct FrameSummary : FrameStatus {
   FrameId frame;                          ///< Which one.
   std::int64_t timestamp_ns = 0;          ///< Of the input.
   float tracking_ms = 0.0f;               ///< From image in memory to pose.
@@ -91,7 +91,7 @@ struct ViewUpdate {
   bool is_reset = false;                    ///< Everything before is void.
   std::optional<SessionInfo> info = {};     ///< Known better than it was before.
   std::shared_ptr<const Map> map;           ///< Null: as before.
-  std::vector<FrameNote> frames;            ///< New ones and those that are known better now.
+  std::vector<FrameSummary> frames;         ///< New ones and those that are known better now.
   std::vector<FeatureColors> colors;        ///< Of new frames.
   std::shared_ptr<const DrawnFrame> image;  ///< Null: none this time.
   SessionStatus status;                     ///< As of now.

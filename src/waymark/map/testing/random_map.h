@@ -169,7 +169,7 @@ class RandomMap {
     const LandmarkId landmark = pick_landmark(keyframe.submap);
     if (!landmark.is_valid() || keyframe.landmarks[feature].is_valid()) return;
     map_.observe(id, feature, landmark);
-    map_.count_sightings(landmark, 2, 1);
+    map_.count_visibility(landmark, 2, 1);
   }
 
   void forget(KeyframeId id, std::uint32_t feature) {

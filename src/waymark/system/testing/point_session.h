@@ -51,7 +51,7 @@ class PointSession {
     return outcome;
   }
 
-  std::vector<KeptScale> kept_scales() const { return tracker_.kept_scales(map()); }
+  std::vector<TransferredScale> kept_scales() const { return tracker_.kept_scales(map()); }
 
   const Map& map() const { return *visible_.map; }
 

@@ -1,0 +1,43 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <algorithm>
+#include <vector>
+
+#include "waymark/map/messages.h"
+
+namespace waymark {
+
+/// Counts in how many frames landmarks should have been seen and were.
+class VisibilityCounter {
+ public:
+  void count_visible(LandmarkId landmark) { sightings_.push_back({landmark, 1, 0}); }
+  void count_found(LandmarkId landmark) { sightings_.push_back({landmark, 0, 1}); }
+  /// Keeps what is counted short: at rest no keyframe takes it.
+  void end_frame() {
+    constexpr std::size_t kMany = 100'000;
+    if (sightings_.size() > kMany) sightings_ = take();
+  }
+  void clear() { sightings_.clear(); }
+
+  /// The counts since the last take(), ascending by landmark.
+  std::vector<LandmarkVisibility> take() {
+    std::ranges::sort(sightings_, {}, &LandmarkVisibility::landmark);
+    std::vector<LandmarkVisibility> merged;
+    for (const LandmarkVisibility& sighting : sightings_) {
+      if (merged.empty() || merged.back().landmark != sighting.landmark) {
+        merged.push_back({sighting.landmark, 0, 0});
+      }
+      merged.back().num_visible += sighting.num_visible;
+      merged.back().num_found += sighting.num_found;
+    }
+    sightings_.clear();
+    return merged;
+  }
+
+ private:
+  std::vector<LandmarkVisibility> sightings_;
+};
+
+}  // namespace waymark
