@@ -304,7 +304,7 @@ class Map {
   /// Notes how the rig moved at a keyframe; its features stay as they are.
   void set_motion(KeyframeId id, const RigMotion& motion) { keyframes_.edit(id).motion = motion; }
   /// Sets the markers that a keyframe sees; null: none.
-  void set_markers(KeyframeId id, std::shared_ptr<const MarkerObservations> markers) {
+  void observe_markers(KeyframeId id, std::shared_ptr<const MarkerObservations> markers) {
     keyframes_.edit(id).markers = std::move(markers);
   }
   /// Takes the place of all markers there were.

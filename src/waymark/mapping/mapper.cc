@@ -155,7 +155,7 @@ void Mapper::set_calibration(const KnownCalibration& calibration) {
   for (const KeyframeId id : seen_so) {
     const Keyframe& keyframe = map_.keyframes().at(id);
     map_.recompute_keyframe(id, recompute(*keyframe.features, calibration.rig, keyframe.motion));
-    map_.set_markers(id, recompute(map_.keyframes().at(id).markers, *calibration.rig));
+    map_.observe_markers(id, recompute(map_.keyframes().at(id).markers, *calibration.rig));
     for (const LandmarkId landmark : map_.keyframes().at(id).landmarks) {
       if (landmark.is_valid()) dirty_.insert(landmark);
     }
