@@ -10,6 +10,8 @@
 #include <vector>
 
 #include "waymark/features/pyramid.h"
+#include "waymark/geometry/damping.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/residual.h"
 
 namespace waymark {
@@ -309,19 +311,19 @@ LensState LensProblem::moved(const Elimination& system, const Eigen::VectorXd& s
 }
 
 double LensProblem::minimize() {
-  double damping = 1e-4;
+  TenfoldDamping damping;
   if (!predict(state)) return std::numeric_limits<double>::infinity();
   differentiate_by_lens();
   double least = cost();
-  for (int i = 0; i < kMaxIterations && damping < 1e6; ++i) {
-    const Elimination system = eliminate(damping);
+  for (int i = 0; i < kMaxIterations && damping.is_below(1e6); ++i) {
+    const Elimination system = eliminate(damping.value());
     const Eigen::VectorXd step =
         system.matrix.selfadjointView<Eigen::Lower>().ldlt().solve(system.right);
     const LensState to = moved(system, step);
     const bool is_possible = step.allFinite() && predict(to);
     const double next = is_possible ? cost() : std::numeric_limits<double>::infinity();
     if (!(next < least)) {
-      damping *= 10.0;
+      damping.reject();
       predict(state);
       continue;
     }
@@ -329,7 +331,7 @@ double LensProblem::minimize() {
     state = to;
     least = next;
     differentiate_by_lens();
-    damping = std::max(0.1 * damping, 1e-9);
+    damping.accept();
     if (is_converged) break;
   }
   return least;

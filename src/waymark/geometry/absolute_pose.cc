@@ -11,6 +11,7 @@
 #include "waymark/geometry/bearing.h"
 #include "waymark/geometry/polynomial.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/robust_loss.h"
 
 namespace waymark {
 namespace {

@@ -28,13 +28,6 @@ inline Eigen::Matrix<double, 3, 2> tangent_basis(const Eigen::Vector3d& n) {
   return basis;
 }
 
-/// Weight of a squared residual under the loss of Geman & McClure, r^2 s^2 / (r^2 + s^2), that is
-/// the loss's derivative by r^2.
-inline double geman_mcclure_weight(double squared_residual, double squared_scale) {
-  const double ratio = squared_scale / (squared_residual + squared_scale);
-  return ratio * ratio;
-}
-
 /// Matched unit bearings of two views, each in the frame of its own view, and the standard
 /// deviation of each bearing's direction in radians, per axis of the tangent plane (> 0). A view:
 /// the arrays belong to the caller and run in parallel.

@@ -9,6 +9,8 @@
 #include <cmath>
 #include <limits>
 
+#include "waymark/geometry/robust_loss.h"
+
 namespace waymark {
 namespace {
 

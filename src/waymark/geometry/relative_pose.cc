@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/geometry/damping.h"
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/robust_loss.h"
 
 namespace waymark {
 namespace {
@@ -63,15 +65,15 @@ Rigid3 descend(Rigid3 pose,
                double squared_scale,
                int max_iterations) {
   double cost = robust_cost(pose, matches, indices, squared_scale);
-  double damping = 1e-4;
+  TenfoldDamping damping;
   for (int iteration = 0; iteration < max_iterations; ++iteration) {
     const EpipolarSystem system = linearise(pose, matches, indices, squared_scale);
     Rigid3 next = pose;
     double next_cost = cost;
     // Raise the damping until the step lowers the cost.
-    for (; damping < 1e6; damping *= 10.0) {
+    for (; damping.is_below(1e6); damping.reject()) {
       Matrix5d damped = system.information;
-      damped.diagonal() *= 1.0 + damping;
+      damped.diagonal() *= damping.factor();
       const Vector5d step = damped.ldlt().solve(-system.gradient);
       if (!step.allFinite()) return pose;
       next = perturb_relative_pose(pose, step);
@@ -82,7 +84,7 @@ Rigid3 descend(Rigid3 pose,
     const double gain = cost - next_cost;
     pose = next;
     cost = next_cost;
-    damping = std::max(1e-9, 0.1 * damping);
+    damping.accept();
     if (gain < 1e-6 * cost) break;
   }
   return pose;

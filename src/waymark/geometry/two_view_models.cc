@@ -12,6 +12,7 @@
 #include "waymark/geometry/essential.h"
 #include "waymark/geometry/homography.h"
 #include "waymark/geometry/relative_pose.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/geometry/two_view.h"
 
 namespace waymark {

@@ -137,11 +137,14 @@ class WaySearch {
 
 }  // namespace
 
-double median_depth(const Map& map, KeyframeId id) {
+double median_depth(const Map& map, KeyframeId id, std::size_t num_landmarks) {
   const Keyframe& keyframe = map.keyframes().at(id);
+  const auto num_seen = std::ranges::count_if(keyframe.landmarks, &LandmarkId::is_valid);
+  const std::size_t stride = static_cast<std::size_t>(num_seen) / num_landmarks + 1;
   std::vector<double> distances;
-  for (LandmarkId landmark : keyframe.landmarks) {
-    if (!landmark.is_valid()) continue;
+  std::size_t number = 0;
+  for (const LandmarkId landmark : keyframe.landmarks) {
+    if (!landmark.is_valid() || number++ % stride != 0) continue;
     distances.push_back(
         (keyframe.rig_from_world * map.landmarks().at(landmark).position_in_world).norm());
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <optional>
 #include <vector>
 
@@ -41,8 +42,9 @@ std::optional<GraphWay> shortest_way(const Map& map,
                                      KeyframeId to,
                                      const std::optional<GraphWay>& enough = std::nullopt);
 
-/// Median distance of what a keyframe sees, in map units; 0 if that is nothing.
-double median_depth(const Map& map, KeyframeId id);
+/// Median distance of what a keyframe sees, in map units; 0 if that is nothing. num_landmarks: it
+/// is enough to look at about so many, spread over its features.
+double median_depth(const Map& map, KeyframeId id, std::size_t num_landmarks = SIZE_MAX);
 
 /// What a loop says the map is off by: the query where the map has it against where the loop puts
 /// it.

@@ -7,7 +7,7 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/base/median.h"
+#include "waymark/loop/drift.h"
 #include "waymark/optimize/pose_graph.h"
 
 namespace waymark {
@@ -37,22 +37,6 @@ constexpr std::size_t kNumForDepth = 32;
 /// What is left to gain, as a share of the cost, when the graph is as good as solved: a thousandth
 /// of a standard deviation.
 constexpr double kNegligibleShare = 1e-6;
-
-/// Median distance of what a keyframe sees, by some of that spread over its features; 0 where it
-/// sees nothing.
-double typical_depth(const Map& map, KeyframeId id) {
-  const Keyframe& keyframe = map.keyframes().at(id);
-  const auto num_seen = std::ranges::count_if(keyframe.landmarks, &LandmarkId::is_valid);
-  const std::size_t stride = static_cast<std::size_t>(num_seen) / kNumForDepth + 1;
-  std::vector<double> distances;
-  std::size_t number = 0;
-  for (const LandmarkId landmark : keyframe.landmarks) {
-    if (!landmark.is_valid() || number++ % stride != 0) continue;
-    distances.push_back(
-        (keyframe.rig_from_world * map.landmarks().at(landmark).position_in_world).norm());
-  }
-  return distances.empty() ? 0.0 : median(distances);
-}
 
 /// The essential graph of a map, one keyframe's links at a time.
 class EssentialGraph {
@@ -161,7 +145,7 @@ class PartGraph {
     for (const KeyframeId id : ids_) {
       graph_.node_from_world.push_back(Sim3(map.keyframes().at(id).rig_from_world));
       graph_.is_fixed.push_back(id == row.root || part.is_rim(id));
-      const double depth = typical_depth(map, id);
+      const double depth = median_depth(map, id, kNumForDepth);
       // A keyframe that sees nothing is as well placed as one that sees things nearby.
       depths_.push_back(depth > 0.0 ? depth : 1.0);
     }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "waymark/loop/odometry.h"
+#include "waymark/map/correction.h"
 
 namespace waymark {
 namespace {
@@ -26,11 +27,8 @@ class Motions {
 
   /// new_world_from_old_world around a keyframe.
   Sim3 of(const Map& now, KeyframeId id) const {
-    const Keyframe& keyframe = now.keyframes().at(id);
     const auto& [old_rig_from_world, old_scale] = *old_[id.value];
-    const Sim3 resized(
-        {1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), keyframe.applied_scale / old_scale);
-    return Sim3(keyframe.rig_from_world.inverse()) * resized * Sim3(old_rig_from_world);
+    return motion_since(old_rig_from_world, old_scale, now.keyframes().at(id));
   }
 
  private:

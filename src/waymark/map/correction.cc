@@ -125,6 +125,11 @@ void move_landmarks(Map& map, const MapCorrection& correction, const MotionTable
 
 }  // namespace
 
+Sim3 motion_since(const Rigid3& old_rig_from_world, double old_scale, const Keyframe& now) {
+  const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), now.applied_scale / old_scale);
+  return Sim3(now.rig_from_world.inverse()) * resized * Sim3(old_rig_from_world);
+}
+
 void apply_correction(Map& map, const MapCorrection& correction) {
   MotionTable motions(map.keyframes().end_id());
   for (const MapCorrection::KeyframeMove& move : correction.keyframes) {

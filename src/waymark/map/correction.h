@@ -46,6 +46,9 @@ struct MapCorrection {
   }
 };
 
+/// new_world_from_old_world around a keyframe, which stood and was scaled like this before.
+Sim3 motion_since(const Rigid3& old_rig_from_world, double old_scale, const Keyframe& now);
+
 /// Moves what the correction names to where it says; what it names but is erased is skipped. What
 /// it does not name, being younger, moves along (unless it is of a part): a keyframe by the
 /// similarity (rotation, translation, scale) of its nearest ancestor in the spanning tree that is

@@ -7,18 +7,16 @@
 
 #include "waymark/base/median.h"
 #include "waymark/geometry/sim3.h"
+#include "waymark/map/correction.h"
 #include "waymark/mapping/adjust_parts.h"
 
 namespace waymark {
 namespace {
 
-/// world_of_now_from_world_of_before around a keyframe of both.
+/// The same of a keyframe of both.
 Sim3 motion_since(const Map& before, const Map& now, KeyframeId id) {
   const Keyframe& old_one = before.keyframes().at(id);
-  const Keyframe& new_one = now.keyframes().at(id);
-  const double scale = new_one.applied_scale / old_one.applied_scale;
-  const Sim3 resized({1.0, 0.0, 0.0, 0.0}, Eigen::Vector3d::Zero(), scale);
-  return Sim3(new_one.rig_from_world.inverse()) * resized * Sim3(old_one.rig_from_world);
+  return motion_since(old_one.rig_from_world, old_one.applied_scale, now.keyframes().at(id));
 }
 
 /// New by old distance of what a keyframe sees, in the median; 1 where it sees nothing.

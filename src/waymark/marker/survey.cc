@@ -7,6 +7,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "waymark/geometry/damping.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/marker/square_pose.h"
 
 namespace waymark {
@@ -73,17 +75,16 @@ void add_corner(const MarkerView& view,
   }
   const Matrix23d w = sighting.pixel_from_bearing[i].cast<double>();
   const Eigen::Vector2d residual = w * (direction - bearing);
-  const double length = residual.norm();
-  const double weight = length > kHuberPx ? kHuberPx / length : 1.0;
-  sum.cost += length > kHuberPx ? 2.0 * kHuberPx * length - kHuberPx * kHuberPx : length * length;
+  const RobustValue robust = huber(residual.squaredNorm(), kHuberPx);
+  sum.cost += robust.loss;
   Eigen::Matrix<double, 3, 7> by_change;
   by_change << Eigen::Matrix3d::Identity(), -skew(corner), corner;
   const Eigen::Matrix3d in_cam_by_corner =
       map_from_marker.scale * (view.cam_from_map.rotation * map_from_marker.rotation).matrix();
   const Eigen::Matrix<double, 2, 7> jacobian =
       (w - (w * direction) * direction.transpose()) / range * in_cam_by_corner * by_change;
-  sum.information += weight * jacobian.transpose() * jacobian;
-  sum.gradient += weight * jacobian.transpose() * residual;
+  sum.information += robust.weight * jacobian.transpose() * jacobian;
+  sum.gradient += robust.weight * jacobian.transpose() * residual;
 }
 
 Equations equations_of(const Views& views, const Sim3& map_from_marker) {
@@ -97,26 +98,26 @@ Equations equations_of(const Views& views, const Sim3& map_from_marker) {
 /// Levenberg-Marquardt; the equations are those of the result.
 Equations refine(const Views& views, int max_iterations, Sim3& map_from_marker) {
   Equations now = equations_of(views, map_from_marker);
-  double damping = 1e-4;
-  for (int i = 0; i < max_iterations && damping < 1e8; ++i) {
+  TenfoldDamping damping;
+  for (int i = 0; i < max_iterations && damping.is_below(1e8); ++i) {
     Matrix7d damped = now.information;
-    damped.diagonal() *= 1.0 + damping;
+    damped.diagonal() *= damping.factor();
     damped.diagonal().array() += 1e-9;
     const Vector7d step = damped.ldlt().solve(-now.gradient);
     if (!step.allFinite() || step.norm() > 20.0) {
-      damping *= 10.0;
+      damping.reject();
       continue;
     }
     const Sim3 candidate = map_from_marker * Sim3::exp(step);
     const Equations then = equations_of(views, candidate);
     if (!(then.cost < now.cost)) {
-      damping *= 10.0;
+      damping.reject();
       continue;
     }
     const bool is_done = now.cost - then.cost < 1e-9 * now.cost;
     map_from_marker = candidate;
     now = then;
-    damping = std::max(0.1 * damping, 1e-9);
+    damping.accept();
     if (is_done) break;
   }
   return now;

@@ -9,6 +9,7 @@
 #include <utility>
 
 #include "waymark/base/median.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/sample.h"
 #include "waymark/image/small_image.h"
@@ -192,8 +193,8 @@ double PatchAligner::step(PatchAlignment& alignment) {
     if (is_seen_[k]) errors_.push_back(std::abs(error(k)));
   }
   if (errors_.empty()) return 0.0;
-  const float sigma = std::max(kMinErrorGrey, 1.4826f * median(errors_));
-  const float limit = 1.345f * sigma;  // Huber 1964.
+  const float sigma = std::max(kMinErrorGrey, kSigmaOfMedian * median(errors_));
+  const float limit = kHuberSigmas95 * sigma;
   using Vector7d = Eigen::Vector<double, 7>;
   Vector7d unit = Vector7d::Ones();
   unit.head<3>().setConstant(range_);  // So that lengths are of the size of angles.
@@ -208,7 +209,7 @@ double PatchAligner::step(PatchAlignment& alignment) {
     jacobian << alignment.gain * points_.gradients[k], points_.greys[k];
     jacobian.array() *= unit.array();
     const float e = error(k);
-    const double weight = std::min(1.0f, limit / std::max(std::abs(e), 1e-6f));
+    const double weight = huber_weight(e, limit);
     hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
     gradient += weight * e * jacobian;
   }

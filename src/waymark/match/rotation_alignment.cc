@@ -11,6 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/image/convert.h"
 #include "waymark/image/sample.h"
 #include "waymark/match/correlation.h"
@@ -231,7 +232,7 @@ double RotationAligner::step(RotationAlignment& alignment) {
     if (is_seen_[i]) errors_.push_back(std::abs(error(i)));
   }
   if (errors_.empty()) return 0.0;
-  const float limit = 1.345f * 1.4826f * std::max(1.0f, median(errors_));  // Huber 1964.
+  const float limit = kHuberSigmas95 * kSigmaOfMedian * std::max(1.0f, median(errors_));
   using Vector5d = Eigen::Vector<double, 5>;
   Eigen::Matrix<double, 5, 5> hessian = 1e-9 * Eigen::Matrix<double, 5, 5>::Identity();
   Vector5d gradient = Vector5d::Zero();
@@ -240,7 +241,7 @@ double RotationAligner::step(RotationAlignment& alignment) {
     Vector5d jacobian;
     jacobian << alignment.gain * points_.gradients[i], points_.greys[i], 1.0;
     const float e = error(i);
-    const double weight = points_.weights[i] * std::min(1.0f, limit / std::max(std::abs(e), 1e-6f));
+    const double weight = points_.weights[i] * huber_weight(e, limit);
     hessian.selfadjointView<Eigen::Lower>().rankUpdate(jacobian, weight);
     gradient += weight * e * jacobian;
   }

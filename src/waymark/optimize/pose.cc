@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "waymark/base/median.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/levenberg_marquardt.h"
 #include "waymark/solver/pose_kernel.h"
 #include "waymark/solver/residual.h"

@@ -12,6 +12,8 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/thread_pool.h"
+#include "waymark/geometry/damping.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/optimize/pose_graph.h"
 #include "waymark/optimize/pose_graph_system.h"
 #include "waymark/solver/levenberg_marquardt.h"

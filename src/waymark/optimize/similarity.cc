@@ -11,6 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/geometry/alignment.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/levenberg_marquardt.h"
 #include "waymark/solver/residual.h"
 

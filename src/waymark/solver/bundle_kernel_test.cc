@@ -10,6 +10,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/camera/perspective.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/residual.h"
 #include "waymark/solver/schur_equations.h"
 

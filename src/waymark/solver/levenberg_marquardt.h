@@ -7,33 +7,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/geometry/damping.h"
+
 namespace waymark {
-
-/// Damping of Levenberg-Marquardt (Madsen, Nielsen & Tingleff 2004, 3.2), to be scaled by the
-/// diagonal of the Hessian (Marquardt 1963).
-class Damping {
- public:
-  explicit Damping(double initial, double least = 0.0) : value_(initial), least_(least) {}
-
-  double value() const { return value_; }
-
-  /// After a step that lowered the cost by `gain` times as much as the linear model promised.
-  void accept(double gain) {
-    value_ *= std::max(1.0 / 3.0, 1.0 - std::pow(2.0 * gain - 1.0, 3));
-    value_ = std::max(value_, least_);
-    growth_ = 2.0;
-  }
-
-  void reject() {
-    value_ *= growth_;
-    growth_ *= 2.0;
-  }
-
- private:
-  double value_;
-  double growth_ = 2.0;
-  double least_;
-};
 
 /// Of a robust sum of squares; hessian * step = -gradient. All without the factor 2 of the
 /// derivative of a square.

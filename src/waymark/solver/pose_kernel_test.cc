@@ -6,6 +6,7 @@
 #include <hwy/highway.h>
 
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/residual.h"
 #include "waymark/solver/testing/scene.h"
 

@@ -11,6 +11,7 @@
 #include <span>
 #include <vector>
 
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/solver/bundle_kernel.h"
 #include "waymark/solver/calibration_border.h"
 #include "waymark/solver/residual.h"

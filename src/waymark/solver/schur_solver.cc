@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "waymark/geometry/damping.h"
 #include "waymark/solver/levenberg_marquardt.h"
 #include "waymark/solver/schur_equations.h"
 
