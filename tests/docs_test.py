@@ -17,6 +17,7 @@ sys.path.insert(0, str(ROOT / "script"))
 from documentation.blocks import Failure, Runner  # noqa: E402
 from documentation.chapters import check_chapters  # noqa: E402
 from documentation.glossary import check_glossary  # noqa: E402
+from documentation.header_examples import check_header_examples  # noqa: E402
 from documentation.links import broken  # noqa: E402
 from documentation.pages import Page, anchor_of  # noqa: E402
 
@@ -164,6 +165,33 @@ class Glossary(unittest.TestCase):
         self.write("script/documentation/terms.txt", "keeper\nreader\nclass\n")
         self.assertEqual(check_glossary(self.root),
                          ["script/documentation/terms.txt:3: class is not in its place, expected sorted words"])
+
+
+class HeaderExamples(unittest.TestCase):
+    """A small tree of two public headers."""
+
+    def setUp(self):
+        folder = tempfile.TemporaryDirectory()
+        self.addCleanup(folder.cleanup)
+        self.root = pathlib.Path(folder.name)
+        self.write("cmake/WaymarkPublicHeaders.cmake", "set(roots\n  map/map.h # values\n  map/rig.h)\n")
+        types = "".join(f"struct {name} {{}};\n" for name in "Input System Viewer FrameImages Map Settings".split())
+        self.write("src/waymark/map/map.h", f"#pragma once\n\n// A map.\n//\n//   Map other = map;\n\nnamespace waymark {{\n{types}}}\n")
+        self.write("src/waymark/map/rig.h", "#pragma once\n\n// A rig.\n\nnamespace waymark { struct Rig {}; }\n")
+
+    def write(self, name, text):
+        path = self.root / name
+        path.parent.mkdir(parents=True, exist_ok=True)
+        path.write_text(text, encoding="utf-8")
+
+    def test_header_without_one_is_named(self):
+        self.assertIn("src/waymark/map/rig.h:1: does not open with an example of its use", check_header_examples(self.root))
+
+    def test_what_does_not_compile_is_named(self):
+        self.write("src/waymark/map/rig.h", "#pragma once\n\n// A rig.\n//\n//   Rig other = rig;\n\nnamespace waymark { struct Rig {}; }\n")
+        self.assertEqual(check_header_examples(self.root), [])
+        self.write("src/waymark/map/rig.h", "#pragma once\n\n// A rig.\n//\n//   other = rig;\n\nnamespace waymark { struct Rig {}; }\n")
+        self.assertRegex(check_header_examples(self.root)[0], r"^map/rig.h, example:1:1: error: .*other.*")
 
 
 class Results(CliTest):

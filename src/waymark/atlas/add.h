@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Map files become part of an atlas.
+//
+//   Atlas atlas = Atlas::open_or_create("building.atlas");
+//   const std::vector<std::filesystem::path> maps = {"monday.wmap", "tuesday.wmap"};
+//   const AddedMaps added = add_maps(atlas, maps, kKeyframesPerTile, /*seed=*/0);
+//   std::printf("%zu maps in %zu tiles, %zu links\n", added.num_added, added.num_tiles,
+//   added.num_links);
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

@@ -2,6 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// A map of any size, in tiles that are opened one by one.
+//
+//   const Atlas atlas = Atlas::open("building.atlas");
+//   for (const AtlasTile& tile : atlas.contents().tiles) {
+//     const StoredMap stored = atlas.load_tile(tile);
+//     stored.map->landmarks().for_each([&](LandmarkId, const Landmark& landmark) {
+//       std::cout << (tile.atlas_from_tile * landmark.position_in_world).transpose() << "\n";
+//     });
+//   }
+
 #include <Eigen/Core>
 #include <cstdint>
 #include <filesystem>

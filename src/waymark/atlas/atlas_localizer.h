@@ -2,6 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Images are found in an atlas.
+//
+//   AtlasLocalizer localizer(rig, settings, Atlas::open("building.atlas"));
+//   const TrackingResult result = localizer.locate(images);
+//   if (result.world_from_rig) std::cout << result.world_from_rig->translation.transpose() << "\n";
+
 #include <cstddef>
 #include <memory>
 #include <optional>

@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// An atlas as one map, for what takes a map.
+//
+//   const StoredMap whole = export_atlas(Atlas::open("building.atlas"));
+//   save_map("building.wmap", whole);
+
 #include "waymark/atlas/atlas.h"
 
 namespace waymark {

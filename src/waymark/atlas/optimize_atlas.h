@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// All tiles of an atlas are adjusted to each other.
+//
+//   Atlas atlas = Atlas::open("building.atlas");
+//   optimize_atlas(atlas, [](const std::string& step) { std::cout << step << "\n"; });
+
 #include <cstddef>
 #include <functional>
 #include <string>

@@ -2,6 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// What comes from outside and is wrong is an InputError of one line; a broken promise of our own
+// code fails a check.
+//
+//   try {
+//     const StoredMap stored = load_map("house.wmap");
+//     WAYMARK_CHECK(stored.map != nullptr);
+//   } catch (const InputError& error) {
+//     std::cerr << "error: " << error.what() << "\n";
+//   }
+
 #include <stdexcept>
 #include <string>
 

@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Settings and cameras are YAML; what is given later replaces what was given before.
+//
+//   const ConfigNode config = merge_configs({ConfigSource::from_file("camchain.yaml"),
+//                                            ConfigSource::from_assignment("features.count=1500")});
+//   Settings changed;
+//   read_settings(changed, config);
+//   const std::optional<CameraChain> chain = read_camchain(config);
+
 #include <filesystem>
 #include <memory>
 #include <string>

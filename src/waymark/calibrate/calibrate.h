@@ -2,6 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// The calibration of a camera that nobody knows, from its images alone.
+//
+//   const EstimatedCalibration found = calibrate(input, CalibrateOptions());
+//   std::cout << describe(found) << "\n";
+//   if (found.is_sure) std::cout << format_camchain(found.chain());
+
 #include <cstddef>
 #include <functional>
 #include <optional>

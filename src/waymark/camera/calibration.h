@@ -2,6 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// What the images told of a calibration, and the numbers of a rig as one vector.
+//
+//   for (const CalibrationEstimate& number : system.calibration()) {
+//     std::cout << number.name << " " << number.given + number.change << " +- " << number.sigma <<
+//     "\n";
+//   }
+//   const CalibrationParameters parameters(rig);
+//   const std::optional<Rig> same = parameters.rig_at(Eigen::VectorXd::Zero(parameters.size()));
+
 #include <Eigen/Core>
 #include <cmath>
 #include <cstddef>

@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Cameras as Kalibr writes them.
+//
+//   const ConfigNode config = parse_config(ConfigSource::from_file("camchain.yaml"));
+//   if (const std::optional<CameraChain> chain = read_camchain(config)) {
+//     const Rig cameras = make_rig(*chain);
+//     std::cout << cameras.cameras.size() << " cameras\n" << format_camchain(*chain);
+//   }
+
 #include <Eigen/Core>
 #include <optional>
 #include <string>

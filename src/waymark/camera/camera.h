@@ -2,6 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Directions to pixels and back, whole arrays at a time.
+//
+//   const Camera& camera = *rig.cameras[0].camera;
+//   const std::vector<Eigen::Vector2d> pixels = {{320.0, 240.0}};
+//   std::vector<Eigen::Vector3d> bearings(pixels.size());
+//   std::vector<std::uint8_t> is_valid(pixels.size());
+//   camera.unproject(pixels, bearings, is_valid);
+//   if (is_valid[0]) std::cout << bearings[0].transpose() << "\n";
+
 #include <Eigen/Core>
 #include <cstdint>
 #include <functional>

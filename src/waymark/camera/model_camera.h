@@ -2,6 +2,27 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// A camera of one's own: three functions of one point; examples/custom_camera is a whole one.
+//
+//   struct Pinhole {
+//     static constexpr std::string_view kName = "my_pinhole";
+//     double f, u, v;  // px
+//     std::optional<Eigen::Vector2d> project(const Eigen::Vector3d& p) const {
+//       if (p.z() <= 0.0) return std::nullopt;
+//       return Eigen::Vector2d(f * p.x() / p.z() + u, f * p.y() / p.z() + v);
+//     }
+//     std::optional<Eigen::Vector3d> unproject(const Eigen::Vector2d& pixel) const {
+//       return Eigen::Vector3d((pixel.x() - u) / f, (pixel.y() - v) / f, 1.0).normalized();
+//     }
+//     Matrix23d jacobian(const Eigen::Vector3d& p) const {
+//       return (Matrix23d() << f, 0.0, -f * p.x() / p.z(), 0.0, f, -f * p.y() / p.z()).finished() /
+//       p.z();
+//     }
+//   };
+//   inline std::shared_ptr<const Camera> make_pinhole() {
+//     return std::make_shared<ModelCamera<Pinhole>>(Pinhole{400.0, 320.0, 240.0}, 640, 480);
+//   }
+
 #include <concepts>
 #include <optional>
 #include <string_view>

@@ -2,6 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Models by the names that files use.
+//
+//   CameraRegistry registry = CameraRegistry::with_builtin_models();
+//   registry.add("my_camera", [&](const CameraDescription& description) {
+//     expect_intrinsics(description, "fu fv pu pv");
+//     return CameraRegistry::with_builtin_models().make_camera(description);
+//   });
+//   const StoredMap stored = load_map("house.wmap", registry);
+
 #include <map>
 #include <memory>
 #include <string>

@@ -2,6 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Cameras that move as one body; camera 0 is the origin.
+//
+//   for (const RigCamera& one : rig.cameras) {
+//     std::cout << one.camera->model() << " at "
+//               << one.cam_from_rig.inverse().translation.transpose() << " m\n";
+//   }
+
 #include <algorithm>
 #include <memory>
 #include <optional>

@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// A trajectory against the truth.
+//
+//   const std::vector<StampedPose> estimate = read_trajectory("out/trajectory.txt");
+//   const std::vector<StampedPose> truth = read_trajectory("groundtruth.txt");
+//   EvaluationOptions options;
+//   options.alignment = TrajectoryAlignment::kSim3;
+//   std::cout << evaluate(estimate, truth, options).ate_m.rmse << " m\n";
+
 #include <cstddef>
 #include <cstdint>
 #include <optional>

@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// A map for other programs.
+//
+//   const ExportScene scene = make_export_scene(map, SubmapId{0});
+//   write_ply("points.ply", scene);
+
 #include <filesystem>
 #include <string>
 

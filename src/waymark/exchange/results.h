@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// The files that a run leaves.
+//
+//   FrameTable table;
+//   table.frames.push_back(FrameRecord());
+//   const FrameCounts counts = count_frames(table.frames);
+//   write_frames_csv("out", table);
+//   std::cout << counts.tracked << " of " << counts.frames << " frames tracked\n";
+
 #include <Eigen/Core>
 #include <array>
 #include <cstddef>

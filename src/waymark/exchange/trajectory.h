@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Trajectories in files of TUM, KITTI and EuRoC.
+//
+//   std::vector<StampedPose> poses;
+//   for (const TrajectoryFrame& frame : system.trajectory()) {
+//     poses.push_back({frame.timestamp_ns, frame.world_from_rig});
+//   }
+//   write_trajectory("trajectory.txt", poses, TrajectoryFormat::kTum);
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>

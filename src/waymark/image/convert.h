@@ -2,6 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Grey values of colour, and fewer pixels.
+//
+//   const ColorImage color(1280, 960);
+//   const Image grey = to_grey(color.view());
+//   const Image half = reduce(grey.view(), 2.0);
+
 #include <array>
 #include <cstdint>
 

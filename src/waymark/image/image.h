@@ -2,6 +2,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Images, owned or borrowed, and what a rig sees at one moment.
+//
+//   const Image left(640, 480), right(640, 480);
+//   FrameImages moment;
+//   moment.timestamp_ns = 1'000'000'000;
+//   moment.image0 = left.view();
+//   moment.image1 = right.view();
+//   const TrackingResult& result = system.feed(moment);
+
 #include <cstddef>
 #include <cstdint>
 #include <vector>

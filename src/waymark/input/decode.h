@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Images in files or memory.
+//
+//   if (const std::optional<Image> image = read_grey_image("0001.png")) {
+//     std::cout << image->width_px << " x " << image->height_px << "\n";
+//   } else {
+//     std::cerr << describe_bad_image("0001.png") << "\n";
+//   }
+
 #include <cstdint>
 #include <filesystem>
 #include <optional>

@@ -2,6 +2,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Data sets, folders, videos and cameras, frame by frame.
+//
+//   const std::unique_ptr<Input> source = open_input("recording.mp4", InputOptions());
+//   while (const std::optional<InputFrame> frame = source->next()) {
+//     if (frame->fault != FrameFault::kNone) continue;
+//     std::cout << frame->timestamp_ns << " ns, " << frame->images.size() << " images\n";
+//   }
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

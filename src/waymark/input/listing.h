@@ -2,6 +2,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// What readers of data sets are made of: the files of all frames, which an input then reads.
+//
+//   Listing listing;
+//   listing.format = "mine";
+//   listing.title = "My data set";
+//   const std::vector<std::filesystem::path> files = list_images("images");
+//   const std::vector<std::int64_t> times = read_times("times.txt", files.size(), "images");
+//   for (std::size_t i = 0; i < files.size(); ++i) listing.frames.push_back({times[i],
+//   {files[i]}});
+
 #include <cstddef>
 #include <cstdint>
 #include <filesystem>

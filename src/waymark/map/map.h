@@ -2,6 +2,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Keyframes, landmarks, and who sees what. What System and files give is frozen, to be read from
+// any thread.
+//
+//   const std::shared_ptr<const Map> frozen = system.map();
+//   frozen->keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
+//     const Eigen::Vector3d position = keyframe.rig_from_world.origin_in_source();
+//     std::cout << id.value << " at " << position.transpose() << "\n";
+//   });
+//   frozen->landmarks().for_each([](LandmarkId, const Landmark& landmark) {
+//     std::cout << landmark.observations.size() << " keyframes see "
+//               << landmark.position_in_world.transpose() << "\n";
+//   });
+
 #include <Eigen/Core>
 #include <algorithm>
 #include <compare>

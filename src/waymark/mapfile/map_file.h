@@ -2,6 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Maps on disk.
+//
+//   save_map("house.wmap", {system.map(), settings_as_yaml(settings), {}});
+//   const StoredMap stored = load_map("house.wmap");
+//   Localizer localizer(rig, settings, stored.map);
+
 #include <filesystem>
 #include <iosfwd>
 #include <map>

@@ -2,6 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Rendered images with their truth.
+//
+//   SequenceSpec spec;
+//   CameraDescription camera;
+//   camera.camera_model = "pinhole";
+//   camera.intrinsics = {400.0, 400.0, 320.0, 240.0};
+//   camera.width_px = 640;
+//   camera.height_px = 480;
+//   spec.chain = mono_chain(camera);
+//   spec.world = "room";
+//   spec.num_frames = 100;
+//   SimulatedSequence sequence(spec);
+//   for (int i = 0; i < sequence.num_frames(); ++i) {
+//     const SimulatedFrame frame = sequence.frame(i);
+//     std::cout << frame.timestamp_ns << " " << frame.world_from_rig.translation.transpose() <<
+//     "\n";
+//   }
+
 #include <cstdint>
 #include <filesystem>
 #include <memory>

@@ -2,6 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Images are found in a map that stays as it is.
+//
+//   Localizer localizer(rig, settings, load_map("house.wmap").map);
+//   const TrackingResult alone = localizer.locate(images);
+//   const TrackingResult next = localizer.track(images);  // of a stream: near the one before
+//   if (next.world_from_rig) std::cout << next.world_from_rig->translation.transpose() << "\n";
+
 #include <memory>
 #include <optional>
 #include <vector>

@@ -2,6 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// All settings, with their defaults; docs/settings.md lists them.
+//
+//   Settings changed;
+//   changed.features.count = 1500;
+//   read_settings(changed, parse_config(ConfigSource::from_file("settings.yaml")));
+//   System other(rig, changed, Timing::kLockstep);
+
 #include <cstdint>
 
 #include "waymark/features/settings.h"

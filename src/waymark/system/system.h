@@ -2,6 +2,21 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// The whole pipeline: images in, poses and a map out.
+//
+//   System slam(rig, settings, Timing::kLockstep);
+//   while (const std::optional<InputFrame> frame = input.next()) {
+//     if (frame->fault != FrameFault::kNone) continue;
+//     FrameImages moment;
+//     moment.timestamp_ns = frame->timestamp_ns;
+//     moment.image0 = frame->images[0].view();
+//     const TrackingResult& result = slam.feed(moment);
+//     if (result.world_from_rig) std::cout << result.world_from_rig->translation.transpose() <<
+//     "\n";
+//   }
+//   slam.finish();
+//   save_map("house.wmap", {slam.map(), settings_as_yaml(settings), {}});
+
 #include <cstddef>
 #include <cstdint>
 #include <memory>

@@ -2,6 +2,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// Shows a session in a viewer, frame by frame.
+//
+//   ViewPublisher publisher(viewer, input.info().num_frames);
+//   const TrackingResult& result = system.feed(images);
+//   publisher.tell(system, images, result);
+//   publisher.finish(system);
+
 #include <chrono>
 #include <cstddef>
 #include <deque>

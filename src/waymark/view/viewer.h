@@ -2,6 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// The page in the browser; ViewPublisher tells it of a session.
+//
+//   Viewer page(ViewerOptions{"127.0.0.1", 0}, SessionInfo());
+//   std::cout << "open " << page.url() << "\n";
+
 #include <cstdint>
 #include <memory>
 #include <optional>

@@ -2,6 +2,17 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+// What every camera model has to pass, in a test of GoogleTest.
+//
+//   TEST(MyCamera, IsACamera) {
+//     CameraDescription description;
+//     description.camera_model = "pinhole";
+//     description.intrinsics = {400.0, 400.0, 320.0, 240.0};
+//     description.width_px = 640;
+//     description.height_px = 480;
+//     expect_camera_is_sound(*CameraRegistry::with_builtin_models().make_camera(description));
+//   }
+
 #include <gtest/gtest.h>
 
 #include <Eigen/Geometry>
