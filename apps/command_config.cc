@@ -15,7 +15,7 @@
 #include "waymark/base/config.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/exchange/config_file.h"
+#include "waymark/input/config_file.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/system/settings.h"
 

@@ -5,7 +5,7 @@
 #include "commands.h"
 #include "input_command.h"
 #include "terminal.h"
-#include "waymark/exchange/input_report.h"
+#include "waymark/input/input_report.h"
 
 namespace waymark {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "reporter.h"
 #include "waymark/calibrate/calibrate.h"
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/session/session.h"
 #include "waymark/session/session_options.h"

@@ -19,7 +19,7 @@
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/failure.h"
-#include "waymark/exchange/config_file.h"
+#include "waymark/input/config_file.h"
 
 namespace waymark {
 namespace {

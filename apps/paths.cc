@@ -13,7 +13,7 @@
 #include "waymark/atlas/atlas.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 namespace {

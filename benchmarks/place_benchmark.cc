@@ -35,12 +35,12 @@
 #include "waymark/base/config.h"
 #include "waymark/base/rng.h"
 #include "waymark/evaluate/association.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/features/features.h"
 #include "waymark/features/frame_builder.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/input/input.h"
 #include "waymark/place/place_index.h"
+#include "waymark/results/trajectory.h"
 
 namespace {
 

@@ -20,8 +20,8 @@
 #include <vector>
 
 #include "waymark/camera/registry.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/testing/town_map.h"
 #include "waymark/simulate/testing/town_session.h"

@@ -19,8 +19,8 @@ set(roots
   camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
   evaluate/evaluation.h
   exchange/exports.h # COLMAP, nerfstudio, PLY
-  exchange/results.h
-  exchange/trajectory.h
+  results/results.h
+  results/trajectory.h
   image/convert.h # colour to grey, depth from metres
   image/image.h
   input/decode.h # images

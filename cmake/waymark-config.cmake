@@ -1,6 +1,6 @@
 # find_package(waymark) gives waymark::waymark, which is all of it, and its modules one by one:
 # waymark::base geometry camera image features marker map match place solver optimize track mapping loop bag input mapfile
-# exchange system session view simulate evaluate.
+# results exchange system session view simulate evaluate.
 include(CMakeFindDependencyMacro)
 find_dependency(Threads)
 find_dependency(Eigen3 3.4 NO_MODULE)

@@ -12,8 +12,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/settings.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/exchange/config_file.h"
 #include "waymark/features/frame_builder.h"
+#include "waymark/input/config_file.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/input/image_times.h"
 

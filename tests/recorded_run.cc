@@ -4,7 +4,7 @@
 
 #include <cstdlib>
 
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/session/session_options.h"
 
 namespace waymark {

@@ -8,8 +8,8 @@
 
 #include "waymark/camera/rig.h"
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/session/session.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/sequence.h"

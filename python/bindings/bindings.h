@@ -15,8 +15,8 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/exchange/trajectory.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/system/system.h"
 
 namespace waymark::python {

@@ -19,7 +19,7 @@
 #include "waymark/exchange/align_map.h"
 #include "waymark/exchange/export_map.h"
 #include "waymark/exchange/export_split.h"
-#include "waymark/exchange/input_report.h"
+#include "waymark/input/input_report.h"
 #include "waymark/session/merging.h"
 
 namespace waymark::python {

@@ -16,7 +16,7 @@
 #include "pictures.h"
 #include "texts.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/system/system.h"
 
 namespace waymark::python {

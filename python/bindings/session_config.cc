@@ -12,7 +12,7 @@
 #include "waymark/base/config.h"
 #include "waymark/base/config_value.h"
 #include "waymark/base/text.h"
-#include "waymark/exchange/config_file.h"
+#include "waymark/input/config_file.h"
 
 namespace waymark::python {
 namespace {

@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

@@ -17,8 +17,8 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/exchange/trajectory.h"
 #include "waymark/geometry/sim3.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

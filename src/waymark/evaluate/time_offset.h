@@ -6,7 +6,7 @@
 #include <optional>
 #include <span>
 
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

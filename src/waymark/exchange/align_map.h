@@ -8,9 +8,9 @@
 #include <string>
 #include <vector>
 
-#include "waymark/exchange/trajectory.h"
 #include "waymark/map/align.h"
 #include "waymark/map/map.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

@@ -8,8 +8,8 @@
 #include <vector>
 
 #include "waymark/exchange/export_scene.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/image/image.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

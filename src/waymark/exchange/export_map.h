@@ -8,9 +8,9 @@
 #include <vector>
 
 #include "waymark/exchange/export_frames.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

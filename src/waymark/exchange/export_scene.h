@@ -10,9 +10,9 @@
 #include <vector>
 
 #include "waymark/camera/camera.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/map/map.h"
 #include "waymark/mapfile/map_file.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

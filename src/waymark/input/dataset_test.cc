@@ -6,11 +6,11 @@
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
 #include "waymark/input/input.h"
 #include "waymark/input/testing/images.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 namespace {

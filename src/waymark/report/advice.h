@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 

@@ -7,7 +7,7 @@
 #include <vector>
 
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 

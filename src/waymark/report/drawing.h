@@ -11,7 +11,7 @@
 #include <vector>
 
 #include "waymark/evaluate/evaluation.h"
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

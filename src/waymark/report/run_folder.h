@@ -8,8 +8,8 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/exchange/results.h"
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/results.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 

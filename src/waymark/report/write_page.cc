@@ -2,8 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/report/report.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

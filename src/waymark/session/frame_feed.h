@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/exchange/results.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
+#include "waymark/results/results.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/system/system.h"
 
 namespace waymark {

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
-#include "waymark/exchange/results.h"
 #include "waymark/map/map.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 

@@ -10,10 +10,10 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/exchange/results.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/input/input.h"
 #include "waymark/map/map.h"
+#include "waymark/results/results.h"
+#include "waymark/results/trajectory.h"
 #include "waymark/session/calibration_monitor.h"
 #include "waymark/session/frame_feed.h"
 #include "waymark/system/localizer.h"

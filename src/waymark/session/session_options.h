@@ -10,7 +10,7 @@
 
 #include "waymark/base/timing.h"
 #include "waymark/calibrate/calibrate.h"
-#include "waymark/exchange/config_file.h"
+#include "waymark/input/config_file.h"
 #include "waymark/input/input.h"
 #include "waymark/mapfile/map_file.h"
 #include "waymark/system/settings.h"

@@ -13,8 +13,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/image/opencv_image.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 namespace {

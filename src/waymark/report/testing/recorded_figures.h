@@ -4,7 +4,7 @@
 
 #include <cstdint>
 
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 namespace waymark {
 

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/config_file.h"
+#include "waymark/input/config_file.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

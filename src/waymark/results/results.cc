@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/results.h"
+#include "waymark/results/results.h"
 
 #include <fmt/format.h>
 

@@ -26,8 +26,8 @@
 
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/calibration.h"
-#include "waymark/exchange/trajectory.h"
 #include "waymark/image/image_statistics.h"
+#include "waymark/results/trajectory.h"
 
 namespace waymark {
 

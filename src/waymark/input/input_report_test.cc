@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/input_report.h"
+#include "waymark/input/input_report.h"
 
 #include <gmock/gmock.h>
 

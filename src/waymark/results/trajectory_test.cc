@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/exchange/trajectory.h"
+#include "waymark/results/trajectory.h"
 
 #include <gmock/gmock.h>
 
