@@ -17,22 +17,22 @@
 namespace waymark {
 namespace {
 
-constexpr int kSizePx = 400;
+constexpr int kViewSizePx = 400;
 constexpr double kCenterPx = 200.0;
 
 /// 100 pixels per radian: covers 229 degrees at the borders.
 std::shared_ptr<const Camera> make_fisheye(double k1 = 0.0) {
   const ImagePlane plane{{100.0, 100.0}, {kCenterPx, kCenterPx}};
   return std::make_shared<FisheyeCamera>(
-      FisheyeModel(plane, {k1, 0.0, 0.0, 0.0}), kSizePx, kSizePx);
+      FisheyeModel(plane, {k1, 0.0, 0.0, 0.0}), kViewSizePx, kViewSizePx);
 }
 
 /// Texture within a circle, black with a little noise outside.
 PaddedImage make_vignetted(double radius_px) {
-  PaddedImage image = testing::make_texture(kSizePx, kSizePx, 4);
-  const PaddedImage noise = testing::make_noise(kSizePx, kSizePx, 5);
-  for (int y = 0; y < kSizePx; ++y) {
-    for (int x = 0; x < kSizePx; ++x) {
+  PaddedImage image = testing::make_texture(kViewSizePx, kViewSizePx, 4);
+  const PaddedImage noise = testing::make_noise(kViewSizePx, kViewSizePx, 5);
+  for (int y = 0; y < kViewSizePx; ++y) {
+    for (int x = 0; x < kViewSizePx; ++x) {
       std::uint8_t& value = image.row(y)[x];
       value = std::max<std::uint8_t>(value, 30);
       if (std::hypot(x - kCenterPx, y - kCenterPx) > radius_px) value = noise.row(y)[x] % 12;
@@ -95,22 +95,22 @@ TEST(ViewMask, FindsTheImageCircle) {
   ViewMask mask(make_fisheye(), {});
   EXPECT_TRUE(mask.levels().is_empty());
   PaddedImage black;
-  black.resize(kSizePx, kSizePx);
-  for (int y = 0; y < kSizePx; ++y) std::fill_n(black.row(y), kSizePx, std::uint8_t{3});
+  black.resize(kViewSizePx, kViewSizePx);
+  for (int y = 0; y < kViewSizePx; ++y) std::fill_n(black.row(y), kViewSizePx, std::uint8_t{3});
   mask.learn(black.view());  // The lid is still on.
   EXPECT_TRUE(mask.levels().is_empty());
   mask.learn(make_vignetted(150.0).view());
   mask.learn(make_vignetted(170.0).view());  // The first image was dark at the border.
   EXPECT_TRUE(mask.levels().allows({kCenterPx + 170.0 - 25.0, kCenterPx}, 0));
   EXPECT_FALSE(mask.levels().allows({kCenterPx + 170.0 - 19.0, kCenterPx}, 0));
-  mask.learn(testing::make_texture(kSizePx, kSizePx, 4).view());
+  mask.learn(testing::make_texture(kViewSizePx, kViewSizePx, 4).view());
   EXPECT_TRUE(mask.levels().is_empty());
 }
 
 TEST(ViewMask, CombinesWithAnotherMask) {
   ViewMask mask(make_fisheye(-0.1), {});
-  Image other(kSizePx, kSizePx);
-  std::fill_n(other.values.begin(), kSizePx * kSizePx / 2, std::uint8_t{1});
+  Image other(kViewSizePx, kViewSizePx);
+  std::fill_n(other.values.begin(), kViewSizePx * kViewSizePx / 2, std::uint8_t{1});
   Image buffer;
   const ImageView combined = mask.levels().combined_with(other.view(), buffer);
   EXPECT_EQ(combined.at(200, 190), Pyramid::kNumLevels);

@@ -24,10 +24,10 @@ constexpr const char* kOwn =
 constexpr const char* kOpencv =
     "%YAML:1.0\n---\nimage_width: 640\nimage_height: 480\n"
     "camera_matrix: [400, 0, 320, 0, 401, 240, 0, 0, 1]\ndistortion_coefficients: [0, 0, 0, 0]\n";
-constexpr const char* kRos =
+constexpr const char* kRosFile =
     "width: 640\nheight: 480\ndistortion_model: plumb_bob\nd: [0, 0, 0, 0, 0]\n"
     "k: [400, 0, 320, 0, 401, 240, 0, 0, 1]\n";
-constexpr const char* kColmap = "# Camera list\n7 PINHOLE 640 480 400 401 320.5 240.5\n";
+constexpr const char* kColmapFile = "# Camera list\n7 PINHOLE 640 480 400 401 320.5 240.5\n";
 constexpr const char* kNerfstudio =
     R"({"camera_model": "OPENCV", "fl_x": 400, "fl_y": 401, "cx": 320.5, "cy": 240.5, "w": 640,
         "h": 480, "frames": [{"file_path": "a.jpg", "transform_matrix": [[1]]}]})";
@@ -60,8 +60,8 @@ TEST(ConfigFile, IsTakenAsOtherProgramsWriteIt) {
   const testing::TemporaryFolder folder;
   const std::vector<std::pair<std::string, std::string>> files = {{"own.yaml", kOwn},
                                                                   {"opencv.yaml", kOpencv},
-                                                                  {"ros.yaml", kRos},
-                                                                  {"cameras.txt", kColmap},
+                                                                  {"ros.yaml", kRosFile},
+                                                                  {"cameras.txt", kColmapFile},
                                                                   {"cameras.bin", colmap_binary()},
                                                                   {"transforms.json", kNerfstudio},
                                                                   {"per_frame.json", kPerFrame}};
@@ -108,14 +108,14 @@ TEST(ConfigFile, OfTwoCamerasIsAPairOrTheLastOne) {
   const std::string turn = "r: [1, 0, 0, 0, 1, 0, 0, 0, 1]\n";
   const std::string plane = "401, 240, 0, 0, 0, 1, 0]\n";
   const std::vector<std::filesystem::path> pair = {
-      folder.write("left.yaml", kRos + turn + "p: [400, 0, 320, 0, 0, " + plane),
-      folder.write("right.yaml", kRos + turn + "p: [400, 0, 320, -40, 0, " + plane)};
+      folder.write("left.yaml", kRosFile + turn + "p: [400, 0, 320, 0, 0, " + plane),
+      folder.write("right.yaml", kRosFile + turn + "p: [400, 0, 320, -40, 0, " + plane)};
   std::vector<std::string> notes;
   const auto chain = read_camchain(merge_configs(read_config_files(pair, notes)));
   ASSERT_EQ(chain.value().cameras.size(), 2u);
   EXPECT_NEAR(chain->cameras[1].cam_from_rig.translation.x(), -0.1, 1e-12);
   const std::vector<std::filesystem::path> others = {folder.write("opencv.yaml", kOpencv),
-                                                     folder.write("ros.yaml", kRos)};
+                                                     folder.write("ros.yaml", kRosFile)};
   notes.clear();
   EXPECT_EQ(read_camchain(merge_configs(read_config_files(others, notes))).value().cameras.size(),
             1u);
@@ -153,7 +153,7 @@ TEST(ConfigFile, OfNerfstudioMayHaveOtherModels) {
 TEST(ConfigFile, ThatIsDamagedIsOneLine) {
   Rng rng(7, 1);
   for (const std::string& whole :
-       {std::string(kColmap), colmap_binary(), std::string(kNerfstudio)}) {
+       {std::string(kColmapFile), colmap_binary(), std::string(kNerfstudio)}) {
     for (int i = 0; i < 300; ++i) {
       std::string text = whole.substr(0, 1 + rng.below(static_cast<std::uint32_t>(whole.size())));
       text[rng.below(static_cast<std::uint32_t>(text.size()))] = static_cast<char>(rng.below(256));

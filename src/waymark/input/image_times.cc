@@ -49,7 +49,7 @@ std::optional<NamedTime> time_in_name(std::string_view name) {
   return std::nullopt;
 }
 
-std::string_view trimmed(std::string_view text) {
+std::string_view without_blanks(std::string_view text) {
   const auto is_space = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
   while (!text.empty() && is_space(text.front())) text.remove_prefix(1);
   while (!text.empty() && is_space(text.back())) text.remove_suffix(1);
@@ -86,7 +86,7 @@ ImageList parse_image_list(std::string_view text, const std::string& name) {
                                    has_time ? "has" : "has not"));
     }
     if (has_time) times.push_back(first);
-    list.images.emplace_back(trimmed(has_time ? line.substr(first.size()) : line));
+    list.images.emplace_back(without_blanks(has_time ? line.substr(first.size()) : line));
   }
   if (list.images.empty()) {
     throw InputError(name, "holds no line, expected one path of an image per line");

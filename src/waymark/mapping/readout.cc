@@ -23,7 +23,6 @@ constexpr double kMinReadoutChange = 2.0;
 constexpr double kMinReadoutS = 7.5e-3;
 /// No camera needs longer for its rows.
 constexpr double kMaxReadoutS = 0.1;
-constexpr int kNumPasses = 3;
 
 /// What a bearing of the rig's was moved by per second of readout, per observation.
 std::vector<Eigen::Vector3f> bearings_by_readout(const Map& map,
@@ -77,6 +76,7 @@ std::optional<KnownCalibration> find_readout(const Map& map,
   }
   BundleProblem adjusted = problem;
   LinearCalibration readout = readout_of(known, by_readout, problem);
+  constexpr int kNumPasses = 3;
   for (int pass = 0; pass < kNumPasses; ++pass) {
     const auto change = adjust_linear(*known.rig, adjusted, readout);
     if (!change || !(std::abs(readout.value[0]) < kMaxReadoutS)) return std::nullopt;

@@ -14,20 +14,20 @@
 namespace waymark {
 namespace {
 
-constexpr double kDurationS = 20.0;
-constexpr double kUnitsPerMetre = 1000.0;
+constexpr double kCrossingS = 20.0;
+constexpr double kDepthUnitsPerMetre = 1000.0;
 
 class Walkers : public ::testing::Test {
  protected:
   DepthImage depth_at(const World& world, double time_s) {
     const auto shared = std::make_shared<const World>(world);
     return Renderer(shared, camera_)
-        .depth(motion_.world_from_rig(time_s), kUnitsPerMetre, pool_, time_s);
+        .depth(motion_.world_from_rig(time_s), kDepthUnitsPerMetre, pool_, time_s);
   }
 
   std::shared_ptr<const Camera> camera_ =
       std::make_shared<PerspectiveCamera>(PerspectiveModel({52.0, 52.0}, {39.5, 29.5}), 80, 60);
-  Motion motion_ = make_motion("hall", "loop", kDurationS);
+  Motion motion_ = make_motion("hall", "loop", kCrossingS);
   std::shared_ptr<const World> empty_ = make_world("hall", 1);
   ThreadPool pool_{1};
 };
@@ -36,7 +36,7 @@ TEST_F(Walkers, HideUpToHalfOfTheView) {
   World world = *empty_;
   add_pedestrians(3, motion_, 5, world);
   std::vector<double> hidden;
-  for (double t = 0.25; t < kDurationS; t += 0.5) {
+  for (double t = 0.25; t < kCrossingS; t += 0.5) {
     const DepthImage without = depth_at(*empty_, t);
     const DepthImage with = depth_at(world, t);
     const auto num_nearer = std::inner_product(with.values.begin(),

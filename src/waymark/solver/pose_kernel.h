@@ -7,6 +7,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/solver/pose_observations.h"
 
