@@ -22,7 +22,6 @@
 #include "waymark/report/report.h"
 #include "waymark/session/autosave.h"
 #include "waymark/session/calibration_advice.h"
-#include "waymark/session/input_prefetch.h"
 #include "waymark/session/keyframe_image_cache.h"
 #include "waymark/session/live_input.h"
 #include "waymark/session/overlay_video.h"
@@ -68,18 +67,16 @@ std::optional<OverlayVideo> start_overlay(const std::filesystem::path& path) {
 
 SessionResults map_input(Session& session,
                          Input& input,
+                         SessionHooks hooks,
                          Autosave& autosave,
                          LiveControl* live,
                          OverlayVideo* overlay,
-                         bool reads_ahead,
                          Reporter& reporter) {
   CalibrationMonitor watch(session,
                            [&reporter](const std::string& mistake) { reporter.warning(mistake); });
   watch.compare_with(session.system->map());
-  SessionHooks hooks;
   hooks.watch = &watch;
   hooks.should_stop = is_interrupted;
-  hooks.reads_ahead = reads_ahead;
   hooks.observer = observe(session, autosave, live, reporter);
   if (live) {
     hooks.should_stop = [live] { return live->should_stop(is_interrupted); };
@@ -238,17 +235,15 @@ std::optional<int> map_once(const RunOptions& options,
     remove_abandoned_parts(options.map_out);
   }
   std::atomic<bool> is_paused{false};
-  const bool reads_ahead = options.session.timing == Timing::kLockstep && options.pace == 0.0 &&
-                           !session.input->info().is_live;
-  const bool decodes_ahead = reads_ahead && session.input->can_decode_apart();
-  InputPrefetch ahead(*session.input);
-  TimedInput input(decodes_ahead ? ahead : *session.input,
+  TimedInput input(*session.input,
                    options.pace,
                    options.session.timing == Timing::kRealtime,
                    is_interrupted,
                    [&is_paused] { return is_paused.load(std::memory_order_relaxed); });
-  KeyframeImageCache images(
-      input.get(), [&] { return session.system->map(); }, std::move(session.images));
+  KeyframeImageCache images([&] { return session.system->map(); }, std::move(session.images));
+  SessionHooks hooks;
+  hooks.is_paced = options.pace > 0.0;
+  hooks.on_decoded = [&images](InputFrame& frame) { images.add(frame); };
   Autosave autosave(options.map_out,
                     has_map_out && !first ? options.autosave_s : 0.0,  // There is a whole map.
                     settings_as_yaml(session.settings),
@@ -257,7 +252,8 @@ std::optional<int> map_once(const RunOptions& options,
   if (live) live->begin({*session.system, autosave, images, is_paused}, session.input->info());
   std::optional<OverlayVideo> overlay = start_overlay(options.overlay);
   OverlayVideo* const drawn = overlay ? &*overlay : nullptr;
-  SessionResults results = map_input(session, images, autosave, live, drawn, reads_ahead, reporter);
+  SessionResults results =
+      map_input(session, input.get(), std::move(hooks), autosave, live, drawn, reporter);
   reporter.finish_progress();
   if (is_interrupted()) reporter.info("interrupted: the input ends here");
   results.summary.timing = to_string(options.session.timing);

@@ -18,9 +18,9 @@
 
 namespace waymark {
 
-/// Pieces of work that need nothing of each other, done ahead by a team of threads: begun in the
-/// order in which they are given, as many at once as there are threads, and their results taken in
-/// the same order. One thread gives and takes. What waits to be taken is bounded.
+/// Pieces of work that need nothing of each other, done before their turn by a team of threads:
+/// begun in the order in which they are given, as many at once as there are threads, and their
+/// results taken in the same order. One thread gives and takes. What waits to be taken is bounded.
 template <class Result>
 class Prefetch {
  public:
@@ -51,10 +51,11 @@ class Prefetch {
 
   /// Pieces that were given and neither taken nor dropped.
   std::size_t size() const { return given_.size(); }
+  bool is_full() const { return size() >= capacity_; }
 
   /// There must be room for it.
   void give(Work work) {
-    WAYMARK_CHECK(size() < capacity_);
+    WAYMARK_CHECK(!is_full());
     given_.push_back(std::make_shared<Piece>(std::move(work)));
     try {
       to_do_.push(given_.back());

@@ -18,28 +18,28 @@ namespace {
 
 TEST(Prefetch, GivesResultsInOrderForAnyNumberOfThreads) {
   for (const unsigned num_threads : {1u, 2u, 5u}) {
-    Prefetch<int> ahead(num_threads, 7);
+    Prefetch<int> prefetch(num_threads, 7);
     int next = 0, expected = 0;
     while (expected < 500) {
-      while (next < 500 && ahead.size() < 7) {
-        ahead.give([i = next++, num_threads](unsigned thread) {
+      while (next < 500 && prefetch.size() < 7) {
+        prefetch.give([i = next++, num_threads](unsigned thread) {
           EXPECT_LT(thread, num_threads);
           return i * i;
         });
       }
-      EXPECT_EQ(ahead.take(), expected * expected);
+      EXPECT_EQ(prefetch.take(), expected * expected);
       ++expected;
     }
-    EXPECT_EQ(ahead.size(), 0u);
+    EXPECT_EQ(prefetch.size(), 0u);
   }
 }
 
 TEST(Prefetch, HandsOnWhatAPieceThrows) {
-  Prefetch<int> ahead(2, 3);
-  ahead.give([](unsigned) -> int { throw std::runtime_error("piece 0"); });
-  ahead.give([](unsigned) { return 1; });
-  EXPECT_THROW(ahead.take(), std::runtime_error);
-  EXPECT_EQ(ahead.take(), 1);
+  Prefetch<int> prefetch(2, 3);
+  prefetch.give([](unsigned) -> int { throw std::runtime_error("piece 0"); });
+  prefetch.give([](unsigned) { return 1; });
+  EXPECT_THROW(prefetch.take(), std::runtime_error);
+  EXPECT_EQ(prefetch.take(), 1);
 }
 
 TEST(Prefetch, NeitherBeginsWhatIsDroppedNorWhatNobodyWillTake) {
@@ -47,29 +47,29 @@ TEST(Prefetch, NeitherBeginsWhatIsDroppedNorWhatNobodyWillTake) {
   std::vector<int> done;
   const auto held = std::make_shared<int>(0);
   {
-    Prefetch<int> ahead(1, 4);
-    ahead.give([&](unsigned) {
+    Prefetch<int> prefetch(1, 4);
+    prefetch.give([&](unsigned) {
       has_begun.push(true);
       return gate.pop().has_value();
     });
     for (int i = 1; i < 4; ++i) {
-      ahead.give([&done, held, i](unsigned) {
+      prefetch.give([&done, held, i](unsigned) {
         done.push_back(i);
         return i;
       });
     }
     has_begun.pop();
-    ahead.drop();
-    ahead.drop();
+    prefetch.drop();
+    prefetch.drop();
     gate.push(true);
-    EXPECT_EQ(ahead.take(), 2);
-    EXPECT_EQ(ahead.take(), 3);
-    ahead.give([&](unsigned) {
+    EXPECT_EQ(prefetch.take(), 2);
+    EXPECT_EQ(prefetch.take(), 3);
+    prefetch.give([&](unsigned) {
       has_begun.push(true);
       return gate.pop().has_value();
     });
     has_begun.pop();
-    ahead.give([held](unsigned) { return 5; });
+    prefetch.give([held](unsigned) { return 5; });
     EXPECT_EQ(held.use_count(), 2);
     gate.close();
   }
@@ -131,22 +131,22 @@ TEST(Prefetch, KeepsSixteenCoresBusy) {
   constexpr unsigned kNumCores = 16;
   constexpr std::size_t kNumPieces = 2000, kCapacity = 2 * kNumCores;
   SimulatedCores cores(kNumPieces);
-  Prefetch<std::size_t> ahead(kNumCores, kCapacity);
+  Prefetch<std::size_t> prefetch(kNumCores, kCapacity);
   Rng rng(1, 0);
   std::size_t num_given = 0;
   const auto give = [&] {
     const double usual = rng.uniform(0.7, 1.3);
     const double duration = num_given % 50 == 49 ? 3.0 * usual : usual;
-    ahead.give(
+    prefetch.give(
         [&cores, piece = num_given, duration](unsigned) { return cores.run(piece, duration); });
     ++num_given;
   };
   for (std::size_t num_taken = 0; num_taken < kNumPieces; ++num_taken) {
-    while (num_given < kNumPieces && ahead.size() < kCapacity) give();
+    while (num_given < kNumPieces && prefetch.size() < kCapacity) give();
     while (!cores.has_ended(num_taken)) {
       cores.end_next(std::min<std::size_t>(kNumCores, num_given - cores.num_ended()));
     }
-    ASSERT_EQ(ahead.take(), num_taken);
+    ASSERT_EQ(prefetch.take(), num_taken);
   }
   EXPECT_GE(cores.mean_busy(), 10.0);
 }

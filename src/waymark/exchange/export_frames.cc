@@ -88,7 +88,6 @@ double seen_step(const FramePlace& a, const FramePlace& b, double scene_distance
 }
 
 std::vector<std::size_t> choose_sharpest(std::span<const FramePlace> places,
-                                         std::span<const RecordedFrame> frames,
                                          std::size_t number,
                                          double scene_distance) {
   std::vector<double> way(places.size(), 0.0);
@@ -103,7 +102,7 @@ std::vector<std::size_t> choose_sharpest(std::span<const FramePlace> places,
   for (std::size_t i = 0; i < places.size(); ++i) {
     const auto part = std::min(number - 1, static_cast<std::size_t>(way[i] * parts_per_way));
     const auto [found, is_first] = best.try_emplace(part, i);
-    if (!is_first && frames[i].sharpness > frames[found->second].sharpness) found->second = i;
+    if (!is_first && places[i].sharpness > places[found->second].sharpness) found->second = i;
   }
   std::vector<std::size_t> chosen;
   for (const auto& [part, frame] : best) chosen.push_back(frame);
@@ -168,12 +167,11 @@ double sharpness(ImageView image) {
 }
 
 std::vector<std::size_t> choose_frames(std::span<const FramePlace> places,
-                                       std::span<const RecordedFrame> frames,
                                        const ExportedFrames& selection,
                                        double scene_distance) {
-  WAYMARK_CHECK(places.size() == frames.size() && selection.number > 0);
+  WAYMARK_CHECK(selection.number > 0);
   if (selection.choice == FrameChoice::kSharpest) {
-    return choose_sharpest(places, frames, selection.number, scene_distance);
+    return choose_sharpest(places, selection.number, scene_distance);
   }
   const std::size_t step = selection.choice == FrameChoice::kEvery ? selection.number : 1;
   std::vector<std::size_t> chosen;
@@ -195,24 +193,22 @@ double median_distance(const ExportScene& scene) {
 
 ExportScene with_frames(const ExportScene& scene,
                         const Map& map,
-                        std::span<const FramePlace> places,
-                        std::span<const RecordedFrame> frames) {
-  WAYMARK_CHECK(places.size() == frames.size());
+                        std::span<const FramePlace> places) {
   std::map<std::pair<KeyframeId, std::size_t>, const ExportView*> of_keyframes;
   for (const ExportView& view : scene.views) {
     of_keyframes[{view.keyframe, view.rig_camera}] = &view;
   }
   ExportScene result{scene.cameras, scene.cam_from_rig, {}, scene.points};
   for (ExportPoint& point : result.points) point.sightings.clear();
-  for (std::size_t i = 0; i < places.size(); ++i) {
-    const std::vector<RigCamera>& cameras = map.keyframes().at(places[i].nearest).rig().cameras;
-    for (std::size_t c = 0; c < std::min(cameras.size(), frames[i].num_images); ++c) {
-      const ExportView& nearest = *of_keyframes.at({places[i].nearest, c});
-      const bool is_keyframe = nearest.timestamp_ns == places[i].timestamp_ns;
-      ExportView view = is_keyframe ? nearest : empty_view(nearest, cameras[c], places[i]);
+  for (const FramePlace& place : places) {
+    const std::vector<RigCamera>& cameras = map.keyframes().at(place.nearest).rig().cameras;
+    for (std::size_t c = 0; c < std::min(cameras.size(), place.num_images); ++c) {
+      const ExportView& nearest = *of_keyframes.at({place.nearest, c});
+      const bool is_keyframe = nearest.timestamp_ns == place.timestamp_ns;
+      ExportView view = is_keyframe ? nearest : empty_view(nearest, cameras[c], place);
       view.name = fmt::format("{}{:06}_{}.jpg",
                               cameras.size() > 1 ? fmt::format("cam{}/", c) : "",
-                              frames[i].index,
+                              place.index,
                               view.timestamp_ns);
       const auto number = static_cast<std::uint32_t>(result.views.size());
       for (std::uint32_t k = 0; k < view.points.size(); ++k) {

@@ -30,18 +30,14 @@ struct ExportedFrames {
   std::size_t number = 1;  ///< Of kEvery and kSharpest, at least 1.
 };
 
-/// Where the rig was at the moment of a frame.
+/// Where the rig was at the moment of a frame, and what the recording has of it.
 struct FramePlace {
   std::int64_t timestamp_ns = 0;  ///< Of the frame.
-  Rigid3 rig_from_world;          ///< In metres (map units where the scale is free).
-  KeyframeId nearest;             ///< In time: whose cameras took the frame, or the frame itself.
-};
-
-/// A frame as the recording has it.
-struct RecordedFrame {
-  std::size_t index = 0;       ///< In the whole recording.
-  double sharpness = 0.0;      ///< See sharpness().
-  std::size_t num_images = 1;  ///< 2 where there is one of camera 1.
+  Rigid3 rig_from_world = {};     ///< In metres (map units where the scale is free).
+  KeyframeId nearest = {};        ///< In time: whose cameras took the frame, or the frame itself.
+  std::size_t index = 0;          ///< In the whole recording.
+  double sharpness = 0.0;         ///< See sharpness().
+  std::size_t num_images = 1;     ///< 2 where there is one of camera 1.
 };
 
 /// The keyframes of a sub-map, by time.
@@ -61,11 +57,10 @@ std::vector<FramePlace> place_frames(const Map& map,
 /// comparable among images of the same scene alone.
 double sharpness(ImageView image);
 
-/// Of frames by time the indices of those that the selection takes, ascending. `frames` belong to
-/// the places. Steps of the way are measured as seen: the angle turned plus the distance moved by
-/// the median distance of the points (scene_distance, in units of the places; more than 0).
+/// Of frames by time the indices of those that the selection takes, ascending. Steps of the way are
+/// measured as seen: the angle turned plus the distance moved by the median distance of the points
+/// (scene_distance, in units of the places; more than 0).
 std::vector<std::size_t> choose_frames(std::span<const FramePlace> places,
-                                       std::span<const RecordedFrame> frames,
                                        const ExportedFrames& selection,
                                        double scene_distance);
 
@@ -78,7 +73,6 @@ double median_distance(const ExportScene& scene);
 /// are named by the index of the frame and its time.
 ExportScene with_frames(const ExportScene& scene,
                         const Map& map,
-                        std::span<const FramePlace> places,
-                        std::span<const RecordedFrame> frames);
+                        std::span<const FramePlace> places);
 
 }  // namespace waymark

@@ -92,28 +92,25 @@ TEST(Sharpness, FallsWithBlur) {
 TEST(ChooseFrames, TakesTheSharpestOfEachPartOfTheWay) {
   const Map map = small_map("plain");
   std::vector<FramePlace> places = place_frames(map, kSubmap, whole_way(), "way.txt");
-  std::vector<RecordedFrame> frames(places.size());
-  for (const std::size_t sharp : {1u, 4u, 9u}) frames[sharp].sharpness = 5.0;
-  EXPECT_THAT(choose_frames(places, frames, {FrameChoice::kSharpest, 3}, 5.0),
-              ElementsAre(1, 4, 9));
-  EXPECT_THAT(choose_frames(places, frames, {FrameChoice::kEvery, 4}, 5.0), ElementsAre(0, 4, 8));
-  EXPECT_EQ(choose_frames(places, frames, {FrameChoice::kAll, 1}, 5.0).size(), 11u);
-  EXPECT_EQ(choose_frames(places, frames, {FrameChoice::kSharpest, 50}, 5.0).size(), 11u);
+  for (const std::size_t sharp : {1u, 4u, 9u}) places[sharp].sharpness = 5.0;
+  EXPECT_THAT(choose_frames(places, {FrameChoice::kSharpest, 3}, 5.0), ElementsAre(1, 4, 9));
+  EXPECT_THAT(choose_frames(places, {FrameChoice::kEvery, 4}, 5.0), ElementsAre(0, 4, 8));
+  EXPECT_EQ(choose_frames(places, {FrameChoice::kAll, 1}, 5.0).size(), 11u);
+  EXPECT_EQ(choose_frames(places, {FrameChoice::kSharpest, 50}, 5.0).size(), 11u);
   // A camera that stands still for most of the time gets no more for that.
   for (std::size_t i = 4; i < places.size(); ++i) {
     places[i].rig_from_world = places[4].rig_from_world;
   }
-  EXPECT_THAT(choose_frames(places, frames, {FrameChoice::kSharpest, 4}, 5.0),
-              ElementsAre(0, 1, 2, 4));
+  EXPECT_THAT(choose_frames(places, {FrameChoice::kSharpest, 4}, 5.0), ElementsAre(0, 1, 2, 4));
 }
 
 TEST(WithFrames, KeepsPointsAndTheFeaturesOfKeyframes) {
   const Map map = small_map("plain");
   const ExportScene scene = make_export_scene(map, kSubmap, {}, ExportCameras::kAll);
-  const std::vector<FramePlace> places = place_frames(map, kSubmap, whole_way(), "way.txt");
+  std::vector<FramePlace> places = place_frames(map, kSubmap, whole_way(), "way.txt");
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].index = 7 + i;
   const std::vector<FramePlace> chosen = {places[0], places[3], places[10]};
-  const std::vector<RecordedFrame> frames = {{7, 0.0, 1}, {10, 0.0, 1}, {17, 0.0, 1}};
-  const ExportScene made = with_frames(scene, map, chosen, frames);
+  const ExportScene made = with_frames(scene, map, chosen);
   ASSERT_EQ(made.views.size(), 3u);
   EXPECT_EQ(made.views[1].name, "000010_101100000000.jpg");
   EXPECT_THAT(made.views[1].pixels, IsEmpty());

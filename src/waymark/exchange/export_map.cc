@@ -129,15 +129,12 @@ class ModelWriter {
         options_.frames.choice == FrameChoice::kKeyframes
             ? keyframe_places(map, submap)
             : place_frames(map, submap, options_.trajectory, options_.trajectory_name);
-    const std::vector<RecordedFrame> frames = recording_->find(places);
-    std::vector<FramePlace> chosen_places;
-    std::vector<RecordedFrame> chosen_frames;
-    for (const std::size_t i :
-         choose_frames(places, frames, options_.frames, median_distance(scene))) {
-      chosen_places.push_back(places[i]);
-      chosen_frames.push_back(frames[i]);
+    recording_->find(places);
+    std::vector<FramePlace> chosen;
+    for (const std::size_t i : choose_frames(places, options_.frames, median_distance(scene))) {
+      chosen.push_back(places[i]);
     }
-    return with_frames(scene, map, chosen_places, chosen_frames);
+    return with_frames(scene, map, chosen);
   }
 
   void write_model(const ExportScene& scene) {

@@ -79,8 +79,10 @@ void RecordedImages::survey(const Map& map, bool has_images) {
   while (std::optional<InputFrame> frame = input->next()) {
     if (frame->fault != FrameFault::kNone || frame->images.empty()) continue;
     if (frames_.empty()) expect_size(map, *frame, input->info().enlargement, input_);
-    frames_[frame->timestamp_ns] = {
-        frame->index, sharpness(whole(frame->images.front())), frame->images.size()};
+    frames_[frame->timestamp_ns] = {.timestamp_ns = frame->timestamp_ns,
+                                    .index = frame->index,
+                                    .sharpness = sharpness(whole(frame->images.front())),
+                                    .num_images = frame->images.size()};
     if (frame->jpeg.empty()) continue;
     const auto [begin, end] = by_time.equal_range(frame->timestamp_ns);
     if (begin == end) continue;
@@ -91,16 +93,15 @@ void RecordedImages::survey(const Map& map, bool has_images) {
   }
 }
 
-std::vector<RecordedFrame> RecordedImages::find(std::vector<FramePlace>& places) const {
-  std::vector<RecordedFrame> found;
+void RecordedImages::find(std::vector<FramePlace>& places) const {
   std::erase_if(places, [&](FramePlace& place) {
     const auto frame = frames_.lower_bound(place.timestamp_ns - kSameTimeNs);
     if (frame == frames_.end() || frame->first > place.timestamp_ns + kSameTimeNs) return true;
-    place.timestamp_ns = frame->first;
-    found.push_back(frame->second);
+    const FramePlace at = std::exchange(place, frame->second);
+    place.rig_from_world = at.rig_from_world;
+    place.nearest = at.nearest;
     return false;
   });
-  return found;
 }
 
 void RecordedImages::for_each(const Visitor& visit) const {

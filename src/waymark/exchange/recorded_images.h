@@ -26,8 +26,8 @@ class RecordedImages {
   /// those of its keyframes. InputError for images that are not of the size of the map's cameras.
   void survey(const Map& map, bool has_images);
 
-  /// The frames at the times of some places; places without one are taken away.
-  std::vector<RecordedFrame> find(std::vector<FramePlace>& places) const;
+  /// Fills in the frames at the times of some places; places without one are taken away.
+  void find(std::vector<FramePlace>& places) const;
   /// Of keyframes; after survey() without images of the map's.
   const KeyframeImages& keyframe_images() const { return keyframe_images_; }
 
@@ -41,7 +41,7 @@ class RecordedImages {
 
   const std::filesystem::path input_;
   const InputOptions reading_;
-  std::map<std::int64_t, RecordedFrame> frames_;  // By time.
+  std::map<std::int64_t, FramePlace> frames_;  // By time; of no place yet.
   KeyframeImages keyframe_images_;
 };
 

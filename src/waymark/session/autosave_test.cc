@@ -7,7 +7,6 @@
 #include "waymark/base/check.h"
 #include "waymark/base/testing/temporary_folder.h"
 #include "waymark/map/testing/random_map.h"
-#include "waymark/session/testing/memory_input.h"
 
 namespace waymark {
 namespace {
@@ -29,8 +28,7 @@ class AutosaveTest : public ::testing::Test {
 
   testing::TemporaryFolder folder_;
   const std::filesystem::path path_ = folder_ / "maps" / "map.wmap";
-  testing::MemoryInput input_{testing::small_frames(1)};
-  KeyframeImageCache images_{input_, [] { return Map().freeze(); }, {}};
+  KeyframeImageCache images_{[] { return Map().freeze(); }, {}};
   const std::shared_ptr<const Map> first_ = some_map(1);
   const std::shared_ptr<const Map> second_ = some_map(2);
 

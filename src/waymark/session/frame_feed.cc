@@ -5,11 +5,8 @@
 #include <sys/resource.h>
 
 #include <algorithm>
-#include <deque>
 #include <iterator>
 #include <map>
-#include <memory>
-#include <optional>
 
 namespace waymark {
 namespace {
@@ -43,7 +40,9 @@ FrameRecord record_of_fault(const InputFrame& frame) {
   return record;
 }
 
-FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& result) {
+FrameRecord record_of_result(const InputFrame& frame,
+                             ImageView image0,
+                             const TrackingResult& result) {
   FrameRecord record;
   record.index = static_cast<std::uint32_t>(frame.index);
   record.timestamp_ns = frame.timestamp_ns;
@@ -53,78 +52,26 @@ FrameRecord record_of_result(const InputFrame& frame, const TrackingResult& resu
   record.is_relocalized = result.is_relocalized;
   record.num_features =
       static_cast<std::uint16_t>(std::min<std::uint32_t>(result.num_features, UINT16_MAX));
-  record.picture = measure_image(frame.images.at(0).view());
+  record.picture = measure_image(image0);
   record.set_stages(result.stages.ms);
   return record;
 }
 
-FrameImages borrow(const InputFrame& frame) {
-  FrameImages input;
-  input.timestamp_ns = frame.timestamp_ns;
-  input.image0 = frame.images.at(0).view();
-  if (frame.images.size() > 1) input.image1 = frame.images[1].view();
-  if (frame.depth) input.depth = frame.depth->view();
-  input.depth_lag_ns = frame.depth_lag_ns;
-  if (frame.mask) input.mask = frame.mask->view();
-  return input;
-}
-
 /// Feeds a frame, unless it has a fault, and adds its row.
 void add_frame(const InputFrame& frame,
+               const FrameImages& images,
                const std::function<TrackingResult(const FrameImages&)>& feed,
                FedFrames& frames) {
   if (frame.fault != FrameFault::kNone) {
     frames.table.frames.push_back(record_of_fault(frame));
     return;
   }
-  const TrackingResult result = feed(borrow(frame));
+  const TrackingResult result = feed(images);
   if (result.frame == FrameId{0}) forget_session(frames);
   frames.fed.push_back(static_cast<std::uint32_t>(frames.table.frames.size()));
   frames.tracking_ms.push_back(static_cast<float>(result.stages.tracking_ms()));
-  frames.table.frames.push_back(record_of_result(frame, result));
+  frames.table.frames.push_back(record_of_result(frame, images.image0, result));
 }
-
-/// The frames of an input, some of which are told of before it is their turn.
-class FramesInTurn {
- public:
-  FramesInTurn(Input& input, const FrameLookahead& lookahead)
-      : input_(input), lookahead_(lookahead) {}
-
-  /// Nothing at the end. Throws what the input threw, after the frames before.
-  std::shared_ptr<const InputFrame> next() {
-    const std::size_t count = std::min(lookahead_.count, kMaxLookahead);
-    while (!has_ended_ && waiting_.size() <= count) read();
-    if (waiting_.empty()) {
-      if (failure_) std::rethrow_exception(failure_);
-      return nullptr;
-    }
-    std::shared_ptr<const InputFrame> frame = std::move(waiting_.front());
-    waiting_.pop_front();
-    return frame;
-  }
-
- private:
-  void read() {
-    std::optional<InputFrame> next;
-    try {
-      next = input_.next();
-    } catch (...) {
-      failure_ = std::current_exception();
-    }
-    has_ended_ = !next;
-    if (!next) return;
-    waiting_.push_back(std::make_shared<const InputFrame>(*std::move(next)));
-    const std::shared_ptr<const InputFrame>& frame = waiting_.back();
-    const bool is_fed = frame->fault == FrameFault::kNone;
-    if (is_fed && lookahead_.count > 0) lookahead_.prepare(borrow(*frame), frame);
-  }
-
-  Input& input_;
-  const FrameLookahead& lookahead_;
-  std::deque<std::shared_ptr<const InputFrame>> waiting_;
-  bool has_ended_ = false;
-  std::exception_ptr failure_;
-};
 
 }  // namespace
 
@@ -137,7 +84,7 @@ FedFrames feed_all(Input& input,
                    const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer,
-                   const FrameLookahead& lookahead) {
+                   const EarlyStages& stages) {
   FedFrames frames;
   // Rows of all frames that there may be, rather than twice as many now and then.
   constexpr std::size_t kMaxExpected = 1'000'000;
@@ -146,14 +93,15 @@ FedFrames feed_all(Input& input,
   frames.fed.reserve(num_expected);
   frames.tracking_ms.reserve(num_expected);
   frames.table.stages.assign(kStageNames.begin(), kStageNames.end());
-  FramesInTurn in_turn(input, lookahead);
+  FramePipeline pipeline(input, stages);
+  const auto feed_frame = [&](const InputFrame& frame, const FrameImages& images) {
+    add_frame(frame, images, feed, frames);
+    if (!frame.name.empty()) frames.table.names.push_back(frame.name);
+    if (observer) observer(frames.table.frames.back(), frame.warning);
+  };
   try {
     while (!should_stop || !should_stop()) {
-      const std::shared_ptr<const InputFrame> frame = in_turn.next();
-      if (!frame) break;
-      add_frame(*frame, feed, frames);
-      if (!frame->name.empty()) frames.table.names.push_back(frame->name);
-      if (observer) observer(frames.table.frames.back(), frame->warning);
+      if (!pipeline.feed_next(feed_frame)) break;
     }
   } catch (...) {
     if (frames.fed.empty()) throw;

@@ -10,9 +10,9 @@
 #include <utility>
 #include <vector>
 
-#include "waymark/input/input.h"
 #include "waymark/results/results.h"
 #include "waymark/results/trajectory.h"
+#include "waymark/session/frame_pipeline.h"
 #include "waymark/system/system.h"
 
 namespace waymark {
@@ -33,16 +33,6 @@ struct FedFrames {
 /// After a reset: what was fed before belongs to no map.
 void forget_session(FedFrames& frames);
 
-/// So many frames may be read before their turn. More cores than half of that have nothing to do.
-inline constexpr std::size_t kMaxLookahead = 32;
-
-/// What hears of frames before they are fed.
-struct FrameLookahead {
-  std::size_t count = 0;  ///< Of so many frames, kMaxLookahead at most.
-  /// The images last as long as the owner.
-  std::function<void(const FrameImages&, std::shared_ptr<const void> owner)> prepare;
-};
-
 /// Feeds an input until it ends or should_stop() says so. Frames with a fault are not fed, but have
 /// their row. What is thrown once a frame was fed ends it, and comes with the frames; before that,
 /// it comes through.
@@ -50,7 +40,7 @@ FedFrames feed_all(Input& input,
                    const std::function<TrackingResult(const FrameImages&)>& feed,
                    const std::function<bool()>& should_stop,
                    const FrameObserver& observer,
-                   const FrameLookahead& lookahead = {});
+                   const EarlyStages& stages = {});
 
 using SubmapTrajectory = std::pair<SubmapId, std::vector<StampedPose>>;
 

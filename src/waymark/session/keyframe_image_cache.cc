@@ -7,30 +7,27 @@
 #include <set>
 #include <utility>
 
-#include "waymark/session/frame_feed.h"
+#include "waymark/session/frame_pipeline.h"
 
 namespace waymark {
 namespace {
 
 // A start may make keyframes of frames that long ago, a new keyframe takes some frames to show in
 // the map, and frames are read some time before they are fed.
-constexpr std::size_t kNumYoung = 100 + kMaxLookahead;
+constexpr std::size_t kNumYoung = 100 + kMaxPrepared;
 
 }  // namespace
 
-KeyframeImageCache::KeyframeImageCache(Input& input, NewestMap newest_map, KeyframeImages earlier)
-    : input_(input),
-      newest_map_(std::move(newest_map)),
+KeyframeImageCache::KeyframeImageCache(NewestMap newest_map, KeyframeImages earlier)
+    : newest_map_(std::move(newest_map)),
       earlier_(std::move(earlier)),
       first_new_(newest_map_()->keyframes().end_id()) {}
 
-std::optional<InputFrame> KeyframeImageCache::next() {
-  std::optional<InputFrame> frame = input_.next();
-  if (!frame || frame->jpeg.empty()) return frame;
-  images_[frame->timestamp_ns] = std::make_shared<const std::string>(std::move(frame->jpeg));
-  frame->jpeg.clear();
+void KeyframeImageCache::add(InputFrame& frame) {
+  if (frame.jpeg.empty()) return;
+  images_[frame.timestamp_ns] = std::make_shared<const std::string>(std::move(frame.jpeg));
+  frame.jpeg.clear();
   if (images_.size() >= num_at_last_check_ + kNumYoung) forget_others();
-  return frame;
 }
 
 void KeyframeImageCache::begin_anew() {

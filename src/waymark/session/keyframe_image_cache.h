@@ -7,7 +7,6 @@
 #include <functional>
 #include <map>
 #include <memory>
-#include <optional>
 
 #include "waymark/input/input.h"
 #include "waymark/map/map.h"
@@ -15,17 +14,17 @@
 
 namespace waymark {
 
-/// An input that remembers the images of frames that became keyframes or still may.
-class KeyframeImageCache : public Input {
+/// Remembers the images of frames that became keyframes or still may.
+class KeyframeImageCache {
  public:
   using NewestMap = std::function<std::shared_ptr<const Map>()>;
 
-  /// The input, whose frames come with a JPEG file, is borrowed. Keyframes that the newest map has
-  /// already are those of earlier sessions, whose images are given.
-  KeyframeImageCache(Input& input, NewestMap newest_map, KeyframeImages earlier);
+  /// Keyframes that the newest map has already are those of earlier sessions, whose images are
+  /// given.
+  KeyframeImageCache(NewestMap newest_map, KeyframeImages earlier);
 
-  const InputInfo& info() const override { return input_.info(); }
-  std::optional<InputFrame> next() override;
+  /// Takes the JPEG file that a frame comes with.
+  void add(InputFrame& frame);
 
   /// From now on there are no earlier sessions: the map was emptied.
   void begin_anew();
@@ -39,7 +38,6 @@ class KeyframeImageCache : public Input {
  private:
   void forget_others();
 
-  Input& input_;
   const NewestMap newest_map_;
   KeyframeImages earlier_;
   KeyframeId first_new_;

@@ -10,8 +10,6 @@
 namespace waymark {
 namespace {
 
-using testing::MemoryInput;
-using testing::read_all;
 using testing::small_frames;
 
 /// A map with a keyframe of each of these times.
@@ -36,11 +34,13 @@ std::shared_ptr<const Map> map_of(const std::vector<std::int64_t>& times_ns) {
 SharedJpeg jpeg(const char* content) { return std::make_shared<const std::string>(content); }
 
 TEST(KeyframeImageCache, KeepsTheImagesOfKeyframesAndOfYoungFrames) {
-  MemoryInput input(small_frames(400));
   std::shared_ptr<const Map> map = map_of({});
-  KeyframeImageCache keeper(input, [&] { return map; }, {});
+  KeyframeImageCache keeper([&] { return map; }, {});
   map = map_of({300'000'000, 39'800'000'000});  // Frames 3 and 398.
-  for (const InputFrame& frame : read_all(keeper)) EXPECT_TRUE(frame.jpeg.empty());
+  for (InputFrame& frame : small_frames(400)) {
+    keeper.add(frame);
+    EXPECT_TRUE(frame.jpeg.empty());
+  }
 
   const KeyframeImages images = keeper.images_of(*map);
   ASSERT_EQ(images.size(), 2u);
@@ -54,10 +54,9 @@ TEST(KeyframeImageCache, KeepsTheImagesOfKeyframesAndOfYoungFrames) {
 
 TEST(KeyframeImageCache, TellsEarlierSessionsByTheirKeyframes) {
   // Times of sessions may well be the same.
-  MemoryInput input(small_frames(3));
   const std::shared_ptr<const Map> before = map_of({0, 100'000'000});
-  KeyframeImageCache keeper(input, [&] { return before; }, {{KeyframeId{1}, jpeg("earlier")}});
-  read_all(keeper);
+  KeyframeImageCache keeper([&] { return before; }, {{KeyframeId{1}, jpeg("earlier")}});
+  for (InputFrame& frame : small_frames(3)) keeper.add(frame);
   const std::shared_ptr<const Map> after = map_of({0, 100'000'000, 200'000'000});
   const KeyframeImages images = keeper.images_of(*after);
   ASSERT_EQ(images.size(), 2u);

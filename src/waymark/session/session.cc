@@ -209,12 +209,13 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
     if (hooks.watch) hooks.watch->add_time(record.index, record.timestamp_ns);
     if (hooks.observer) hooks.observer(record, warning);
   };
-  FrameLookahead lookahead;
-  if (hooks.reads_ahead && !input.info().is_live) lookahead.count = system.max_prepared();
-  lookahead.prepare = [&](const FrameImages& frame, std::shared_ptr<const void> owner) {
+  EarlyStages stages;
+  if (!hooks.is_paced && !input.info().is_live) stages.num_prepared = system.max_prepared();
+  stages.on_decoded = hooks.on_decoded;
+  stages.prepare = [&](const FrameImages& frame, std::shared_ptr<const void> owner) {
     system.prepare(frame, std::move(owner));
   };
-  FedFrames frames = feed_all(input, feed, hooks.should_stop, observe, lookahead);
+  FedFrames frames = feed_all(input, feed, hooks.should_stop, observe, stages);
   finish(system, hooks, frames);
   reserve.release();
   if (hooks.watch) hooks.watch->finish();

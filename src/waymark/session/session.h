@@ -41,14 +41,14 @@ struct SessionResults {
 
 /// Who takes part in a session while it runs; any may be empty or null.
 struct SessionHooks {
-  std::function<bool()> should_stop;  ///< Asked before each frame.
+  std::function<bool()> should_stop;            ///< Asked before each frame.
+  std::function<void(InputFrame&)> on_decoded;  ///< See EarlyStages.
   FrameObserver observer;
   /// Hears of each frame that was fed.
   std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
   CalibrationMonitor* watch = nullptr;  ///< Its mistakes become part of the summary.
-  /// Whether frames may be read before they are fed: not where they come at their own pace.
-  bool reads_ahead = true;
+  bool is_paced = false;  ///< Frames come at their own pace: none is read before its turn.
 };
 
 /// Feeds an input to a system until it ends or should_stop() says so, finishes the system and

@@ -18,7 +18,7 @@ FramePreparation::FramePreparation(std::shared_ptr<const Rig> rig,
                                    const Settings& settings,
                                    unsigned num_threads)
     : builder_(std::move(rig), frame_settings(settings)),
-      ahead_(builder_, frame_settings(settings), num_threads),
+      prefetch_(builder_, frame_settings(settings), num_threads),
       marker_finder_(settings.markers) {}
 
 void FramePreparation::set_calibration(std::shared_ptr<const Rig> rig) {
@@ -45,7 +45,7 @@ std::shared_ptr<const Features> FramePreparation::build(const FrameImages& image
   std::optional<FoundFrame> found;
   {
     StageTimer timer(times, Stage::kWait);
-    found = ahead_.take(images);
+    found = prefetch_.take(images);
   }
   auto features = found ? builder_.build(*std::move(found), images, predicted)
                         : builder_.build(images, predicted);

@@ -7,7 +7,7 @@
 #include <memory>
 
 #include "waymark/features/frame_builder.h"
-#include "waymark/system/frame_prefetch.h"
+#include "waymark/system/feature_prefetch.h"
 #include "waymark/system/marker_finder.h"
 #include "waymark/system/settings.h"
 #include "waymark/track/frame.h"
@@ -15,11 +15,11 @@
 
 namespace waymark {
 
-/// Makes frames for the tracker of the images of a session: features, some of them found ahead by
+/// Makes frames for the tracker of the images of a session: features, some of them prefetched by
 /// other threads, by the cameras as calibrated so far, kept free of what moves along with these.
 class FramePreparation {
  public:
-  /// num_threads: that look at frames ahead; 0: none.
+  /// num_threads: that prefetch features; 0: none.
   FramePreparation(std::shared_ptr<const Rig> rig, const Settings& settings, unsigned num_threads);
 
   /// The cameras as calibrated so far.
@@ -29,9 +29,9 @@ class FramePreparation {
 
   /// See System::prepare().
   void prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
-    ahead_.prepare(images, std::move(owner));
+    prefetch_.prepare(images, std::move(owner));
   }
-  std::size_t max_prepared() const { return ahead_.capacity(); }
+  std::size_t max_prepared() const { return prefetch_.capacity(); }
 
   /// The next frame, and in the result what is known of it. motion(): how the rig should move,
   /// asked for where that matters.
@@ -53,7 +53,7 @@ class FramePreparation {
                                         StageTimes& times);
 
   FrameBuilder builder_;
-  FramePrefetch ahead_;
+  FeaturePrefetch prefetch_;
   const MarkerFinder marker_finder_;
   SubmapId watched_submap_;  ///< Of the last frame with a pose.
 };

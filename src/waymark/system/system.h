@@ -75,7 +75,7 @@ class System {
   /// is looked for in it; where it is not found, a new sub-map begins, which is joined once it is.
   /// Their models must be known (see load_map()), else InputError.
   ///
-  /// num_threads: that look at frames ahead, see prepare(); 0: none.
+  /// num_threads: that find features of frames before their turn, see prepare(); 0: none.
   System(Rig rig,
          const Settings& settings,
          Timing timing,

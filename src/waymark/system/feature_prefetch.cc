@@ -1,19 +1,19 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/system/frame_prefetch.h"
+#include "waymark/system/feature_prefetch.h"
 
 #include <utility>
 
 namespace waymark {
 
-void FramePrefetch::prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
+void FeaturePrefetch::prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
   // How the first images are looked at depends on those before.
   if (builder_.is_learning() || frames_.size() >= capacity()) return;
   if (!frames_.empty() && images.timestamp_ns <= frames_.back().images.timestamp_ns) return;
   begin({images, std::move(owner), builder_.view()});
 }
 
-void FramePrefetch::begin(Prepared frame) {
+void FeaturePrefetch::begin(Prepared frame) {
   if (!work_) {
     for (unsigned i = 0; i < num_threads_; ++i) finders_.emplace_back(frame.view.rig, settings_);
     work_.emplace(num_threads_, capacity());
@@ -24,7 +24,7 @@ void FramePrefetch::begin(Prepared frame) {
   });
 }
 
-std::optional<FoundFrame> FramePrefetch::take(const FrameImages& images) {
+std::optional<FoundFrame> FeaturePrefetch::take(const FrameImages& images) {
   const auto is_over = [&](const FrameImages& prepared) {
     return prepared.timestamp_ns < images.timestamp_ns ||
            (prepared.timestamp_ns == images.timestamp_ns &&
@@ -43,7 +43,7 @@ std::optional<FoundFrame> FramePrefetch::take(const FrameImages& images) {
 }
 
 /// What was found so far is of no use; what has not begun is left out.
-void FramePrefetch::begin_anew() {
+void FeaturePrefetch::begin_anew() {
   std::deque<Prepared> frames;
   frames.swap(frames_);
   while (work_->size() > 0) work_->drop();

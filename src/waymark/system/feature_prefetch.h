@@ -16,11 +16,11 @@ namespace waymark {
 /// Finds the features of frames before it is their turn, by several threads. A frame is looked at
 /// with what is known of the cameras when it is prepared; where that is not what is known when it
 /// is its turn, it is looked at again, so that nothing but time depends on it.
-class FramePrefetch {
+class FeaturePrefetch {
  public:
   /// builder: that frames are made with, borrowed. num_threads: they start with the first frame; 0:
-  /// nothing is done ahead.
-  FramePrefetch(const FrameBuilder& builder, const FrameSettings& settings, unsigned num_threads)
+  /// nothing is done before its turn.
+  FeaturePrefetch(const FrameBuilder& builder, const FrameSettings& settings, unsigned num_threads)
       : builder_(builder), settings_(settings), num_threads_(num_threads) {}
 
   /// Frames that may be prepared at a time. With two per thread one that takes longer than its
