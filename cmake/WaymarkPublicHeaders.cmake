@@ -19,8 +19,6 @@ set(roots
   camera/testing/camera_test.h # the tests that a camera model has to pass (needs GoogleTest)
   evaluate/evaluation.h
   exchange/exports.h # COLMAP, nerfstudio, PLY
-  results/results.h
-  results/trajectory.h
   image/convert.h # colour to grey, depth from metres
   image/image.h
   input/decode.h # images
@@ -28,6 +26,8 @@ set(roots
   input/listing.h
   map/map.h
   mapfile/map_file.h
+  results/results.h
+  results/trajectory.h
   simulate/sequence.h # rendered sequences with their truth, to test with
   system/localizer.h
   system/settings.h

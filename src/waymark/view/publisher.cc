@@ -78,7 +78,7 @@ void ViewPublisher::tell(const System& system,
   count(result);
   update_.map = system.map();
   note_calibration(system);
-  note_frames(system, input, result);
+  note_frames(input, result);
   update_.colors.push_back(colors_of(result, input.image0));
   if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
     update_.image = std::make_shared<const DrawnFrame>(DrawnFrame{result.frame_in_map,
@@ -92,9 +92,7 @@ void ViewPublisher::tell(const System& system,
   push();
 }
 
-void ViewPublisher::note_frames(const System& system,
-                                const FrameImages& input,
-                                const TrackingResult& result) {
+void ViewPublisher::note_frames(const FrameImages& input, const TrackingResult& result) {
   update_.frames.push_back({result,
                             result.frame_in_map,
                             input.timestamp_ns,
