@@ -31,7 +31,7 @@ struct MarkerTable {
   py::array ids, sides_m, world_from_marker, submaps, is_surveyed;
 };
 
-struct SightingTable {
+struct MarkerObservationTable {
   py::array keyframes, ids, cameras, pixels;
 };
 
@@ -96,17 +96,17 @@ MarkerTable markers(const PythonMap& self) {
           array_of(std::move(is_surveyed))};
 }
 
-SightingTable marker_observations(const PythonMap& self) {
+MarkerObservationTable marker_observations(const PythonMap& self) {
   std::vector<std::uint32_t> keyframes, ids;
   std::vector<std::uint8_t> cameras;
   std::vector<float> pixels;
   self.map().keyframes().for_each([&](KeyframeId id, const Keyframe& keyframe) {
     if (!keyframe.markers) return;
-    for (const MarkerObservation& sighting : *keyframe.markers) {
+    for (const MarkerObservation& observation : *keyframe.markers) {
       keyframes.push_back(id.value);
-      ids.push_back(static_cast<std::uint32_t>(sighting.id));
-      cameras.push_back(sighting.camera);
-      for (const Eigen::Vector2f& pixel : sighting.pixels) {
+      ids.push_back(static_cast<std::uint32_t>(observation.id));
+      cameras.push_back(observation.camera);
+      for (const Eigen::Vector2f& pixel : observation.pixels) {
         pixels.insert(pixels.end(), pixel.begin(), pixel.end());
       }
     }
@@ -205,17 +205,17 @@ void bind_markers(py::module_& module) {
       .get("is_surveyed",
            "uint8 array (N,): 1 where it was said to be there and holds the map.",
            &MarkerTable::is_surveyed);
-  Class<SightingTable>(module,
-                       "MarkerObservations",
-                       "What keyframes see of markers, as arrays of the same length N.")
-      .def("__len__", [](const SightingTable& self) { return self.ids.size(); })
-      .get("keyframes", "uint32 array (N,): ids, ascending.", &SightingTable::keyframes)
-      .get("ids", "uint32 array (N,): numbers of the markers.", &SightingTable::ids)
-      .get("cameras", "uint8 array (N,): index in the rig.", &SightingTable::cameras)
+  Class<MarkerObservationTable>(module,
+                                "MarkerObservations",
+                                "What keyframes see of markers, as arrays of the same length N.")
+      .def("__len__", [](const MarkerObservationTable& self) { return self.ids.size(); })
+      .get("keyframes", "uint32 array (N,): ids, ascending.", &MarkerObservationTable::keyframes)
+      .get("ids", "uint32 array (N,): numbers of the markers.", &MarkerObservationTable::ids)
+      .get("cameras", "uint8 array (N,): index in the rig.", &MarkerObservationTable::cameras)
       .get("pixels",
            "float32 array (N, 4, 2): corners, top left, top right, bottom right, bottom left of "
            "the upright print.",
-           &SightingTable::pixels);
+           &MarkerObservationTable::pixels);
 }
 
 }  // namespace

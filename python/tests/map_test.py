@@ -43,10 +43,10 @@ class MapArrays(Test):
         self.assertEqual(self.keyframes.parents[0], waymark.NO_ID)
 
     def test_tables_of_markers_are_empty_where_none_were_looked_for(self):
-        markers, sightings = self.map.markers(), self.map.marker_observations()
-        self.assertEqual((len(markers), len(sightings)), (0, 0))
+        markers, observations = self.map.markers(), self.map.marker_observations()
+        self.assertEqual((len(markers), len(observations)), (0, 0))
         self.assertEqual(markers.world_from_marker.shape, (0, 4, 4))
-        self.assertEqual(sightings.pixels.shape, (0, 4, 2))
+        self.assertEqual(observations.pixels.shape, (0, 4, 2))
 
     def test_observations_go_both_ways(self):
         id = self.landmarks.ids[np.argmax(self.landmarks.num_observers)]

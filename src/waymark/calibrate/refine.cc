@@ -21,7 +21,7 @@ constexpr std::size_t kMinKeyframes = 5;
 constexpr std::size_t kMaxKeyframes = 100;
 constexpr std::size_t kMinLandmarks = 100;
 /// Landmarks of fewer keyframes tell nothing of the lens.
-constexpr std::size_t kMinSightings = 3;
+constexpr std::size_t kMinObservations = 3;
 constexpr double kHuberPx = 1.0;
 constexpr double kGatePx = 2.45;
 constexpr int kMaxIterations = 40;
@@ -31,7 +31,7 @@ using Matrix26d = Eigen::Matrix<double, 2, 6>;
 using Matrix63d = Eigen::Matrix<double, 6, 3>;
 
 /// One landmark in one keyframe.
-struct LensSighting {
+struct LensObservation {
   int pose = 0;
   Eigen::Vector2d pixel;
   float level_scale = 1.0f;
@@ -39,8 +39,8 @@ struct LensSighting {
 
 /// A landmark and where it is seen.
 struct LensPoint {
-  std::vector<LensSighting> sightings;
-  std::size_t first = 0;  ///< Of its sightings, among those of all points.
+  std::vector<LensObservation> observations;
+  std::size_t first = 0;  ///< Of its observations, among those of all points.
 };
 
 /// What is looked for.
@@ -63,7 +63,7 @@ std::vector<KeyframeId> keyframes_of_largest(const Map& map) {
   return largest;
 }
 
-/// The least-squares problem of a map: sightings, and residuals at a state.
+/// The least-squares problem of a map: observations, and residuals at a state.
 class LensProblem {
  public:
   LensProblem(const Map& map,
@@ -104,7 +104,7 @@ class LensProblem {
   const CameraDescription assumed_;
   const LensChange sigmas_;  ///< Of the truth around what is assumed.
   std::vector<LensPoint> points_;
-  // At the state predicted last, all sightings in order.
+  // At the state predicted last, all observations in order.
   LensChange change_;
   std::vector<Eigen::Vector3d> points_in_cam_;
   std::vector<Eigen::Vector2d> errors_;  ///< Predicted - measured, px of the level.
@@ -142,11 +142,11 @@ LensProblem::LensProblem(const Map& map,
       const Features& features = *map.keyframes().at(seen.keyframe).features;
       if (features.is_edge(seen.feature)) continue;
       const Keypoint& keypoint = features.keypoints[seen.feature];
-      point.sightings.push_back({static_cast<int>(at - keyframes.begin()),
-                                 {keypoint.x_px, keypoint.y_px},
-                                 static_cast<float>(Pyramid::scale(keypoint.level))});
+      point.observations.push_back({static_cast<int>(at - keyframes.begin()),
+                                    {keypoint.x_px, keypoint.y_px},
+                                    static_cast<float>(Pyramid::scale(keypoint.level))});
     }
-    if (point.sightings.size() < kMinSightings) return;
+    if (point.observations.size() < kMinObservations) return;
     points_.push_back(std::move(point));
     state.points.push_back(landmark.position_in_world);
   });
@@ -160,8 +160,8 @@ bool LensProblem::predict(const LensState& at) {
   points_in_cam_.clear();
   for (std::size_t i = 0; i < points_.size(); ++i) {
     points_[i].first = points_in_cam_.size();
-    for (const LensSighting& sighting : points_[i].sightings) {
-      points_in_cam_.push_back(at.cam_from_world[static_cast<std::size_t>(sighting.pose)] *
+    for (const LensObservation& observation : points_[i].observations) {
+      points_in_cam_.push_back(at.cam_from_world[static_cast<std::size_t>(observation.pose)] *
                                at.points[i]);
     }
   }
@@ -172,9 +172,9 @@ bool LensProblem::predict(const LensState& at) {
   lens->camera->project_with_jacobian(points_in_cam_, errors_, error_by_point_, is_visible_);
   std::size_t k = 0;
   for (const LensPoint& point : points_) {
-    for (const LensSighting& sighting : point.sightings) {
-      errors_[k] = (errors_[k] - sighting.pixel) / sighting.level_scale;
-      error_by_point_[k++] /= sighting.level_scale;
+    for (const LensObservation& observation : point.observations) {
+      errors_[k] = (errors_[k] - observation.pixel) / observation.level_scale;
+      error_by_point_[k++] /= observation.level_scale;
     }
   }
   return true;
@@ -196,10 +196,10 @@ void LensProblem::differentiate_by_lens() {
     lens_above->camera->project(points_in_cam_, above, is_above);
     std::size_t k = 0;
     for (const LensPoint& point : points_) {
-      for (const LensSighting& sighting : point.sightings) {
+      for (const LensObservation& observation : point.observations) {
         if (is_below[k] && is_above[k]) {
           error_by_lens_[k].col(column) =
-              (above[k] - below[k]) / (2.0 * steps[column] * sighting.level_scale);
+              (above[k] - below[k]) / (2.0 * steps[column] * observation.level_scale);
         }
         ++k;
       }
@@ -223,21 +223,21 @@ void LensProblem::add_point(std::size_t index, double damping, Elimination& syst
   Eigen::Vector3d right = Eigen::Vector3d::Zero();
   std::vector<Matrix63d>& by_pose = system.pose_by_point[index];
   Matrix63d& by_lens = system.lens_by_point[index];
-  by_pose.assign(point.sightings.size(), Matrix63d::Zero());
+  by_pose.assign(point.observations.size(), Matrix63d::Zero());
   by_lens.setZero();
-  for (std::size_t k = 0; k < point.sightings.size(); ++k) {
-    const std::size_t sighting = point.first + k;
-    if (!is_visible_[sighting]) continue;
-    const Eigen::Vector2d& error = errors_[sighting];
+  for (std::size_t k = 0; k < point.observations.size(); ++k) {
+    const std::size_t observation = point.first + k;
+    if (!is_visible_[observation]) continue;
+    const Eigen::Vector2d& error = errors_[observation];
     const double weight = huber(error.squaredNorm(), kHuberPx).weight;
-    const Matrix23d& by_camera_point = error_by_point_[sighting];
+    const Matrix23d& by_camera_point = error_by_point_[observation];
     const Matrix23d by_point =
-        by_camera_point *
-        state.cam_from_world[static_cast<std::size_t>(point.sightings[k].pose)].rotation_matrix();
+        by_camera_point * state.cam_from_world[static_cast<std::size_t>(point.observations[k].pose)]
+                              .rotation_matrix();
     Matrix26d pose;
-    pose << by_camera_point, -by_camera_point * skew(points_in_cam_[sighting]);
-    const Matrix26d& lens = error_by_lens_[sighting];
-    const Eigen::Index at = 6 * point.sightings[k].pose;
+    pose << by_camera_point, -by_camera_point * skew(points_in_cam_[observation]);
+    const Matrix26d& lens = error_by_lens_[observation];
+    const Eigen::Index at = 6 * point.observations[k].pose;
     system.matrix.block<6, 6>(at, at) += weight * pose.transpose() * pose;
     system.matrix.block<6, 6>(lens_at, at) += weight * lens.transpose() * pose;
     system.matrix.block<6, 6>(lens_at, lens_at) += weight * lens.transpose() * lens;
@@ -252,11 +252,11 @@ void LensProblem::add_point(std::size_t index, double damping, Elimination& syst
   const Eigen::Matrix3d inverse = points.inverse();
   system.point_inverse[index] = inverse;
   system.point_right[index] = right;
-  for (std::size_t k = 0; k < point.sightings.size(); ++k) {
-    const Eigen::Index at = 6 * point.sightings[k].pose;
+  for (std::size_t k = 0; k < point.observations.size(); ++k) {
+    const Eigen::Index at = 6 * point.observations[k].pose;
     const Matrix63d eliminated = by_pose[k] * inverse;
-    for (std::size_t l = 0; l < point.sightings.size(); ++l) {
-      const Eigen::Index other = 6 * point.sightings[l].pose;
+    for (std::size_t l = 0; l < point.observations.size(); ++l) {
+      const Eigen::Index other = 6 * point.observations[l].pose;
       if (other > at) continue;
       system.matrix.block<6, 6>(at, other) -= eliminated * by_pose[l].transpose();
     }
@@ -301,9 +301,9 @@ LensState LensProblem::moved(const Elimination& system, const Eigen::VectorXd& s
   }
   for (std::size_t i = 0; i < points_.size(); ++i) {
     Eigen::Vector3d right = system.point_right[i] - system.lens_by_point[i].transpose() * of_lens;
-    for (std::size_t k = 0; k < points_[i].sightings.size(); ++k) {
+    for (std::size_t k = 0; k < points_[i].observations.size(); ++k) {
       right -= system.pose_by_point[i][k].transpose() *
-               step.segment<6>(6 * points_[i].sightings[k].pose);
+               step.segment<6>(6 * points_[i].observations[k].pose);
     }
     to.points[i] += system.point_inverse[i] * right;
   }
@@ -341,12 +341,12 @@ void LensProblem::drop_outliers() {
   std::size_t count = 0;
   for (std::size_t i = 0; i < points_.size(); ++i) {
     LensPoint kept;
-    for (std::size_t k = 0; k < points_[i].sightings.size(); ++k) {
-      const std::size_t sighting = points_[i].first + k;
-      if (!is_visible_[sighting] || errors_[sighting].norm() > kGatePx) continue;
-      kept.sightings.push_back(points_[i].sightings[k]);
+    for (std::size_t k = 0; k < points_[i].observations.size(); ++k) {
+      const std::size_t observation = points_[i].first + k;
+      if (!is_visible_[observation] || errors_[observation].norm() > kGatePx) continue;
+      kept.observations.push_back(points_[i].observations[k]);
     }
-    if (kept.sightings.size() < kMinSightings) continue;
+    if (kept.observations.size() < kMinObservations) continue;
     points_[count] = std::move(kept);
     state.points[count++] = state.points[i];
   }

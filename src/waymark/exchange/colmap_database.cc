@@ -42,7 +42,7 @@ CREATE TABLE two_view_geometries (pair_id INTEGER PRIMARY KEY NOT NULL, rows INT
   tvec BLOB);
 )";
 
-/// Of a track each sighting is matched to so many that follow: those of points that hundreds of
+/// Of a track each observation is matched to so many that follow: those of points that hundreds of
 /// views see would be tens of thousands otherwise. COLMAP follows matches from view to view.
 constexpr std::size_t kMaxPartners = 10;
 constexpr std::int64_t kPairFactor = 2147483647;  // Of the documentation.
@@ -99,7 +99,7 @@ using ViewMatches = std::map<ViewPair, std::vector<std::uint32_t>>;
 ViewMatches match_views(const ExportScene& scene) {
   ViewMatches matches;
   for (const ExportPoint& point : scene.points) {
-    std::vector<ExportObservation> track = point.sightings;
+    std::vector<ExportObservation> track = point.observations;
     std::ranges::sort(track, {}, &ExportObservation::view);
     for (std::size_t a = 0; a < track.size(); ++a) {
       const std::size_t end = std::min(track.size(), a + 1 + kMaxPartners);
@@ -215,12 +215,12 @@ std::vector<bool> find_connected(const ExportScene& scene) {
   return is_connected;
 }
 
-/// Takes away the sightings of some views, and the last one of a point.
-void take_sightings(ExportScene& scene, const std::vector<bool>& is_kept) {
+/// Takes away the observations of some views, and the last one of a point.
+void take_observations(ExportScene& scene, const std::vector<bool>& is_kept) {
   for (ExportPoint& point : scene.points) {
     const auto num_kept = std::ranges::count_if(
-        point.sightings, [&](const ExportObservation& seen) { return is_kept[seen.view]; });
-    std::erase_if(point.sightings, [&](const ExportObservation& seen) {
+        point.observations, [&](const ExportObservation& seen) { return is_kept[seen.view]; });
+    std::erase_if(point.observations, [&](const ExportObservation& seen) {
       if (is_kept[seen.view] && num_kept >= 2) return false;
       scene.views[seen.view].points[seen.feature] = kNoPoint;
       return true;
@@ -234,7 +234,7 @@ void unlink_loose_views(ExportScene& scene) {
   // What one view loses may disconnect the next.
   for (auto is_connected = find_connected(scene); std::ranges::count(is_connected, false) > 0;
        is_connected = find_connected(scene)) {
-    take_sightings(scene, is_connected);
+    take_observations(scene, is_connected);
     for (std::size_t v = 0; v < scene.views.size(); ++v) {
       if (is_connected[v]) continue;
       scene.views[v].pixels.clear();

@@ -69,14 +69,14 @@ TEST(UnlinkLooseViews, LeavesFeaturesToViewsThatShareEnough) {
   EXPECT_EQ(scene.views[1].points, whole.views[1].points);
   // The last view sees few, and the points beyond number 20 are then seen by the first alone.
   for (std::size_t i = 0; i < scene.points.size(); ++i) {
-    std::vector<ExportObservation>& sightings = scene.points[i].sightings;
-    std::erase_if(sightings, [&](const ExportObservation& seen) {
+    std::vector<ExportObservation>& observations = scene.points[i].observations;
+    std::erase_if(observations, [&](const ExportObservation& seen) {
       return (seen.view == 2 && i >= 5 && i < 21) || (seen.view == 1 && i > 20);
     });
   }
   unlink_loose_views(scene);
-  EXPECT_EQ(scene.points[3].sightings.size(), 2u);
-  EXPECT_EQ(scene.points[25].sightings.size(), 0u);
+  EXPECT_EQ(scene.points[3].observations.size(), 2u);
+  EXPECT_EQ(scene.points[25].observations.size(), 0u);
   EXPECT_EQ(scene.points.size(), 30u);
   EXPECT_TRUE(scene.views[2].pixels.empty());
   EXPECT_EQ(scene.views[0].points[25], kNoPoint);

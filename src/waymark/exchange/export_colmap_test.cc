@@ -44,7 +44,7 @@ cv::Point2d project(const ReadCamera& camera, const ReadImage& image, const Read
 }
 
 void expect_consistent(const ReadModel& model) {
-  std::size_t num_sightings = 0;
+  std::size_t num_observations = 0;
   for (const auto& [id, point] : model.points) {
     EXPECT_GE(point.track.size(), 2u);
     EXPECT_LT(point.error, 0.01);
@@ -54,14 +54,14 @@ void expect_consistent(const ReadModel& model) {
       const cv::Point2d pixel = project(model.cameras.at(image.camera), image, point);
       EXPECT_NEAR(pixel.x, image.pixels[feature][0], 0.01);
       EXPECT_NEAR(pixel.y, image.pixels[feature][1], 0.01);
-      ++num_sightings;
+      ++num_observations;
     }
   }
   for (const auto& [id, image] : model.images) {
-    num_sightings -= static_cast<std::size_t>(
+    num_observations -= static_cast<std::size_t>(
         std::count_if(image.points.begin(), image.points.end(), [](auto p) { return p != -1; }));
   }
-  EXPECT_EQ(num_sightings, 0u);
+  EXPECT_EQ(num_observations, 0u);
 }
 
 class ExportColmap : public ::testing::TestWithParam<std::pair<const char*, const char*>> {};

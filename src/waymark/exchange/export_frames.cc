@@ -182,7 +182,7 @@ std::vector<std::size_t> choose_frames(std::span<const FramePlace> places,
 double median_distance(const ExportScene& scene) {
   std::vector<double> distances;
   for (const ExportPoint& point : scene.points) {
-    const ExportView& view = scene.views[point.sightings.front().view];
+    const ExportView& view = scene.views[point.observations.front().view];
     distances.push_back((view.cam_from_world * point.position_in_world).norm());
   }
   if (distances.empty()) return 1.0;
@@ -199,7 +199,7 @@ ExportScene with_frames(const ExportScene& scene,
     of_keyframes[{view.keyframe, view.rig_camera}] = &view;
   }
   ExportScene result{scene.cameras, scene.cam_from_rig, {}, scene.points};
-  for (ExportPoint& point : result.points) point.sightings.clear();
+  for (ExportPoint& point : result.points) point.observations.clear();
   for (const FramePlace& place : places) {
     const std::vector<RigCamera>& cameras = map.keyframes().at(place.nearest).rig().cameras;
     for (std::size_t c = 0; c < std::min(cameras.size(), place.num_images); ++c) {
@@ -213,16 +213,16 @@ ExportScene with_frames(const ExportScene& scene,
       const auto number = static_cast<std::uint32_t>(result.views.size());
       for (std::uint32_t k = 0; k < view.points.size(); ++k) {
         if (view.points[k] != kNoPoint)
-          result.points[view.points[k]].sightings.push_back({number, k});
+          result.points[view.points[k]].observations.push_back({number, k});
       }
       result.views.push_back(std::move(view));
     }
   }
   // COLMAP takes points that no view sees, but not those that a single one does.
   for (ExportPoint& point : result.points) {
-    if (point.sightings.size() != 1) continue;
-    result.views[point.sightings[0].view].points[point.sightings[0].feature] = kNoPoint;
-    point.sightings.clear();
+    if (point.observations.size() != 1) continue;
+    result.views[point.observations[0].view].points[point.observations[0].feature] = kNoPoint;
+    point.observations.clear();
   }
   return result;
 }

@@ -69,7 +69,7 @@ double median_distance(const ExportScene& scene);
 
 /// The scene, which has all cameras of the keyframes, with these frames as its views, by time, and
 /// then by camera: keyframes among them keep their features, others have none; further keyframes
-/// go. All points stay; those that fewer than two views still see have no sightings. Image files
+/// go. All points stay; those that fewer than two views still see have no observations. Image files
 /// are named by the index of the frame and its time.
 ExportScene with_frames(const ExportScene& scene,
                         const Map& map,

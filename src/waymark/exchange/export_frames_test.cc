@@ -117,9 +117,9 @@ TEST(WithFrames, KeepsPointsAndTheFeaturesOfKeyframes) {
   EXPECT_EQ(made.views[2].pixels.size(), 31u);
   ASSERT_EQ(made.points.size(), 30u);
   for (const ExportPoint& point : made.points) {
-    ASSERT_EQ(point.sightings.size(), 2u);
-    EXPECT_EQ(point.sightings[1].view, 2u);
-    EXPECT_EQ(&made.points[made.views[2].points[point.sightings[1].feature]], &point);
+    ASSERT_EQ(point.observations.size(), 2u);
+    EXPECT_EQ(point.observations[1].view, 2u);
+    EXPECT_EQ(&made.points[made.views[2].points[point.observations[1].feature]], &point);
   }
 }
 

@@ -134,23 +134,23 @@ class SceneBuilder {
     scene_.views.push_back(std::move(view));
   }
 
-  /// A sighting, if the view is there, has none yet and shows the point where it should be.
-  void add_sighting(const Keyframe& keyframe,
-                    std::uint32_t first_view,
-                    std::uint32_t feature,
-                    ExportPoint& point) {
+  /// An observation, if the view is there, has none yet and shows the point where it should be.
+  void add_observation(const Keyframe& keyframe,
+                       std::uint32_t first_view,
+                       std::uint32_t feature,
+                       ExportPoint& point) {
     const std::size_t num_primary = keyframe.features->num_primary;
     const std::size_t rig_camera = feature < num_primary ? 0 : 1;
     if (rig_camera > 0 && cameras_ == ExportCameras::kFirst) return;
     const auto view = first_view + static_cast<std::uint32_t>(rig_camera);
-    for (const ExportObservation& other : point.sightings) {
+    for (const ExportObservation& other : point.observations) {
       if (other.view == view) return;
     }
     const std::optional<SightedPixel> sighted =
         sight(keyframe, rig_camera, feature, point.position_in_world);
     if (!sighted || sighted->error_px > kMaxExportErrorPx) return;
     const auto first_feature = static_cast<std::uint32_t>(rig_camera == 0 ? 0 : num_primary);
-    point.sightings.push_back({view, feature - first_feature});
+    point.observations.push_back({view, feature - first_feature});
     point.error_px += sighted->error_px;
     scene_.views[view].pixels[feature - first_feature] = sighted->pixel;
   }
@@ -162,17 +162,17 @@ class SceneBuilder {
     for (const Observation& observation : landmark.observations) {
       const Keyframe& keyframe = map_.keyframes().at(observation.keyframe);
       const std::uint32_t first_view = first_view_.at(observation.keyframe);
-      add_sighting(keyframe, first_view, observation.feature, point);
+      add_observation(keyframe, first_view, observation.feature, point);
       const FeatureArray<std::uint32_t>& partner = keyframe.features->partner;
       if (observation.feature < partner.size() && partner[observation.feature] != kNoFeature) {
-        add_sighting(keyframe, first_view, partner[observation.feature], point);
+        add_observation(keyframe, first_view, partner[observation.feature], point);
       }
     }
-    if (point.sightings.size() < 2) return;
-    point.error_px /= static_cast<double>(point.sightings.size());
-    for (const ExportObservation& sighting : point.sightings) {
-      ExportView& view = scene_.views[sighting.view];
-      view.points[sighting.feature] = static_cast<std::uint32_t>(scene_.points.size());
+    if (point.observations.size() < 2) return;
+    point.error_px /= static_cast<double>(point.observations.size());
+    for (const ExportObservation& observation : point.observations) {
+      ExportView& view = scene_.views[observation.view];
+      view.points[observation.feature] = static_cast<std::uint32_t>(scene_.points.size());
       const Eigen::Vector3d position_in_view = view.cam_from_world * point.position_in_world;
       point.normal -= view.cam_from_world.rotation.conjugate() * position_in_view.normalized();
     }

@@ -47,7 +47,7 @@ struct ExportPoint {
   Eigen::Vector3d position_in_world = Eigen::Vector3d::Zero();
   std::array<std::uint8_t, 3> color = {128, 128, 128};  ///< Red, green, blue.
   double error_px = 0.0;                                ///< Mean reprojection error.
-  std::vector<ExportObservation> sightings;             ///< Two at least, or none.
+  std::vector<ExportObservation> observations;          ///< Two at least, or none.
   /// Mean unit vector towards the cameras that see it: the side of its surface that is seen.
   Eigen::Vector3d normal = Eigen::Vector3d::Zero();
 };

@@ -98,20 +98,21 @@ class Splitter {
     result_.parts.emplace_back(split);
   }
 
-  /// Points with the sightings of the parts; those that no part sees twice go.
+  /// Points with the observations of the parts; those that no part sees twice go.
   void finish_points() {
     ExportScene& scene = result_.scene;
     std::vector<ExportPoint> points = scene_.points;
-    for (ExportPoint& point : points) point.sightings.clear();
+    for (ExportPoint& point : points) point.observations.clear();
     for (std::uint32_t v = 0; v < scene.views.size(); ++v) {
       for (std::uint32_t i = 0; i < scene.views[v].points.size(); ++i) {
         const std::uint32_t point = scene.views[v].points[i];
-        if (point != kNoPoint) points[point].sightings.push_back({v, i});
+        if (point != kNoPoint) points[point].observations.push_back({v, i});
       }
     }
     std::vector<std::uint32_t> new_index(points.size(), kNoPoint);
     for (std::size_t i = 0; i < points.size(); ++i) {
-      const bool is_lost = points[i].sightings.size() < 2 && scene_.points[i].sightings.size() >= 2;
+      const bool is_lost =
+          points[i].observations.size() < 2 && scene_.points[i].observations.size() >= 2;
       if (is_lost) continue;
       new_index[i] = static_cast<std::uint32_t>(scene.points.size());
       scene.points.push_back(std::move(points[i]));

@@ -36,10 +36,10 @@ std::string content_of(const std::filesystem::path& path) {
   return {std::istreambuf_iterator<char>(stream), {}};
 }
 
-/// Every sighting, with the pinhole camera and the pose that the model states.
+/// Every observation, with the pinhole camera and the pose that the model states.
 void expect_small_errors(const ExportScene& scene) {
   const testing::ReadModel model = testing::read_text(format_colmap(scene, ColmapFormat::kText));
-  std::size_t num_sightings = 0;
+  std::size_t num_observations = 0;
   for (const auto& [id, point] : model.points) {
     for (const auto& [image_id, feature] : point.track) {
       const testing::ReadImage& image = model.images.at(image_id);
@@ -54,10 +54,10 @@ void expect_small_errors(const ExportScene& scene) {
           camera.params[0] * x.x() / x.z() + camera.params[2], image.pixels[feature][0], 0.02);
       EXPECT_NEAR(
           camera.params[1] * x.y() / x.z() + camera.params[3], image.pixels[feature][1], 0.02);
-      ++num_sightings;
+      ++num_observations;
     }
   }
-  EXPECT_GE(num_sightings, 90u);
+  EXPECT_GE(num_observations, 90u);
 }
 
 TEST(ExportSplit, PartsSeeThePointsWhereTheyAre) {

@@ -20,14 +20,14 @@ namespace {
 
 using testing::small_map;
 
-TEST(ExportScene, LeavesOutSightingsThatAreOff) {
+TEST(ExportScene, LeavesOutObservationsThatAreOff) {
   testing::SmallMap small = testing::make_small_map();
   small.moved_px[1][4].x() = 6.0;
   for (int id : {1, 2}) small.moved_px[id][5].y() = 6.0;
   const Map map = small.map();
   const ExportScene scene = make_export_scene(map, SubmapId{0});
   EXPECT_EQ(scene.points.size(), 29u);
-  EXPECT_EQ(scene.points[4].sightings.size(), 2u);
+  EXPECT_EQ(scene.points[4].observations.size(), 2u);
   EXPECT_EQ(scene.views[1].points[4], kNoPoint);
 }
 
@@ -58,12 +58,12 @@ TEST(ExportScene, ShowsPointsOnEdgesWhereTheirEdgesAre) {
   const ExportScene scene =
       make_export_scene(map_with_an_edge(angle_rad, 7.0f * along + across), SubmapId{0});
   ASSERT_EQ(scene.points.size(), 30u);
-  EXPECT_EQ(scene.points[29].sightings.size(), 3u);
+  EXPECT_EQ(scene.points[29].observations.size(), 3u);
   EXPECT_NEAR(scene.points[29].error_px, 1.0 / 3.0, 0.1);
   EXPECT_LT((scene.views[1].pixels[29] - place - across.cast<double>()).norm(), 0.1);
   const ExportScene beside =
       make_export_scene(map_with_an_edge(angle_rad, 6.0f * across), SubmapId{0});
-  EXPECT_EQ(beside.points[29].sightings.size(), 2u);
+  EXPECT_EQ(beside.points[29].observations.size(), 2u);
 }
 
 TEST(ExportScene, TakesColoursFromImages) {

@@ -140,11 +140,11 @@ std::string format_points_text(const ExportScene& scene, ColmapIds numbers) {
                    point.color[1],
                    point.color[2],
                    point.error_px);
-    for (const ExportObservation& sighting : point.sightings) {
+    for (const ExportObservation& observation : point.observations) {
       fmt::format_to(std::back_inserter(text),
                      " {} {}",
-                     numbers.first_image + sighting.view,
-                     sighting.feature);
+                     numbers.first_image + observation.view,
+                     observation.feature);
     }
     text += '\n';
   }
@@ -159,10 +159,10 @@ std::string format_points_binary(const ExportScene& scene, ColmapIds numbers) {
     for (const double value : point.position_in_world) append_little_endian(bytes, value);
     for (const std::uint8_t channel : point.color) append_little_endian(bytes, channel);
     append_little_endian(bytes, point.error_px);
-    append_little_endian(bytes, std::uint64_t{point.sightings.size()});
-    for (const ExportObservation& sighting : point.sightings) {
-      append_little_endian(bytes, numbers.first_image + sighting.view);
-      append_little_endian(bytes, sighting.feature);
+    append_little_endian(bytes, std::uint64_t{point.observations.size()});
+    for (const ExportObservation& observation : point.observations) {
+      append_little_endian(bytes, numbers.first_image + observation.view);
+      append_little_endian(bytes, observation.feature);
     }
   }
   return bytes;

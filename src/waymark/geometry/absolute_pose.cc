@@ -165,17 +165,17 @@ struct PoseSystem {
 };
 
 PoseSystem linearise(const Rigid3& cam_from_world,
-                     const PointSightings& sightings,
+                     const PointObservations& observations,
                      std::span<const std::uint32_t> indices,
                      double squared_scale) {
   PoseSystem system;
   for (const std::uint32_t index : indices) {
-    const Eigen::Vector3d point = cam_from_world * sightings.points_in_world[index];
-    const Eigen::Vector3d& bearing = sightings.bearings[index];
+    const Eigen::Vector3d point = cam_from_world * observations.points_in_world[index];
+    const Eigen::Vector3d& bearing = observations.bearings[index];
     const double range = point.norm();
     const Eigen::Vector3d direction = point / range;
     if (!(direction.dot(bearing) > 0.0)) continue;
-    const double inverse_sigma = 1.0 / sightings.sigmas_rad[index];
+    const double inverse_sigma = 1.0 / observations.sigmas_rad[index];
     const Eigen::Matrix<double, 2, 3> tangent = inverse_sigma * tangent_basis(bearing).transpose();
     const Eigen::Vector2d residual = tangent * direction;
     Eigen::Matrix<double, 2, 6> jacobian;
@@ -231,17 +231,17 @@ std::vector<Rigid3> AbsolutePoseEstimator::fit(
     std::span<const std::uint32_t, kSampleSize> sample) const {
   std::array<Eigen::Vector3d, kSampleSize> bearings, points_in_world;
   for (std::size_t i = 0; i < kSampleSize; ++i) {
-    bearings[i] = sightings_.bearings[sample[i]];
-    points_in_world[i] = sightings_.points_in_world[sample[i]];
+    bearings[i] = observations_.bearings[sample[i]];
+    points_in_world[i] = observations_.points_in_world[sample[i]];
   }
   return solve_absolute_three_point(bearings, points_in_world);
 }
 
 double AbsolutePoseEstimator::squared_error(const Rigid3& cam_from_world, std::size_t index) const {
   const Eigen::Vector3d direction =
-      (cam_from_world * sightings_.points_in_world[index]).normalized();
-  const double sigma = sightings_.sigmas_rad[index];
-  return (direction - sightings_.bearings[index]).squaredNorm() / (sigma * sigma);
+      (cam_from_world * observations_.points_in_world[index]).normalized();
+  const double sigma = observations_.sigmas_rad[index];
+  return (direction - observations_.bearings[index]).squaredNorm() / (sigma * sigma);
 }
 
 std::optional<Rigid3> AbsolutePoseEstimator::refine(const Rigid3& cam_from_world,
@@ -250,7 +250,7 @@ std::optional<Rigid3> AbsolutePoseEstimator::refine(const Rigid3& cam_from_world
   if (nearby.size() <= kSampleSize) return std::nullopt;
   Rigid3 pose = cam_from_world;
   for (int step = 0; step < kNumSteps; ++step) {
-    const PoseSystem system = linearise(pose, sightings_, nearby, kMaxSquaredError);
+    const PoseSystem system = linearise(pose, observations_, nearby, kMaxSquaredError);
     const Vector6d tangent = -system.information.ldlt().solve(system.gradient);
     if (!tangent.allFinite()) return std::nullopt;
     pose = Rigid3::exp(tangent) * pose;

@@ -27,7 +27,7 @@ std::vector<Rigid3> solve_absolute_three_point(std::span<const Eigen::Vector3d, 
 /// Unit bearings that a camera measured of points with known positions, and the standard deviation
 /// of each bearing's direction in radians, per axis of the tangent plane (> 0). A view: the arrays
 /// belong to the caller and run in parallel.
-struct PointSightings {
+struct PointObservations {
   std::span<const Eigen::Vector3d> points_in_world;
   std::span<const Eigen::Vector3d> bearings;
   std::span<const double> sigmas_rad;
@@ -44,8 +44,9 @@ class AbsolutePoseEstimator {
   static constexpr std::size_t kSampleSize = 3;
   static constexpr double kMaxSquaredError = 5.99;
 
-  explicit AbsolutePoseEstimator(const PointSightings& sightings) : sightings_(sightings) {}
-  std::size_t num_data() const { return sightings_.size(); }
+  explicit AbsolutePoseEstimator(const PointObservations& observations)
+      : observations_(observations) {}
+  std::size_t num_data() const { return observations_.size(); }
   std::vector<Rigid3> fit(std::span<const std::uint32_t, kSampleSize> sample) const;
   double squared_error(const Rigid3& cam_from_world, std::size_t index) const;
   /// Gauss-Newton steps under the loss of Geman & McClure.
@@ -53,7 +54,7 @@ class AbsolutePoseEstimator {
                                std::span<const std::uint32_t> nearby) const;
 
  private:
-  PointSightings sightings_;
+  PointObservations observations_;
 };
 
 }  // namespace waymark

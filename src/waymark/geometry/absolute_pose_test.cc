@@ -221,17 +221,17 @@ TEST(AbsoluteThreePoint, DegenerateBearingsGiveFinitePosesThatFit) {
   }
 }
 
-struct SightingScene {
+struct ObservationScene {
   Rigid3 cam_from_world;
   std::vector<Eigen::Vector3d> points_in_world, bearings;
   std::vector<double> sigmas_rad;
   std::vector<std::uint8_t> is_outlier;
 
-  PointSightings sightings() const { return {points_in_world, bearings, sigmas_rad}; }
+  PointObservations observations() const { return {points_in_world, bearings, sigmas_rad}; }
 };
 
-SightingScene make_sightings(const View& view, double outlier_share, Rng& rng) {
-  SightingScene scene;
+ObservationScene make_scene(const View& view, double outlier_share, Rng& rng) {
+  ObservationScene scene;
   scene.cam_from_world = random_pose(rng, rng.uniform(0.0, M_PI), 5.0);
   for (int i = 0; i < 200; ++i) {
     const double sigma = 0.002 * std::pow(1.2, rng.below(8));
@@ -249,9 +249,9 @@ SightingScene make_sightings(const View& view, double outlier_share, Rng& rng) {
 TEST(AbsolutePoseEstimator, FindsThePoseAmongOutliers) {
   for (int i = 0; i < 20; ++i) {
     Rng rng(7, static_cast<std::uint64_t>(i));
-    const SightingScene scene = make_sightings({.sees_all = i % 2 == 0}, 0.7, rng);
+    const ObservationScene scene = make_scene({.sees_all = i % 2 == 0}, 0.7, rng);
     const auto result =
-        ransac(AbsolutePoseEstimator(scene.sightings()), {.seed = 1, .min_inlier_ratio = 0.15});
+        ransac(AbsolutePoseEstimator(scene.observations()), {.seed = 1, .min_inlier_ratio = 0.15});
     ASSERT_TRUE(result.has_value()) << i;
     EXPECT_LT(rotation_error_rad(result->model, scene.cam_from_world), 0.005) << i;
     EXPECT_LT((result->model.translation - scene.cam_from_world.translation).norm(), 0.1) << i;
@@ -262,11 +262,11 @@ TEST(AbsolutePoseEstimator, FindsThePoseAmongOutliers) {
   }
 }
 
-TEST(AbsolutePoseEstimator, FindsLittleSupportAmongRandomSightings) {
+TEST(AbsolutePoseEstimator, FindsLittleSupportAmongRandomObservations) {
   Rng rng(8, 0);
-  const SightingScene scene = make_sightings({}, 1.0, rng);
+  const ObservationScene scene = make_scene({}, 1.0, rng);
   const auto result =
-      ransac(AbsolutePoseEstimator(scene.sightings()), {.seed = 1, .min_inlier_ratio = 0.2});
+      ransac(AbsolutePoseEstimator(scene.observations()), {.seed = 1, .min_inlier_ratio = 0.2});
   EXPECT_TRUE(!result || result->inliers.size() < 15);
 }
 

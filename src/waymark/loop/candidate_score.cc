@@ -19,7 +19,7 @@ constexpr AppearanceOptions kAppearance{.max_distance = 64, .max_ratio = 0.8};
 constexpr double kNoisePx = 1.5;
 /// Search for more matches of the two keyframes, then for what else should be seen.
 constexpr double kGuidedRadiusPx = 8.0;
-constexpr double kSightingRadiusPx = 4.0;
+constexpr double kObservationRadiusPx = 4.0;
 constexpr std::size_t kNumSurroundings = 8;
 /// Landmarks that so many keyframes saw are expected to be seen again.
 constexpr std::size_t kMinObservers = 3;
@@ -173,7 +173,7 @@ VisibleShare CandidateScorer::look_for(const Map& map,
                                                      *keyframe.features,
                                                      {},
                                                      target_from_world,
-                                                     {.radius_px = kSightingRadiusPx});
+                                                     {.radius_px = kObservationRadiusPx});
   const auto num_visible =
       std::count(found.is_visible.begin(), found.is_visible.end(), std::uint8_t{1});
   return {found.num_matches, static_cast<std::size_t>(num_visible)};
@@ -198,11 +198,11 @@ void CandidateScorer::count_visibility(const Map& map, ScoredCandidate& scored) 
     const Features& features = *map.keyframes().at(id).features;
     const Rigid3 id_from_query = map.keyframes().at(id).rig_from_world * query_from_world.inverse();
     const Sim3 id_from_match = Sim3(id_from_query) * candidate.query_from_match;
-    const VisibleShare sightings =
+    const VisibleShare observations =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
-    scored.is_confirmed = static_cast<int>(sightings.num_found) >=
+    scored.is_confirmed = static_cast<int>(observations.num_found) >=
                               adaptive_threshold(kMinFoundToConfirm, features.num_corners()) &&
-                          sightings.share() >= kMinShareToConfirm;
+                          observations.share() >= kMinShareToConfirm;
     if (scored.is_confirmed) break;
   }
 }

@@ -83,7 +83,7 @@ enum class Edit {
   kJoinSubmaps,
   kMoveLandmark,
   kSetAppearance,
-  kCountSightings,
+  kCountObservations,
   kCorrect,
   kNumEdits
 };
@@ -205,7 +205,7 @@ class RandomEditor {
         return map.move_landmark(landmark, random_point()), true;
       case Edit::kSetAppearance:
         return map.set_appearance(landmark, {{rng_.next()}, random_point(), 0.1}), true;
-      case Edit::kCountSightings:
+      case Edit::kCountObservations:
         return map.count_visibility(landmark, 2, 1), true;
       default:
         apply_correction(map, {{{keyframe, random_pose(), 1.5}}, {{landmark, random_point()}}});

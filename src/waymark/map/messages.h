@@ -37,12 +37,12 @@ struct LandmarkVisibility {
 
 /// The tracker asks the mapper to add a frame to the map.
 struct NewKeyframe {
-  FrameId frame;                              ///< Which one.
-  std::int64_t timestamp_ns = 0;              ///< Of its images.
-  RelativePose pose;                          ///< Moves with the map.
-  std::shared_ptr<const Features> features;   ///< Never null.
-  std::vector<LandmarkId> landmarks;          ///< Per feature, invalid where none.
-  std::vector<LandmarkVisibility> sightings;  ///< Ascending by landmark.
+  FrameId frame;                               ///< Which one.
+  std::int64_t timestamp_ns = 0;               ///< Of its images.
+  RelativePose pose;                           ///< Moves with the map.
+  std::shared_ptr<const Features> features;    ///< Never null.
+  std::vector<LandmarkId> landmarks;           ///< Per feature, invalid where none.
+  std::vector<LandmarkVisibility> visibility;  ///< Ascending by landmark.
   std::shared_ptr<const MarkerObservations> markers = nullptr;  ///< That it sees; null: none.
 };
 

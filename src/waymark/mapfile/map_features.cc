@@ -159,9 +159,9 @@ std::shared_ptr<const MarkerObservations> read_markers(MapRecord& record, const 
   const auto pixels = record.array<Eigen::Vector2f>("marker_pixel", 4 * count);
   const auto bearings = record.array<Eigen::Vector3f>("marker_bearing", 4 * count);
   const auto slopes = record.array<Matrix23f>("marker_pixel_from_bearing", 4 * count, kSlopeRange);
-  auto sightings = std::make_shared<MarkerObservations>(count);
+  auto observations = std::make_shared<MarkerObservations>(count);
   for (std::size_t i = 0; i < count; ++i) {
-    MarkerObservation& sighting = (*sightings)[i];
+    MarkerObservation& observation = (*observations)[i];
     if (numbers[i] > kMaxMarkerNumber || cameras[i] >= rig.cameras.size()) {
       record.fail(fmt::format("has marker {} of camera {}, expected one up to {} of {} cameras",
                               numbers[i],
@@ -169,20 +169,20 @@ std::shared_ptr<const MarkerObservations> read_markers(MapRecord& record, const 
                               kMaxMarkerNumber,
                               rig.cameras.size()));
     }
-    sighting.id = static_cast<int>(numbers[i]);
-    sighting.camera = cameras[i];
+    observation.id = static_cast<int>(numbers[i]);
+    observation.camera = cameras[i];
     for (std::size_t corner = 0; corner < 4; ++corner) {
-      sighting.pixels[corner] = pixels[4 * i + corner];
-      sighting.bearings[corner] = bearings[4 * i + corner];
-      sighting.pixel_from_bearing[corner] = slopes[4 * i + corner];
-      const double length = sighting.bearings[corner].cast<double>().norm();
+      observation.pixels[corner] = pixels[4 * i + corner];
+      observation.bearings[corner] = bearings[4 * i + corner];
+      observation.pixel_from_bearing[corner] = slopes[4 * i + corner];
+      const double length = observation.bearings[corner].cast<double>().norm();
       if (!(std::abs(length - 1.0) <= kMaxUnitError)) {
         record.fail(fmt::format(
-            "marker_bearing of marker {} has the length {}, expected 1", sighting.id, length));
+            "marker_bearing of marker {} has the length {}, expected 1", observation.id, length));
       }
     }
   }
-  return sightings;
+  return observations;
 }
 
 }  // namespace waymark

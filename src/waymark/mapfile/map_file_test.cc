@@ -130,17 +130,18 @@ StoredMap map_with_markers() {
   MapParts parts = take_apart(*stored.map);
   for (auto& [id, keyframe] : parts.keyframes) {
     if (id.value % 3 != 0) continue;
-    auto sightings = std::make_shared<MarkerObservations>(2);
+    auto observations = std::make_shared<MarkerObservations>(2);
     for (std::size_t i = 0; i < 2; ++i) {
-      MarkerObservation& sighting = (*sightings)[i];
-      sighting.id = static_cast<int>(i) + 7;
+      MarkerObservation& observation = (*observations)[i];
+      observation.id = static_cast<int>(i) + 7;
       for (std::size_t corner = 0; corner < 4; ++corner) {
-        sighting.pixels[corner] = {10.0f * static_cast<float>(corner), 0.25f};
-        sighting.bearings[corner] = keyframe.features->bearings[corner];
-        sighting.pixel_from_bearing[corner] = keyframe.features->level_pixel_from_bearing[corner];
+        observation.pixels[corner] = {10.0f * static_cast<float>(corner), 0.25f};
+        observation.bearings[corner] = keyframe.features->bearings[corner];
+        observation.pixel_from_bearing[corner] =
+            keyframe.features->level_pixel_from_bearing[corner];
       }
     }
-    keyframe.markers = sightings;
+    keyframe.markers = observations;
   }
   const Rigid3 pose = Rigid3::exp((Vector6d() << 1, 2, 3, 0.1, 0.2, 0.3).finished());
   parts.markers.push_back({7, 0.16, parts.keyframes[3].id, 1.5, pose});

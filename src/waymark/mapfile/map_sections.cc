@@ -49,18 +49,18 @@ void add_features(MapRecordWriter& writer, const Features& features) {
   writer.add_array("inverse_range_sigma", features.inverse_range_sigma, kNotNegative);
 }
 
-void add_markers(MapRecordWriter& writer, const MarkerObservations& sightings) {
+void add_markers(MapRecordWriter& writer, const MarkerObservations& observations) {
   std::vector<std::uint32_t> numbers;
   std::vector<std::uint8_t> cameras;
   std::vector<Eigen::Vector2f> pixels;
   std::vector<Eigen::Vector3f> bearings;
   std::vector<Matrix23f> slopes;
-  for (const MarkerObservation& sighting : sightings) {
-    numbers.push_back(static_cast<std::uint32_t>(sighting.id));
-    cameras.push_back(sighting.camera);
-    pixels.insert(pixels.end(), sighting.pixels.begin(), sighting.pixels.end());
-    bearings.insert(bearings.end(), sighting.bearings.begin(), sighting.bearings.end());
-    const auto& of_corners = sighting.pixel_from_bearing;
+  for (const MarkerObservation& observation : observations) {
+    numbers.push_back(static_cast<std::uint32_t>(observation.id));
+    cameras.push_back(observation.camera);
+    pixels.insert(pixels.end(), observation.pixels.begin(), observation.pixels.end());
+    bearings.insert(bearings.end(), observation.bearings.begin(), observation.bearings.end());
+    const auto& of_corners = observation.pixel_from_bearing;
     slopes.insert(slopes.end(), of_corners.begin(), of_corners.end());
   }
   writer.add_array("marker", numbers);

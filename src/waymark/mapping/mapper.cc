@@ -109,10 +109,10 @@ void Mapper::look_for_readout(KeyframeId newest) {
 }
 
 KeyframeId Mapper::insert(const NewKeyframe& message) {
-  for (const LandmarkVisibility& sighting : message.sightings) {
-    const LandmarkId landmark = map_.resolve(sighting.landmark);
+  for (const LandmarkVisibility& seen : message.visibility) {
+    const LandmarkId landmark = map_.resolve(seen.landmark);
     if (landmark.is_valid()) {
-      map_.count_visibility(landmark, sighting.num_visible, sighting.num_found);
+      map_.count_visibility(landmark, seen.num_visible, seen.num_found);
     }
   }
   Keyframe keyframe;

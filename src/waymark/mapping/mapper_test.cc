@@ -153,14 +153,14 @@ double announced_error(const Session& session) {
   return std::sqrt(sum / static_cast<double>(session.position_variances.size()));
 }
 
-/// All sightings of all landmarks by a part of the frames, as only the simulator knows them, at the
-/// true poses and points.
+/// All observations of all landmarks by a part of the frames, as only the simulator knows them, at
+/// the true poses and points.
 BundleProblem perfect_problem(const Setup& setup,
                               const std::shared_ptr<const Rig>& rig,
                               int every) {
   const PointCloud cloud = make_cloud();
   BundleProblem problem;
-  std::vector<std::vector<BundleObservation>> sightings(cloud.landmarks.size());
+  std::vector<std::vector<BundleObservation>> observations(cloud.landmarks.size());
   for (int i = 0; i < kNumFrames; i += every) {
     const PointObservation seen =
         observe(cloud, rig, truth(i), make_noise(setup), static_cast<std::uint64_t>(i));
@@ -168,15 +168,15 @@ BundleProblem perfect_problem(const Setup& setup,
       const std::uint32_t landmark = seen.landmark_of_feature[k];
       if (landmark == kNoLandmark) continue;
       const auto pose = static_cast<std::uint32_t>(problem.rig_from_world.size());
-      sightings[landmark].push_back({seen.features->measurement(k), pose});
+      observations[landmark].push_back({seen.features->measurement(k), pose});
     }
     problem.is_pose_fixed.push_back(problem.rig_from_world.empty());
     problem.rig_from_world.push_back(truth(i).inverse());
     problem.rigs.push_back(rig.get());
   }
-  for (std::size_t landmark = 0; landmark < sightings.size(); ++landmark) {
-    if (sightings[landmark].size() < 2) continue;
-    for (BundleObservation& observation : sightings[landmark]) {
+  for (std::size_t landmark = 0; landmark < observations.size(); ++landmark) {
+    if (observations[landmark].size() < 2) continue;
+    for (BundleObservation& observation : observations[landmark]) {
       observation.point = static_cast<std::uint32_t>(problem.points.size());
       problem.observations.push_back(observation);
     }

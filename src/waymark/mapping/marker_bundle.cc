@@ -20,19 +20,19 @@ struct MarkerInKeyframe {
   const MarkerObservation* marker;
 };
 
-std::vector<MarkerInKeyframe> list_sightings(const Map& map,
-                                             std::span<const KeyframeId> keyframes,
-                                             const MapMarker& of_map) {
+std::vector<MarkerInKeyframe> list_observations(const Map& map,
+                                                std::span<const KeyframeId> keyframes,
+                                                const MapMarker& of_map) {
   const SubmapId submap = map.submap_of(of_map);
-  std::vector<MarkerInKeyframe> sightings;
+  std::vector<MarkerInKeyframe> observations;
   for (std::size_t i = 0; i < keyframes.size(); ++i) {
     const Keyframe& keyframe = map.keyframes().at(keyframes[i]);
     if (!keyframe.markers || keyframe.submap != submap) continue;
     for (const MarkerObservation& marker : *keyframe.markers) {
-      if (marker.id == of_map.id) sightings.push_back({static_cast<std::uint32_t>(i), &marker});
+      if (marker.id == of_map.id) observations.push_back({static_cast<std::uint32_t>(i), &marker});
     }
   }
-  return sightings;
+  return observations;
 }
 
 /// A camera one side of the marker before its middle, which looks at it.
@@ -61,7 +61,7 @@ Measurement corner_measurement(const Rig& rig, std::size_t corner, double side) 
   return measured;
 }
 
-Measurement sighting_measurement(const MarkerObservation& marker, std::size_t corner) {
+Measurement observation_measurement(const MarkerObservation& marker, std::size_t corner) {
   return {marker.camera,
           marker.bearings[corner],
           marker.pixel_from_bearing[corner] / static_cast<float>(kCornerSigmaPx)};
@@ -75,8 +75,8 @@ std::vector<std::shared_ptr<const Rig>> add_markers(const Map& map,
   WAYMARK_CHECK(!problem.calibration);
   std::vector<std::shared_ptr<const Rig>> rigs;
   for (const MapMarker& marker : map.markers()) {
-    const std::vector<MarkerInKeyframe> sightings = list_sightings(map, keyframes, marker);
-    if (sightings.size() < 2) continue;
+    const std::vector<MarkerInKeyframe> observations = list_observations(map, keyframes, marker);
+    if (observations.size() < 2) continue;
     const auto rig = rigs.emplace_back(rig_before(marker.side_m));
     const auto& surveyed = marker.surveyed_world_from_marker;
     const Rigid3 world_from_marker = surveyed ? *surveyed : map.world_from_marker(marker);
@@ -87,9 +87,9 @@ std::vector<std::shared_ptr<const Rig>> add_markers(const Map& map,
     for (std::size_t corner = 0; corner < 4; ++corner) {
       const auto point = static_cast<std::uint32_t>(problem.points.size());
       problem.points.push_back(world_from_marker * marker_corner(corner, marker.side_m));
-      for (const MarkerInKeyframe& sighting : sightings) {
+      for (const MarkerInKeyframe& observation : observations) {
         problem.observations.push_back(
-            {sighting_measurement(*sighting.marker, corner), sighting.pose, point});
+            {observation_measurement(*observation.marker, corner), observation.pose, point});
       }
       problem.observations.push_back(
           {corner_measurement(*rig, corner, marker.side_m), pose, point});

@@ -34,7 +34,7 @@ class MarkerBundleTest : public ::testing::Test {
       keyframe.features = features;
       if (k > 0) keyframe.parent = KeyframeId{static_cast<std::uint32_t>(k - 1)};
       keyframe.markers = std::make_shared<const MarkerObservations>(MarkerObservations{
-          testing::make_sighting(4, truth * hung_, kSide, 0.05, static_cast<std::uint64_t>(k))});
+          testing::make_observation(4, truth * hung_, kSide, 0.05, static_cast<std::uint64_t>(k))});
       keyframes_.push_back(map_.add_keyframe(std::move(keyframe)));
       truth_.push_back(truth);
     }

@@ -17,10 +17,10 @@ std::map<int, std::vector<MarkerView>> list_views(const Map& map, SubmapId subma
   std::map<int, std::vector<MarkerView>> views;
   map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
     if (keyframe.submap != submap || !keyframe.markers) return;
-    for (const MarkerObservation& sighting : *keyframe.markers) {
-      const Rigid3& cam_from_rig = keyframe.rig().cameras[sighting.camera].cam_from_rig;
-      views[sighting.id].push_back(
-          {cam_from_rig * keyframe.rig_from_world, keyframe.timestamp_ns, &sighting});
+    for (const MarkerObservation& observation : *keyframe.markers) {
+      const Rigid3& cam_from_rig = keyframe.rig().cameras[observation.camera].cam_from_rig;
+      views[observation.id].push_back(
+          {cam_from_rig * keyframe.rig_from_world, keyframe.timestamp_ns, &observation});
     }
   });
   for (auto& [id, of_marker] : views) {

@@ -42,23 +42,23 @@ bool is_clockwise(const Corners& corners) {
   return a.x() * b.y() - a.y() * b.x() > 0.0;
 }
 
-std::optional<MarkerObservation> sighting_of(int id,
-                                             const Corners& corners,
-                                             const Camera& camera,
-                                             std::uint8_t camera_index) {
+std::optional<MarkerObservation> observation_of(int id,
+                                                const Corners& corners,
+                                                const Camera& camera,
+                                                std::uint8_t camera_index) {
   constexpr std::array<float, 4> kLevelScales = {1.0f, 1.0f, 1.0f, 1.0f};
   TangentComputer computer;
   const TangentArrays& tangents = computer.compute(camera, corners, kLevelScales);
-  MarkerObservation sighting;
-  sighting.id = id;
-  sighting.camera = camera_index;
+  MarkerObservation observation;
+  observation.id = id;
+  observation.camera = camera_index;
   for (std::size_t i = 0; i < 4; ++i) {
     if (!tangents.is_valid[i]) return std::nullopt;
-    sighting.pixels[i] = corners[i].cast<float>();
-    sighting.bearings[i] = tangents.bearings[i];
-    sighting.pixel_from_bearing[i] = tangents.level_pixel_from_bearing[i];
+    observation.pixels[i] = corners[i].cast<float>();
+    observation.bearings[i] = tangents.bearings[i];
+    observation.pixel_from_bearing[i] = tangents.level_pixel_from_bearing[i];
   }
-  return sighting;
+  return observation;
 }
 
 /// lengths by the side.
@@ -103,8 +103,8 @@ bool are_near(const Corners& expected, const Corners& found) {
 MarkerObservations MarkerDetector::detect(ImageView image,
                                           const Camera& camera,
                                           std::uint8_t camera_index) const {
-  MarkerObservations sightings;
-  if (image.width_px < 8 || image.height_px < 8) return sightings;
+  MarkerObservations observations;
+  if (image.width_px < 8 || image.height_px < 8) return observations;
   std::vector<std::vector<cv::Point2f>> outlines;
   std::vector<int> ids;
   cv::aruco::detectMarkers(mat_of(image),
@@ -118,19 +118,19 @@ MarkerObservations MarkerDetector::detect(ImageView image,
     if (!is_clockwise(corners)) continue;
     const auto refined = refine_marker_corners(image, camera, corners, family_.side_modules());
     if (!refined) continue;
-    if (auto sighting = sighting_of(ids[i], *refined, camera, camera_index)) {
-      sightings.push_back(*sighting);
+    if (auto observation = observation_of(ids[i], *refined, camera, camera_index)) {
+      observations.push_back(*observation);
     }
   }
-  std::ranges::stable_sort(sightings, {}, &MarkerObservation::id);
-  return sightings;
+  std::ranges::stable_sort(observations, {}, &MarkerObservation::id);
+  return observations;
 }
 
 MarkerObservations MarkerDetector::confirm(ImageView image,
                                            const Camera& camera,
                                            std::uint8_t camera_index,
                                            std::span<const ExpectedMarker> expected) const {
-  MarkerObservations sightings;
+  MarkerObservations observations;
   for (const ExpectedMarker& marker : expected) {
     if (marker.id < 0 || marker.id >= family_.size() || !(marker.side > 0.0)) continue;
     Rigid3 cam_from_marker = marker.cam_from_marker;
@@ -142,22 +142,22 @@ MarkerObservations MarkerDetector::confirm(ImageView image,
     const auto after = project_corners(camera, fit->cam_from_marker);
     if (!after || !are_near(*before, *after)) continue;
     if (!is_own_pattern(image, camera, family_, marker.id, *fit)) continue;
-    if (auto sighting = sighting_of(marker.id, *after, camera, camera_index)) {
-      sightings.push_back(*sighting);
+    if (auto observation = observation_of(marker.id, *after, camera, camera_index)) {
+      observations.push_back(*observation);
     }
   }
-  return sightings;
+  return observations;
 }
 
 std::shared_ptr<const MarkerObservations> recompute(
-    const std::shared_ptr<const MarkerObservations>& sightings, const Rig& rig) {
-  if (!sightings) return nullptr;
+    const std::shared_ptr<const MarkerObservations>& observations, const Rig& rig) {
+  if (!observations) return nullptr;
   auto anew = std::make_shared<MarkerObservations>();
-  for (const MarkerObservation& sighting : *sightings) {
+  for (const MarkerObservation& observation : *observations) {
     Corners corners;
-    for (std::size_t i = 0; i < 4; ++i) corners[i] = sighting.pixels[i].cast<double>();
-    const Camera& camera = *rig.cameras.at(sighting.camera).camera;
-    const auto measured = sighting_of(sighting.id, corners, camera, sighting.camera);
+    for (std::size_t i = 0; i < 4; ++i) corners[i] = observation.pixels[i].cast<double>();
+    const Camera& camera = *rig.cameras.at(observation.camera).camera;
+    const auto measured = observation_of(observation.id, corners, camera, observation.camera);
     if (measured) anew->push_back(*measured);
   }
   return anew->empty() ? nullptr : anew;

@@ -32,7 +32,7 @@ class MarkerDetector {
   explicit MarkerDetector(MarkerFamily family) : family_(std::move(family)) {}
 
   /// The markers of an image of that camera, by id. Those whose corners are not all in the field of
-  /// view or whose outline does not fit a square's are left out. camera_index: of the sightings.
+  /// view or whose outline does not fit a square's are left out. camera_index: of the observations.
   MarkerObservations detect(ImageView image, const Camera& camera, std::uint8_t camera_index) const;
 
   /// Those of expected markers that the image shows where they are expected, see fit_pattern(). As
@@ -49,9 +49,9 @@ class MarkerDetector {
   MarkerFamily family_;
 };
 
-/// The same sightings as a rig that is calibrated otherwise measures their pixels, without those
+/// The same observations as a rig that is calibrated otherwise measures their pixels, without those
 /// that it has no bearings of; null as it was.
 std::shared_ptr<const MarkerObservations> recompute(
-    const std::shared_ptr<const MarkerObservations>& sightings, const Rig& rig);
+    const std::shared_ptr<const MarkerObservations>& observations, const Rig& rig);
 
 }  // namespace waymark

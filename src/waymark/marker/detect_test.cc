@@ -55,9 +55,10 @@ double corner_error_px(const MarkerDetector& detector,
                        const Image& image,
                        int id,
                        const Rigid3& cam_from_marker) {
-  for (const MarkerObservation& sighting : detector.detect(image.view(), camera, 0)) {
-    EXPECT_EQ(sighting.id, id);
-    if (sighting.id == id) return std::sqrt(squared_error_px(sighting, cam_from_marker, kSide));
+  for (const MarkerObservation& observation : detector.detect(image.view(), camera, 0)) {
+    EXPECT_EQ(observation.id, id);
+    if (observation.id == id)
+      return std::sqrt(squared_error_px(observation, cam_from_marker, kSide));
   }
   return -1.0;
 }

@@ -15,8 +15,8 @@ constexpr double kLeastCosine = 0.05;
 
 /// The frame of a camera that looks at the middle of the square, with its upper side level: any
 /// part of any image is then as of a perspective camera.
-Eigen::Quaterniond turn_ahead(const MarkerObservation& sighting) {
-  const auto bearing = [&](std::size_t i) { return sighting.bearings[i].cast<double>().eval(); };
+Eigen::Quaterniond turn_ahead(const MarkerObservation& observation) {
+  const auto bearing = [&](std::size_t i) { return observation.bearings[i].cast<double>().eval(); };
   const Eigen::Vector3d ahead = (bearing(0) + bearing(1) + bearing(2) + bearing(3)).normalized();
   const Eigen::Vector3d right = bearing(1) + bearing(2) - bearing(0) - bearing(3);
   const Eigen::Vector3d down = ahead.cross(right).normalized();
@@ -40,40 +40,41 @@ Rigid3 rigid_of(const cv::Mat& rotation_vector, const cv::Mat& translation) {
 
 }  // namespace
 
-double squared_error_px(const MarkerObservation& sighting,
+double squared_error_px(const MarkerObservation& observation,
                         const Rigid3& cam_from_marker,
                         double side) {
   double sum = 0.0;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector3d seen = (cam_from_marker * marker_corner(i, side)).normalized();
-    const Eigen::Vector3d off = seen - sighting.bearings[i].cast<double>();
+    const Eigen::Vector3d off = seen - observation.bearings[i].cast<double>();
     // The tangent plane does not tell what lies behind.
-    if (seen.dot(sighting.bearings[i].cast<double>()) <= 0.0) return 1e6;
-    sum += (sighting.pixel_from_bearing[i].cast<double>() * off).squaredNorm();
+    if (seen.dot(observation.bearings[i].cast<double>()) <= 0.0) return 1e6;
+    sum += (observation.pixel_from_bearing[i].cast<double>() * off).squaredNorm();
   }
   return sum / 4.0;
 }
 
-double mean_side_px(const MarkerObservation& sighting) {
+double mean_side_px(const MarkerObservation& observation) {
   float sum = 0.0f;
   for (std::size_t i = 0; i < 4; ++i) {
     // By bearings: pixels jump at the seam of 360 degree images.
     const std::size_t next = (i + 1) % 4;
     sum +=
-        (sighting.pixel_from_bearing[i] * (sighting.bearings[next] - sighting.bearings[i])).norm();
+        (observation.pixel_from_bearing[i] * (observation.bearings[next] - observation.bearings[i]))
+            .norm();
   }
   return sum / 4.0;
 }
 
-std::vector<Rigid3> square_poses(const MarkerObservation& sighting, double side) {
-  const Eigen::Quaterniond ahead_from_cam = turn_ahead(sighting);
+std::vector<Rigid3> square_poses(const MarkerObservation& observation, double side) {
+  const Eigen::Quaterniond ahead_from_cam = turn_ahead(observation);
   if (!ahead_from_cam.coeffs().allFinite()) return {};
   std::vector<cv::Point3d> corners;
   std::vector<cv::Point2d> seen;
   for (std::size_t i = 0; i < 4; ++i) {
     const Eigen::Vector3d corner = kMarkerFromBack.conjugate() * marker_corner(i, side);
     corners.emplace_back(corner.x(), corner.y(), 0.0);
-    const Eigen::Vector3d ahead = ahead_from_cam * sighting.bearings[i].cast<double>();
+    const Eigen::Vector3d ahead = ahead_from_cam * observation.bearings[i].cast<double>();
     if (!(ahead.z() > kLeastCosine)) return {};
     seen.emplace_back(ahead.x() / ahead.z(), ahead.y() / ahead.z());
   }
@@ -102,7 +103,7 @@ std::vector<Rigid3> square_poses(const MarkerObservation& sighting, double side)
     poses.push_back(pose);
   }
   std::ranges::stable_sort(
-      poses, {}, [&](const Rigid3& pose) { return squared_error_px(sighting, pose, side); });
+      poses, {}, [&](const Rigid3& pose) { return squared_error_px(observation, pose, side); });
   return poses;
 }
 

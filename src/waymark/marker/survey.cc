@@ -50,11 +50,11 @@ Rigid3 pose_in(const MarkerView& view, const Sim3& map_from_marker) {
 }
 
 double squared_error(const MarkerView& view, const Sim3& map_from_marker) {
-  return squared_error_px(*view.sighting, pose_in(view, map_from_marker), 1.0);
+  return squared_error_px(*view.observation, pose_in(view, map_from_marker), 1.0);
 }
 
 bool fits(const MarkerView& view, const Sim3& map_from_marker) {
-  const double limit = kFitPx + kFitShare * mean_side_px(*view.sighting);
+  const double limit = kFitPx + kFitShare * mean_side_px(*view.observation);
   return squared_error(view, map_from_marker) <= limit * limit;
 }
 
@@ -63,17 +63,17 @@ void add_corner(const MarkerView& view,
                 std::size_t i,
                 const Sim3& map_from_marker,
                 Equations& sum) {
-  const MarkerObservation& sighting = *view.sighting;
+  const MarkerObservation& observation = *view.observation;
   const Eigen::Vector3d corner = marker_corner(i, 1.0);
   const Eigen::Vector3d in_cam = view.cam_from_map * (map_from_marker * corner);
   const double range = std::max(in_cam.norm(), 1e-12);
   const Eigen::Vector3d direction = in_cam / range;
-  const Eigen::Vector3d bearing = sighting.bearings[i].cast<double>();
+  const Eigen::Vector3d bearing = observation.bearings[i].cast<double>();
   if (direction.dot(bearing) <= 0.0) {
     sum.cost += 1e6;
     return;
   }
-  const Matrix23d w = sighting.pixel_from_bearing[i].cast<double>();
+  const Matrix23d w = observation.pixel_from_bearing[i].cast<double>();
   const Eigen::Vector2d residual = w * (direction - bearing);
   const RobustValue robust = huber(residual.squaredNorm(), kHuberPx);
   sum.cost += robust.loss;
@@ -123,9 +123,9 @@ Equations refine(const Views& views, int max_iterations, Sim3& map_from_marker) 
   return now;
 }
 
-Eigen::Vector3d middle_bearing(const MarkerObservation& sighting) {
+Eigen::Vector3d middle_bearing(const MarkerObservation& observation) {
   Eigen::Vector3d sum = Eigen::Vector3d::Zero();
-  for (const Eigen::Vector3f& bearing : sighting.bearings) sum += bearing.cast<double>();
+  for (const Eigen::Vector3f& bearing : observation.bearings) sum += bearing.cast<double>();
   return sum.normalized();
 }
 
@@ -135,7 +135,7 @@ std::optional<double> side_by(const MarkerView& view,
                               const Rigid3& cam_from_marker,
                               const MarkerView& other) {
   const Rigid3 other_from_cam = other.cam_from_map * view.cam_from_map.inverse();
-  const Eigen::Vector3d ray = middle_bearing(*other.sighting);
+  const Eigen::Vector3d ray = middle_bearing(*other.observation);
   const auto across = [&](const Eigen::Vector3d& v) {
     return Eigen::Vector3d(v - ray.dot(v) * ray);
   };
@@ -184,7 +184,7 @@ std::vector<Hypothesis> list_hypotheses(const Views& views) {
   std::vector<Hypothesis> hypotheses;
   const Views samples = spread(views, kMaxSamples);
   for (const MarkerView* view : samples) {
-    for (const Rigid3& cam_from_marker : square_poses(*view->sighting, 1.0)) {
+    for (const Rigid3& cam_from_marker : square_poses(*view->observation, 1.0)) {
       for (const MarkerView* other : samples) {
         if (other == view) continue;
         const auto side = side_by(*view, cam_from_marker, *other);
@@ -267,7 +267,7 @@ void judge_other_places(const Views& others, const Views& chosen, SurveyedMarker
 bool is_twice_in_an_image(const Views& views) {
   for (std::size_t i = 1; i < views.size(); ++i) {
     if (views[i]->timestamp_ns == views[i - 1]->timestamp_ns &&
-        views[i]->sighting->camera == views[i - 1]->sighting->camera) {
+        views[i]->observation->camera == views[i - 1]->observation->camera) {
       return true;
     }
   }

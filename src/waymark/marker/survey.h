@@ -18,9 +18,9 @@ namespace waymark {
 
 /// A marker seen from a place of a map.
 struct MarkerView {
-  Rigid3 cam_from_map;                          ///< In units of the map.
-  std::int64_t timestamp_ns = 0;                ///< Of the image.
-  const MarkerObservation* sighting = nullptr;  ///< Not null; outlives the view.
+  Rigid3 cam_from_map;                             ///< In units of the map.
+  std::int64_t timestamp_ns = 0;                   ///< Of the image.
+  const MarkerObservation* observation = nullptr;  ///< Not null; outlives the view.
 };
 
 /// What came of a marker.

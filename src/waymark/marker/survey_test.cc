@@ -15,7 +15,7 @@ namespace {
 
 using ::testing::HasSubstr;
 using ::testing::IsEmpty;
-using testing::make_sighting;
+using testing::make_observation;
 
 constexpr double kNoisePx = 0.2;
 
@@ -42,11 +42,11 @@ class Scene {
     std::vector<MarkerView> views;
     for (int k = first; k < end; ++k) {
       const auto stream = static_cast<std::uint64_t>(100 * id + k);
-      sightings_.push_back(
-          make_sighting(id, camera(k) * world_from_marker, side, kNoisePx, stream));
+      observations_.push_back(
+          make_observation(id, camera(k) * world_from_marker, side, kNoisePx, stream));
       Rigid3 cam_from_map = camera(k);
       cam_from_map.translation /= unit_;
-      views.push_back({cam_from_map, 1'000'000'000LL * k, &sightings_.back()});
+      views.push_back({cam_from_map, 1'000'000'000LL * k, &observations_.back()});
     }
     return views;
   }
@@ -57,7 +57,7 @@ class Scene {
 
  private:
   double unit_;
-  std::deque<MarkerObservation> sightings_;
+  std::deque<MarkerObservation> observations_;
 };
 
 TEST(SurveyMarkerTest, FindsPoseAndSizeInUnitsOfTheMap) {
@@ -82,17 +82,17 @@ TEST(SurveyMarkerTest, LeavesOutViewsThatAreWrong) {
 }
 
 TEST(SurveyMarkerTest, OneSmallSquareSeenFromOnePlaceStaysAmbiguous) {
-  std::deque<MarkerObservation> sightings;
+  std::deque<MarkerObservation> observations;
   std::vector<MarkerView> views;
   const Eigen::Quaterniond tilt(Eigen::AngleAxisd(EIGEN_PI - 0.4, Eigen::Vector3d::UnitX()));
   for (int k = 0; k < 4; ++k) {
     const Rigid3 camera(Eigen::Quaterniond::Identity(), {0.03 * k, 0.0, 0.0});
-    sightings.push_back(make_sighting(1,
-                                      camera * Rigid3(tilt, {0.0, 0.0, 6.0}),
-                                      0.12,
-                                      kNoisePx,
-                                      7 + static_cast<std::uint64_t>(k)));
-    views.push_back({camera, k, &sightings.back()});
+    observations.push_back(make_observation(1,
+                                            camera * Rigid3(tilt, {0.0, 0.0, 6.0}),
+                                            0.12,
+                                            kNoisePx,
+                                            7 + static_cast<std::uint64_t>(k)));
+    views.push_back({camera, k, &observations.back()});
   }
   EXPECT_EQ(survey_marker(1, views).verdict, MarkerStatus::kFewViews);
 }
@@ -135,7 +135,7 @@ TEST(SurveyMarkerTest, ImagesOfAPairCountOnce) {
     views.push_back(left);
     const Rigid3 right_from_map =
         Rigid3(Eigen::Quaterniond::Identity(), {-0.1, 0.0, 0.0}) * left.cam_from_map;
-    right.push_back(make_sighting(3, right_from_map * truth, 0.2, kNoisePx, 50 + right.size()));
+    right.push_back(make_observation(3, right_from_map * truth, 0.2, kNoisePx, 50 + right.size()));
     right.back().camera = 1;
     views.push_back({right_from_map, left.timestamp_ns, &right.back()});
   }

@@ -11,11 +11,11 @@
 namespace waymark {
 namespace {
 
-struct CameraSightings {
+struct CameraObservations {
   std::vector<Eigen::Vector3d> points_in_world, bearings;
   std::vector<double> sigmas_rad;
 
-  PointSightings view() const { return {points_in_world, bearings, sigmas_rad}; }
+  PointObservations view() const { return {points_in_world, bearings, sigmas_rad}; }
 };
 
 std::size_t busiest_camera(const Rig& rig, const PoseObservations& observations) {
@@ -26,8 +26,8 @@ std::size_t busiest_camera(const Rig& rig, const PoseObservations& observations)
   return static_cast<std::size_t>(std::max_element(counts.begin(), counts.end()) - counts.begin());
 }
 
-CameraSightings sightings_of(std::size_t camera, const PoseObservations& observations) {
-  CameraSightings sightings;
+CameraObservations observations_of(std::size_t camera, const PoseObservations& observations) {
+  CameraObservations of_camera;
   for (std::size_t i = 0; i < observations.size(); ++i) {
     if (observations.camera[i] != camera) continue;
     // Pixels per radian; the root of the mean square over the directions where they differ.
@@ -36,11 +36,11 @@ CameraSightings sightings_of(std::size_t camera, const PoseObservations& observa
     const Eigen::Vector3d bearing = observations.bearing[i].cast<double>();
     const bool is_finite = bearing.allFinite() && observations.point_in_world[i].allFinite();
     if (!is_finite || !(sigma_rad > 0.0) || !std::isfinite(sigma_rad)) continue;
-    sightings.points_in_world.push_back(observations.point_in_world[i]);
-    sightings.bearings.push_back(bearing);
-    sightings.sigmas_rad.push_back(sigma_rad);
+    of_camera.points_in_world.push_back(observations.point_in_world[i]);
+    of_camera.bearings.push_back(bearing);
+    of_camera.sigmas_rad.push_back(sigma_rad);
   }
-  return sightings;
+  return of_camera;
 }
 
 }  // namespace
@@ -51,8 +51,8 @@ std::optional<PoseEstimate> locate(const Rig& rig,
                                    PoseWorkspace& workspace) {
   const std::size_t camera = busiest_camera(rig, observations);
   if (camera >= rig.cameras.size()) return std::nullopt;
-  const CameraSightings sightings = sightings_of(camera, observations);
-  const auto consensus = ransac(AbsolutePoseEstimator(sightings.view()), ransac_options);
+  const CameraObservations of_camera = observations_of(camera, observations);
+  const auto consensus = ransac(AbsolutePoseEstimator(of_camera.view()), ransac_options);
   if (!consensus) return std::nullopt;
   const Rigid3 rig_from_world = rig.cameras[camera].cam_from_rig.inverse() * consensus->model;
   return optimize_pose(rig, observations, rig_from_world, workspace);

@@ -47,7 +47,7 @@ TEST_P(AtRest, NothingGrowsWithTime) {
 }
 
 /// What the tracker counted meanwhile arrives with the next keyframe: each landmark once.
-TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
+TEST_P(AtRest, VisibilityIsCountedOncePerLandmark) {
   PointSession session = resting_session(GetParam());
   constexpr std::uint32_t kRest = 500;
   for (std::uint32_t i = 0; i < kRest; ++i) session.track();
@@ -56,13 +56,13 @@ TEST_P(AtRest, SightingsAreCountedOncePerLandmark) {
     session.look_from(beside(0.58 + 0.02 * i), 1);
     const Tracked outcome = session.track();
     if (!outcome.message) continue;
-    const auto& sightings = std::get<NewKeyframe>(*outcome.message).sightings;
-    ASSERT_FALSE(sightings.empty());
-    EXPECT_LE(sightings.size(), num_landmarks);
+    const auto& visibility = std::get<NewKeyframe>(*outcome.message).visibility;
+    ASSERT_FALSE(visibility.empty());
+    EXPECT_LE(visibility.size(), num_landmarks);
     std::uint32_t most = 0;
-    for (const LandmarkVisibility& sighting : sightings) {
-      EXPECT_LE(sighting.num_found, kRest + 1 + static_cast<std::uint32_t>(i));
-      most = std::max(most, sighting.num_visible);
+    for (const LandmarkVisibility& seen : visibility) {
+      EXPECT_LE(seen.num_found, kRest + 1 + static_cast<std::uint32_t>(i));
+      most = std::max(most, seen.num_visible);
     }
     EXPECT_GT(most, kRest / 2);
     return;

@@ -56,8 +56,8 @@ MarkerObservations MarkerFinder::confirm(const FrameImages& images,
     const auto camera = static_cast<std::uint8_t>(i);
     std::vector<ExpectedMarker> expected;
     for (const MapMarker& marker : map.markers()) {
-      const bool is_read = std::ranges::any_of(read, [&](const MarkerObservation& sighting) {
-        return sighting.id == marker.id && sighting.camera == camera;
+      const bool is_read = std::ranges::any_of(read, [&](const MarkerObservation& observation) {
+        return observation.id == marker.id && observation.camera == camera;
       });
       if (is_read || map.submap_of(marker) != result.submap) continue;
       const Rigid3 cam_from_world = rig.cameras[i].cam_from_rig * rig_from_world;

@@ -12,32 +12,32 @@ namespace waymark {
 /// Counts in how many frames landmarks should have been seen and were.
 class VisibilityCounter {
  public:
-  void count_visible(LandmarkId landmark) { sightings_.push_back({landmark, 1, 0}); }
-  void count_found(LandmarkId landmark) { sightings_.push_back({landmark, 0, 1}); }
+  void count_visible(LandmarkId landmark) { counts_.push_back({landmark, 1, 0}); }
+  void count_found(LandmarkId landmark) { counts_.push_back({landmark, 0, 1}); }
   /// Keeps what is counted short: at rest no keyframe takes it.
   void end_frame() {
     constexpr std::size_t kMany = 100'000;
-    if (sightings_.size() > kMany) sightings_ = take();
+    if (counts_.size() > kMany) counts_ = take();
   }
-  void clear() { sightings_.clear(); }
+  void clear() { counts_.clear(); }
 
   /// The counts since the last take(), ascending by landmark.
   std::vector<LandmarkVisibility> take() {
-    std::ranges::sort(sightings_, {}, &LandmarkVisibility::landmark);
+    std::ranges::sort(counts_, {}, &LandmarkVisibility::landmark);
     std::vector<LandmarkVisibility> merged;
-    for (const LandmarkVisibility& sighting : sightings_) {
-      if (merged.empty() || merged.back().landmark != sighting.landmark) {
-        merged.push_back({sighting.landmark, 0, 0});
+    for (const LandmarkVisibility& count : counts_) {
+      if (merged.empty() || merged.back().landmark != count.landmark) {
+        merged.push_back({count.landmark, 0, 0});
       }
-      merged.back().num_visible += sighting.num_visible;
-      merged.back().num_found += sighting.num_found;
+      merged.back().num_visible += count.num_visible;
+      merged.back().num_found += count.num_found;
     }
-    sightings_.clear();
+    counts_.clear();
     return merged;
   }
 
  private:
-  std::vector<LandmarkVisibility> sightings_;
+  std::vector<LandmarkVisibility> counts_;
 };
 
 }  // namespace waymark

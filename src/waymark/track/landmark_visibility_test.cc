@@ -14,17 +14,17 @@ TEST(VisibilityCounter, AddsUpPerLandmarkInOrder) {
     counter.count_visible(LandmarkId{2});
     if (frame == 1) counter.count_found(LandmarkId{7});
   }
-  const std::vector<LandmarkVisibility> sightings = counter.take();
-  ASSERT_EQ(sightings.size(), 2u);
-  EXPECT_EQ(sightings[0].landmark, LandmarkId{2});
-  EXPECT_EQ(sightings[0].num_visible, 3u);
-  EXPECT_EQ(sightings[0].num_found, 0u);
-  EXPECT_EQ(sightings[1].landmark, LandmarkId{7});
-  EXPECT_EQ(sightings[1].num_visible, 3u);
-  EXPECT_EQ(sightings[1].num_found, 1u);
+  const std::vector<LandmarkVisibility> counts = counter.take();
+  ASSERT_EQ(counts.size(), 2u);
+  EXPECT_EQ(counts[0].landmark, LandmarkId{2});
+  EXPECT_EQ(counts[0].num_visible, 3u);
+  EXPECT_EQ(counts[0].num_found, 0u);
+  EXPECT_EQ(counts[1].landmark, LandmarkId{7});
+  EXPECT_EQ(counts[1].num_visible, 3u);
+  EXPECT_EQ(counts[1].num_found, 1u);
 }
 
-TEST(VisibilityCounter, GivesEachSightingOnce) {
+TEST(VisibilityCounter, GivesEachCountOnce) {
   VisibilityCounter counter;
   counter.count_found(LandmarkId{1});
   EXPECT_EQ(counter.take().size(), 1u);

@@ -29,17 +29,17 @@ constexpr std::array kEnds = {FrameReason::kNone,
 constexpr std::size_t kMaxNearMarker = 4;
 
 /// The poses that the markers of a frame leave open.
-std::vector<MarkerPose> poses_by_markers(const MarkerObservations& sightings,
+std::vector<MarkerPose> poses_by_markers(const MarkerObservations& observations,
                                          const Rig& rig,
                                          const Map& map) {
   std::vector<MarkerPose> poses;
-  for (const MarkerObservation& sighting : sightings) {
-    if (sighting.camera >= rig.cameras.size()) continue;  // One camera of a pair is used.
+  for (const MarkerObservation& observation : observations) {
+    if (observation.camera >= rig.cameras.size()) continue;  // One camera of a pair is used.
     for (const MapMarker& marker : map.markers()) {
-      if (marker.id != sighting.id) continue;
+      if (marker.id != observation.id) continue;
       const Rigid3 world_from_marker = map.world_from_marker(marker);
-      const Rigid3 rig_from_cam = rig.cameras[sighting.camera].cam_from_rig.inverse();
-      for (const Rigid3& cam_from_marker : square_poses(sighting, marker.side_m)) {
+      const Rigid3 rig_from_cam = rig.cameras[observation.camera].cam_from_rig.inverse();
+      for (const Rigid3& cam_from_marker : square_poses(observation, marker.side_m)) {
         poses.push_back({map.submap_of(marker),
                          rig_from_cam * cam_from_marker * world_from_marker.inverse(),
                          world_from_marker.translation});

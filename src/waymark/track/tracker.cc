@@ -31,7 +31,7 @@ void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
 void Tracker::continue_in(const Map& map, TrackingPurpose purpose) {
   purpose_ = purpose;
   ids_ = PredictedIds(map, ids_.newest_frame());
-  sightings_.clear();
+  visibility_.clear();
   search_.continue_in(map);
   const std::vector<KeyframeId>& around = search_.local_map().keyframes;
   const bool had_pose = last_.has_pose();
@@ -63,11 +63,11 @@ std::optional<MapperMessage> Tracker::track(const Frame& seen,
 
 void Tracker::count_visibility(const Features& features, const LocatedFrame& located) {
   if (purpose_ == TrackingPurpose::kLocalizing) return;
-  for (const LandmarkId id : located.visible) sightings_.count_visible(id);
+  for (const LandmarkId id : located.visible) visibility_.count_visible(id);
   for (const LandmarkId id : primary_landmarks(features, located.landmarks)) {
-    sightings_.count_found(id);
+    visibility_.count_found(id);
   }
-  sightings_.end_frame();
+  visibility_.end_frame();
 }
 
 bool Tracker::is_keyframe(const Frame& frame, const LocatedFrame& located) const {
@@ -114,7 +114,7 @@ std::optional<MapperMessage> Tracker::accept(const Frame& frame,
                           pose,
                           moved(frame.features, motion),
                           located.landmarks,
-                          sightings_.take()};
+                          visibility_.take()};
     // A keyframe is its own reference, so that it moves as the map moves it.
     result.pose = {ids_.add_keyframe(frame.id), pose.reference_scale, Rigid3{}};
   }

@@ -88,7 +88,7 @@ class Tracker {
   MapSnapshot visible_;
   LastFrame last_;
   PredictedIds ids_;
-  VisibilityCounter sightings_;
+  VisibilityCounter visibility_;
 };
 
 }  // namespace waymark

@@ -121,11 +121,11 @@ TEST_F(TrackerTest, AsksForKeyframesWithConsecutiveIdsAndTrueAssociations) {
       if (!message.landmarks[k].is_valid()) continue;
       (message.landmarks[k] == truth[k] ? num_right : num_wrong) += 1;
     }
-    for (std::size_t k = 1; k < message.sightings.size(); ++k) {
-      EXPECT_LT(message.sightings[k - 1].landmark, message.sightings[k].landmark);
+    for (std::size_t k = 1; k < message.visibility.size(); ++k) {
+      EXPECT_LT(message.visibility[k - 1].landmark, message.visibility[k].landmark);
     }
-    for (const LandmarkVisibility& sighting : message.sightings) {
-      EXPECT_GT(sighting.num_visible + sighting.num_found, 0u);
+    for (const LandmarkVisibility& seen : message.visibility) {
+      EXPECT_GT(seen.num_visible + seen.num_found, 0u);
     }
   }
   EXPECT_GE(num_keyframes, 3u) << "3 metres past a scene 2 to 5 metres away";
