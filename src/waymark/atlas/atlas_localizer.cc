@@ -11,7 +11,6 @@
 
 #include "waymark/atlas/atlas_places.h"
 #include "waymark/atlas/open_tiles.h"
-#include "waymark/base/check.h"
 #include "waymark/base/median.h"
 #include "waymark/place/map_snapshot.h"
 #include "waymark/system/query_frames.h"
@@ -128,7 +127,6 @@ class AtlasLocalizer::Impl {
   std::uint32_t tile_ = 0;               ///< Which.
   std::optional<MapSnapshot> snapshot_;  ///< Of that.
   std::uint32_t num_since_look_ = 0;
-  std::optional<std::int64_t> last_timestamp_ns_;
 };
 
 /// Of the tiles that were compared the one that came closest.
@@ -204,18 +202,14 @@ std::optional<FoundInTile> AtlasLocalizer::Impl::search_near(const Frame& frame,
 }
 
 void AtlasLocalizer::Impl::fill_in(const FoundInTile& found, TrackingResult& result) const {
-  result.state = FrameState::kTracked;
-  result.world_from_rig = found.located.rig_from_world.inverse();
-  result.covariance = found.located.covariance;
-  result.num_matches = found.located.num_matches;
-  result.num_inliers = found.located.num_inliers;
+  set_located(found.located, result);
   put_into_atlas(row(found.tile), result);
 }
 
 TrackingResult AtlasLocalizer::Impl::locate(const FrameImages& images,
                                             const std::optional<PosePrior>& hint) {
   TrackingResult result;
-  const Frame frame = frames_.build(images, {}, result);
+  const Frame frame = frames_.build(images, result);
   StageTimer timer(result.stages, Stage::kRecover);
   if (frame.features->num_primary == 0) {
     result.reason = FrameReason::kNoFeatures;
@@ -245,15 +239,10 @@ bool AtlasLocalizer::Impl::should_look(const TrackingResult& result) {
 }
 
 TrackingResult AtlasLocalizer::Impl::track(const FrameImages& images) {
-  if (last_timestamp_ns_ && images.timestamp_ns <= *last_timestamp_ns_) {
-    throw InputError("frame " + std::to_string(frames_.num_frames()),
-                     "time stamp is not later than that of the frame before");
-  }
-  last_timestamp_ns_ = images.timestamp_ns;
   TrackingResult result;
   const bool needs_motion = tracker_ && frames_.needs_motion(images);
   const Frame frame =
-      frames_.build(images, needs_motion ? tracker_->predict_motion() : RigMotion{}, result);
+      frames_.build_next(images, needs_motion ? tracker_->predict_motion() : RigMotion{}, result);
   const TrackingResult untracked = result;
   const auto follow = [&] {
     const StageTimes stages = result.stages;

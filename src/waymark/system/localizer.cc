@@ -7,7 +7,6 @@
 #include <variant>
 #include <vector>
 
-#include "waymark/base/check.h"
 #include "waymark/system/query_calibration.h"
 #include "waymark/system/query_frames.h"
 #include "waymark/system/temporary_map.h"
@@ -77,19 +76,13 @@ class Localizer::Impl {
   Tracker tracker_;
   Relocalizer relocalizer_;
   QueryCalibration calibration_;
-  std::uint32_t num_tracked_ = 0;                  ///< Of the stream.
-  std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
+  std::uint32_t num_tracked_ = 0;  ///< Of the stream.
 };
 
 TrackingResult Localizer::Impl::track(const FrameImages& images) {
-  if (last_timestamp_ns_ && images.timestamp_ns <= *last_timestamp_ns_) {
-    throw InputError("frame " + std::to_string(frames_.num_frames()),
-                     "time stamp is not later than that of the frame before");
-  }
   TrackingResult result;
   const RigMotion motion = frames_.needs_motion(images) ? tracker_.predict_motion() : RigMotion{};
-  const Frame frame = frames_.build(images, motion, result);
-  last_timestamp_ns_ = images.timestamp_ns;
+  const Frame frame = frames_.build_next(images, motion, result);
   bridge_gaps(result, tracker_.track(frame, temporary_.visible(), result), images.timestamp_ns);
   result.is_keyframe = false;  // Of what is thrown away afterwards.
   if (result.world_from_rig && ++num_tracked_ % kCalibrationSpacing == 0 &&
@@ -135,7 +128,7 @@ void Localizer::Impl::bridge_gaps(const TrackingResult& result,
 TrackingResult Localizer::Impl::locate(const FrameImages& images,
                                        const std::optional<PosePrior>& hint) {
   TrackingResult result;
-  const Frame frame = frames_.build(images, {}, result);
+  const Frame frame = frames_.build(images, result);
   StageTimer timer(result.stages, Stage::kRecover);
   if (frame.features->num_primary == 0) {
     result.reason = FrameReason::kNoFeatures;
@@ -144,11 +137,7 @@ TrackingResult Localizer::Impl::locate(const FrameImages& images,
   const std::optional<LocatedFrame> located = search(frame, hint);
   static_cast<FrameStatus&>(result) = relocalizer_.diagnosis();
   if (!located) return result;
-  result.state = FrameState::kTracked;
-  result.world_from_rig = located->rig_from_world.inverse();
-  result.covariance = located->covariance;
-  result.num_matches = located->num_matches;
-  result.num_inliers = located->num_inliers;
+  set_located(*located, result);
   result.submap = submap_of(*snapshot_.map, located->landmarks);
   // Bent by a rolling shutter, and straightened by no motion, an image tells nothing.
   if (frames_.rig()->cameras[0].readout_s == 0.0 &&

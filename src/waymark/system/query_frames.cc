@@ -4,9 +4,11 @@
 
 #include <algorithm>
 #include <map>
+#include <string>
 #include <utility>
 #include <vector>
 
+#include "waymark/base/check.h"
 #include "waymark/base/median.h"
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/camera/scaled_camera.h"
@@ -76,6 +78,18 @@ Rig QueryFrames::full_rig() const {
     if (rig.cameras[c].remake) rig.cameras[c].camera = rig.cameras[c].remake(*now.description);
   }
   return rig;
+}
+
+Frame QueryFrames::build_next(const FrameImages& images,
+                              const RigMotion& motion,
+                              TrackingResult& result) {
+  if (last_timestamp_ns_ && images.timestamp_ns <= *last_timestamp_ns_) {
+    throw InputError("frame " + std::to_string(num_frames_),
+                     "time stamp is not later than that of the frame before");
+  }
+  Frame frame = build(images, motion, result);
+  last_timestamp_ns_ = images.timestamp_ns;
+  return frame;
 }
 
 Frame QueryFrames::build(const FrameImages& images,

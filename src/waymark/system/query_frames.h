@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 
 #include "waymark/camera/rig.h"
 #include "waymark/features/frame_builder.h"
@@ -34,14 +35,17 @@ class QueryFrames {
   /// From the next frame on the reduced images are of this rig.
   void set_calibration(std::shared_ptr<const Rig> rig) { builder_.set_calibration(std::move(rig)); }
 
-  /// How many were built.
-  std::uint32_t num_frames() const { return num_frames_; }
   bool needs_motion(const FrameImages& images) const { return builder_.needs_motion(images); }
-  /// The next frame, and in the result what is known of it. motion: of a stream, see
-  /// Tracker::predict_motion; images by themselves have none.
-  Frame build(const FrameImages& images, const RigMotion& motion, TrackingResult& result);
+  /// A frame by itself, and in the result what is known of it.
+  Frame build(const FrameImages& images, TrackingResult& result) {
+    return build(images, {}, result);
+  }
+  /// The next one of a stream. motion: see Tracker::predict_motion. InputError where its time stamp
+  /// is not later than that of the one before.
+  Frame build_next(const FrameImages& images, const RigMotion& motion, TrackingResult& result);
 
  private:
+  Frame build(const FrameImages& images, const RigMotion& motion, TrackingResult& result);
   std::shared_ptr<const Features> find_features(const FrameImages& images, const RigMotion& motion);
 
   const std::shared_ptr<const Rig> full_rig_;
@@ -50,6 +54,7 @@ class QueryFrames {
   FrameBuilder builder_;
   const MarkerFinder marker_finder_;
   std::uint32_t num_frames_ = 0;
+  std::optional<std::int64_t> last_timestamp_ns_;  ///< Of the stream.
 };
 
 }  // namespace waymark

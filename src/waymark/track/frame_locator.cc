@@ -18,6 +18,14 @@ std::vector<LandmarkId> visible_of(const LandmarkSet& set, const ProjectionMatch
 
 }  // namespace
 
+void set_located(const LocatedFrame& located, TrackingResult& result) {
+  result.state = FrameState::kTracked;
+  result.world_from_rig = located.rig_from_world.inverse();
+  result.covariance = located.covariance;
+  result.num_matches = located.num_matches;
+  result.num_inliers = located.num_inliers;
+}
+
 int num_valid(std::span<const LandmarkId> landmarks) {
   return static_cast<int>(std::ranges::count_if(landmarks, &LandmarkId::is_valid));
 }

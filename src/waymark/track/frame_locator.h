@@ -11,6 +11,7 @@
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
 #include "waymark/optimize/pose.h"
+#include "waymark/track/tracking_result.h"
 
 namespace waymark {
 
@@ -23,6 +24,9 @@ struct LocatedFrame {
   std::vector<LandmarkId> landmarks;  ///< Per feature, invalid where none.
   std::vector<LandmarkId> visible;    ///< Of the local map: what should be seen from there.
 };
+
+/// The result of a frame that was located, but for what the landmarks are and belong to.
+void set_located(const LocatedFrame& located, TrackingResult& result);
 
 /// How many features show a landmark.
 int num_valid(std::span<const LandmarkId> landmarks);
