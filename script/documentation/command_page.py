@@ -21,6 +21,10 @@ Every setting of Waymark, as `waymark config` lists them. They go into the YAML 
 an error that names file, line and what was expected. There are few on purpose: what can be derived from the camera or measured while
 running is not a setting. Which of them matter for speed says [performance.md](performance.md).
 
+Below `experiment` the constants of the stages can be changed without a build, as `--set experiment.tracking.keyframes.max_pending=3`. They are for
+trials: not listed here, free to change with any version, each with its reason where it is kept ([tracking](../src/waymark/track/options.h),
+[mapping](../src/waymark/mapping/options.h), [loops](../src/waymark/loop/options.h)).
+
 """
 
 

@@ -7,6 +7,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <cstdint>
 
 #include "waymark/base/check.h"
 #include "waymark/base/config_value.h"
@@ -24,6 +25,11 @@ bool is_calibration_key(std::string_view key) {
 }
 
 bool is_section(const SettingField& field) { return std::holds_alternative<Section>(field.value); }
+
+/// Constants of stages, which change from version to version: written only where they were changed.
+bool is_experiment(const SettingField& field) {
+  return field.key == "experiment" || field.key.starts_with("experiment.");
+}
 
 /// Sets the field that a value of the document names.
 struct ValueReader {
@@ -109,6 +115,24 @@ std::string printed_value(const SettingField& field) {
   return std::visit(ValuePrinter{}, field.value);
 }
 
+/// The fields to write: experiments where they, or what is below them, are not as by default.
+std::vector<std::uint8_t> choose_written(const std::vector<SettingField>& fields,
+                                         const std::vector<SettingField>& defaults) {
+  std::vector<std::uint8_t> is_written(fields.size());
+  for (std::size_t i = fields.size(); i-- > 0;) {
+    is_written[i] = !is_experiment(fields[i]);
+    if (is_section(fields[i])) {
+      const std::string prefix = fields[i].key + ".";
+      for (std::size_t k = i + 1; k < fields.size() && fields[k].key.starts_with(prefix); ++k) {
+        is_written[i] |= is_written[k];
+      }
+    } else {
+      is_written[i] |= printed_value(fields[i]) != printed_value(defaults[i]);
+    }
+  }
+  return is_written;
+}
+
 std::string printed_range(const SettingField& field) {
   return describe_range(std::visit(NounPrinter{}, field.value), {field.info.low, field.info.high});
 }
@@ -148,7 +172,9 @@ std::string settings_as_yaml(const std::vector<SettingField>& fields,
                              const std::vector<SettingField>& defaults) {
   WAYMARK_CHECK(fields.size() == defaults.size());
   std::string yaml;
+  const std::vector<std::uint8_t> is_written = choose_written(fields, defaults);
   for (std::size_t i = 0; i < fields.size(); ++i) {
+    if (!is_written[i]) continue;
     const std::string& key = fields[i].key;
     const std::size_t indent =
         2 * static_cast<std::size_t>(std::count(key.begin(), key.end(), '.'));
@@ -180,6 +206,7 @@ std::string settings_as_markdown(const std::vector<SettingField>& fields) {
       "| key | default | range | unit | meaning |\n|---|---|---|---|---|\n";
   std::string text = kHead;
   for (const SettingField& field : fields) {
+    if (is_experiment(field)) continue;
     if (std::holds_alternative<Section>(field.value)) {
       text += fmt::format("\n## {}\n\n{}\n\n{}", field.key, field.info.help, kHead);
     } else {

@@ -33,6 +33,9 @@ struct SettingInfo {
   const char* help = "";  ///< One sentence.
 };
 
+/// Range of a constant of a stage, whose reason stands beside it in its struct (track/options.h).
+inline constexpr SettingInfo within(double low, double high) { return {.low = low, .high = high}; }
+
 /// One field of a settings struct, whatever its type. A section has no value.
 struct SettingField {
   struct Section {};
@@ -81,7 +84,8 @@ void read_settings(Settings& settings, const std::vector<ConfigSource>& sources)
 }
 
 /// The settings as a YAML document that read_settings accepts, with help, range, unit and default
-/// of each as comments. `defaults` are the same fields with default values.
+/// of each as comments; of the section `experiment` only what is not as by default. `defaults` are
+/// the same fields with default values.
 std::string settings_as_yaml(const std::vector<SettingField>& fields,
                              const std::vector<SettingField>& defaults);
 
@@ -103,8 +107,8 @@ std::vector<std::string> changed_settings(Settings settings) {
   return changed_settings(list_settings(settings), list_settings(defaults));
 }
 
-/// The settings as Markdown: a table of key, default, range, unit, meaning, for each section one
-/// under its heading.
+/// The settings but for the section `experiment` as Markdown: a table of key, default, range, unit,
+/// meaning, for each section one under its heading.
 std::string settings_as_markdown(const std::vector<SettingField>& fields);
 
 /// The same for the defaults of a settings struct.

@@ -10,25 +10,6 @@
 namespace waymark {
 namespace {
 
-/// Fewer matches by appearance or fewer inliers among them are not worth the time.
-constexpr std::size_t kMinMatches = 15;
-constexpr std::size_t kMinInliers = 10;
-constexpr AppearanceOptions kAppearance{.max_distance = 64, .max_ratio = 0.8};
-/// Standard deviation of the residuals of landmarks that were mapped independently, in pixels of
-/// the level: their own errors count, too.
-constexpr double kNoisePx = 1.5;
-/// Search for more matches of the two keyframes, then for what else should be seen.
-constexpr double kGuidedRadiusPx = 8.0;
-constexpr double kObservationRadiusPx = 4.0;
-constexpr std::size_t kNumSurroundings = 8;
-/// Landmarks that so many keyframes saw are expected to be seen again.
-constexpr std::size_t kMinObservers = 3;
-/// A keyframe near the query confirms if it finds so many landmarks, or what is enough of its
-/// features, and such a share.
-constexpr std::size_t kMaxConfirming = 5;
-constexpr int kMinFoundToConfirm = 25;
-constexpr double kMinShareToConfirm = 0.1;
-
 Rigid3 cam_from_world(const Keyframe& keyframe) {
   return keyframe.rig().cameras[0].cam_from_rig * keyframe.rig_from_world;
 }
@@ -76,8 +57,11 @@ LandmarkMatches CandidateScorer::match_by_appearance(const Map& map,
     if (in_query.landmarks[i].is_valid()) known.push_back(i);
   }
   LandmarkMatches matches;
-  for (const FeatureMatch& pair :
-       appearance_.match_all(*in_query.features, known, *in_match.features, kAppearance)) {
+  for (const FeatureMatch& pair : appearance_.match_all(
+           *in_query.features,
+           known,
+           *in_match.features,
+           {.max_distance = options_.max_distance, .max_ratio = options_.max_ratio})) {
     if (!in_match.landmarks[pair.b].is_valid()) continue;
     add_view(map, in_match, pair.b, matches.a);
     add_view(map, in_query, pair.a, matches.b);
@@ -94,19 +78,22 @@ std::optional<SimilarityEstimate> CandidateScorer::estimate(const Map& map,
         rig_from_cam(in_query) * query_cam_from_match_cam * rig_from_cam(in_match).inverse();
   };
   LandmarkMatches matches = match_by_appearance(map, candidate.query, candidate.match);
-  if (matches.size() < kMinMatches) return std::nullopt;
+  if (matches.size() < static_cast<std::size_t>(options_.min_matches)) return std::nullopt;
   const bool is_metric =
       has_metric_submap(map, candidate.query) && has_metric_submap(map, candidate.match);
-  const SimilarityOptions options{.is_scale_free = !is_metric, .noise_px = kNoisePx};
+  const SimilarityOptions options{.is_scale_free = !is_metric, .noise_px = options_.noise_px};
   std::optional<SimilarityEstimate> found = find_similarity(
       matches, options, {.seed = seed_, .stream = candidate.query.value, .min_inlier_ratio = 0.2});
   constexpr int kRounds = 2;
-  for (int round = 0; round < kRounds && found && found->num_inliers >= kMinInliers; ++round) {
+  for (int round = 0; round < kRounds && found &&
+                      found->num_inliers >= static_cast<std::size_t>(options_.min_inliers);
+       ++round) {
     set_similarity(found->b_from_a);
     matches = match_by_projection(map, candidate);
     found = refine_similarity(matches, found->b_from_a, options);
   }
-  if (!found || found->num_inliers < kMinInliers) return std::nullopt;
+  if (!found || found->num_inliers < static_cast<std::size_t>(options_.min_inliers))
+    return std::nullopt;
   set_similarity(found->b_from_a);
   candidate.num_inliers = found->num_inliers;
   std::vector<LoopCandidate::Pair> inliers;
@@ -134,7 +121,7 @@ LandmarkMatches CandidateScorer::match_by_projection(const Map& map, LoopCandida
                         *in_query.features,
                         {},
                         pose_in_other_world(candidate.query_from_match, in_match.rig_from_world),
-                        {.radius_px = kGuidedRadiusPx});
+                        {.radius_px = options_.guided_radius_px});
   LandmarkMatches matches;
   candidate.pairs.clear();
   for (std::size_t i = 0; i < landmarks_.size(); ++i) {
@@ -162,7 +149,8 @@ VisibleShare CandidateScorer::look_for(const Map& map,
   for (LandmarkId id : ids) {
     if (!id.is_valid()) continue;
     const Landmark& landmark = map.landmarks().at(id);
-    if (landmark.appearance.size_m > 0.0 && num_observers(landmark) >= kMinObservers) {
+    if (landmark.appearance.size_m > 0.0 &&
+        num_observers(landmark) >= static_cast<std::size_t>(options_.min_observers)) {
       landmarks_.add(id, landmark);
     }
   }
@@ -173,7 +161,7 @@ VisibleShare CandidateScorer::look_for(const Map& map,
                                                      *keyframe.features,
                                                      {},
                                                      target_from_world,
-                                                     {.radius_px = kObservationRadiusPx});
+                                                     {.radius_px = options_.observation_radius_px});
   const auto num_visible =
       std::count(found.is_visible.begin(), found.is_visible.end(), std::uint8_t{1});
   return {found.num_matches, static_cast<std::size_t>(num_visible)};
@@ -184,25 +172,27 @@ void CandidateScorer::count_visibility(const Map& map, ScoredCandidate& scored) 
   const Rigid3 query_from_world = map.keyframes().at(candidate.query).rig_from_world;
   const Rigid3 match_from_world = map.keyframes().at(candidate.match).rig_from_world;
   const std::vector<KeyframeId> around_match =
-      with_neighbours(map, candidate.match, kNumSurroundings);
+      with_neighbours(map, candidate.match, static_cast<std::size_t>(options_.num_surroundings));
   scored.in_query = look_for(map,
                              around_match,
                              candidate.query,
                              pose_in_other_world(candidate.query_from_match, match_from_world));
-  scored.in_match =
-      look_for(map,
-               with_neighbours(map, candidate.query, kNumSurroundings),
-               candidate.match,
-               pose_in_other_world(candidate.query_from_match.inverse(), query_from_world));
-  for (KeyframeId id : strongest_neighbours(map, candidate.query, kMaxConfirming)) {
+  scored.in_match = look_for(
+      map,
+      with_neighbours(map, candidate.query, static_cast<std::size_t>(options_.num_surroundings)),
+      candidate.match,
+      pose_in_other_world(candidate.query_from_match.inverse(), query_from_world));
+  for (KeyframeId id : strongest_neighbours(
+           map, candidate.query, static_cast<std::size_t>(options_.max_confirming))) {
     const Features& features = *map.keyframes().at(id).features;
     const Rigid3 id_from_query = map.keyframes().at(id).rig_from_world * query_from_world.inverse();
     const Sim3 id_from_match = Sim3(id_from_query) * candidate.query_from_match;
     const VisibleShare observations =
         look_for(map, around_match, id, pose_in_other_world(id_from_match, match_from_world));
-    scored.is_confirmed = static_cast<int>(observations.num_found) >=
-                              adaptive_threshold(kMinFoundToConfirm, features.num_corners()) &&
-                          observations.share() >= kMinShareToConfirm;
+    scored.is_confirmed =
+        static_cast<int>(observations.num_found) >=
+            adaptive_threshold(options_.min_found_to_confirm, features.num_corners()) &&
+        observations.share() >= options_.min_share_to_confirm;
     if (scored.is_confirmed) break;
   }
 }

@@ -8,6 +8,7 @@
 #include <span>
 
 #include "waymark/loop/drift.h"
+#include "waymark/loop/options.h"
 #include "waymark/map/map.h"
 #include "waymark/match/appearance.h"
 #include "waymark/match/projection.h"
@@ -41,7 +42,8 @@ struct ScoredCandidate {
 /// its buffers.
 class CandidateScorer {
  public:
-  explicit CandidateScorer(std::uint64_t seed) : seed_(seed) {}
+  explicit CandidateScorer(std::uint64_t seed, const ScoreOptions& options = {})
+      : seed_(seed), options_(options) {}
 
   /// Nothing if no similarity fits enough matches to be looked into, or fewer than min_inliers.
   /// Repeatable by bits.
@@ -61,6 +63,7 @@ class CandidateScorer {
   void count_visibility(const Map& map, ScoredCandidate& scored);
 
   std::uint64_t seed_;
+  const ScoreOptions options_;
   AppearanceMatcher appearance_;
   ProjectionMatcher projection_;
   LandmarkSet landmarks_;

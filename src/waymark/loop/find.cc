@@ -8,16 +8,6 @@
 namespace waymark {
 namespace {
 
-/// Of the query's sub-map, and again of the others.
-constexpr std::size_t kMaxCandidates = 4;
-/// Of keyframes that see the same, so many are candidates, so that others have their turn.
-constexpr int kMaxOfOnePlace = 2;
-constexpr std::size_t kNumRanked = 12;
-/// Keyframes so many steps away are the query's surroundings.
-constexpr int kNumNearSteps = 2;
-/// Of the best score within the surroundings.
-constexpr double kMinRelativeScore = 0.1;
-
 bool are_linked(const Map& map, KeyframeId a, KeyframeId b) {
   return std::ranges::any_of(map.covisible(a), [&](const CovisibilityEdge& edge) {
     return edge.keyframe == b && edge.num_shared >= kMinSharedOfLinked;
@@ -70,12 +60,17 @@ std::vector<KeyframeId> with_neighbours(const Map& map,
   return ids;
 }
 
-std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query) {
-  const std::vector<KeyframeId> near = within_steps(map, query, kNumNearSteps);
+std::vector<KeyframeId> find_alike(const Map& map,
+                                   const PlaceIndex& places,
+                                   KeyframeId query,
+                                   const CandidateOptions& options) {
+  const std::vector<KeyframeId> near = within_steps(map, query, options.num_near_steps);
   const SubmapId own = map.keyframes().at(query).submap;
   const auto ranked = places.find(
       map.keyframes().at(query).features->corner_descriptors(),
-      {.max_candidates = has_others(map, own) ? places.size() : near.size() + kNumRanked,
+      {.max_candidates = has_others(map, own)
+                             ? places.size()
+                             : near.size() + static_cast<std::size_t>(options.num_ranked),
        .is_excluded = [&](const PlaceRow& row) { return row.keyframe == query; }});
   double best_near = 0.0;
   for (const PlaceCandidate& candidate : ranked) {
@@ -87,13 +82,15 @@ std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, Key
   std::size_t num_others = 0;
   for (const PlaceCandidate& candidate : ranked) {
     const KeyframeId id = candidate.keyframe;
-    if (candidate.score < kMinRelativeScore * best_near) break;
+    if (candidate.score < options.min_relative_score * best_near) break;
     if (std::ranges::binary_search(near, id) || !map.keyframes().contains(id)) continue;
     if (has_metric_submap(map, id) != has_metric_submap(map, query)) continue;
     std::size_t& count = map.keyframes().at(id).submap == own ? num_own : num_others;
     const auto num_linked = std::ranges::count_if(
         alike, [&](KeyframeId chosen) { return are_linked(map, chosen, id); });
-    if (count == kMaxCandidates || num_linked >= kMaxOfOnePlace) continue;
+    if (count == static_cast<std::size_t>(options.max_candidates) ||
+        num_linked >= options.max_of_one_place)
+      continue;
     alike.push_back(id);
     ++count;
   }

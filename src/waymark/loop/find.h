@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "waymark/loop/options.h"
 #include "waymark/map/map.h"
 #include "waymark/place/place_index.h"
 
@@ -29,6 +30,9 @@ std::vector<KeyframeId> with_neighbours(const Map& map, KeyframeId keyframe, std
 /// a few steps of covisibility, few of one place, and none that look less like it than the query's
 /// own surroundings do by far. As many of the query's sub-map as of the others: places of its own
 /// that only look alike do not take the places of those.
-std::vector<KeyframeId> find_alike(const Map& map, const PlaceIndex& places, KeyframeId query);
+std::vector<KeyframeId> find_alike(const Map& map,
+                                   const PlaceIndex& places,
+                                   KeyframeId query,
+                                   const CandidateOptions& options = {});
 
 }  // namespace waymark

@@ -15,8 +15,6 @@
 namespace waymark {
 namespace {
 
-/// So many keyframes of a map are compared with what lies beside them per new keyframe.
-constexpr std::size_t kNumConsolidatedPerKeyframe = 2;
 /// Keyframes five steps away in the graph are known to each other well enough; of views further
 /// apart ORB features change too much.
 constexpr SpatialNeighbourOptions kSpatialNeighbours = {
@@ -45,7 +43,7 @@ GlobalMapper::GlobalMapper(std::shared_ptr<const Rig> rig,
                            std::optional<KnownMarkers> markers)
     : settings_(loop),
       mapper_(std::move(rig), mapping, calibration),
-      verifier_(seed),
+      verifier_(seed, loop.options),
       markers_(std::move(markers)) {}
 
 void GlobalMapper::take_over(const MapSnapshot& before) {
@@ -68,7 +66,8 @@ void GlobalMapper::add(const NewKeyframe& message) {
     schedule_.note_placement(*moved);
   }
   if (!settings_.enabled || close_alike(changes.added.back())) return;
-  if (!has_loop_task()) consolidate_some(kNumConsolidatedPerKeyframe);
+  if (!has_loop_task())
+    consolidate_some(static_cast<std::size_t>(settings_.options.num_consolidated));
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {

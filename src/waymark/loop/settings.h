@@ -3,12 +3,14 @@
 #pragma once
 
 #include "waymark/base/settings.h"
+#include "waymark/loop/options.h"
 
 namespace waymark {
 
 /// Places seen before.
 struct LoopSettings {
-  bool enabled = true;  ///< Off: loops stay open and sub-maps apart.
+  bool enabled = true;       ///< Off: loops stay open and sub-maps apart.
+  LoopOptions options = {};  ///< Constants, for experiments.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

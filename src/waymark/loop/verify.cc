@@ -16,28 +16,17 @@
 namespace waymark {
 namespace {
 
-/// What a candidate must have at least. In the shelves of a warehouse and the arcades of an atrium
-/// that are alike, false ones had up to 37 inliers and a share of 0.13.
-/// Where the images offer little, what is enough of that.
-struct Demand {
-  int num_inliers;
-  int num_found;
-};
-constexpr Demand kOfLoops{25, 40};
-constexpr Demand kOfJoins{30, 60};
-constexpr double kMinShare = 0.15;  ///< Of what both sides should see.
-
-/// Features of the query that show landmarks of both sides, and their distances in the same ratio.
-constexpr std::size_t kMinPairsOfNeighbours = 10;
-constexpr double kMaxRatioError = 0.15;
-
 /// That either of two keyframes has at least.
 std::size_t num_features_of(const Map& map, KeyframeId a, KeyframeId b) {
   return std::min(map.keyframes().at(a).features->num_corners(),
                   map.keyframes().at(b).features->num_corners());
 }
 
-bool meets(const Map& map, const ScoredCandidate& scored, const Demand& demand) {
+bool meets(const Map& map,
+           const ScoredCandidate& scored,
+           int min_inliers,
+           int min_found,
+           double min_share) {
   const LoopCandidate& candidate = scored.candidate;
   const std::size_t num_features = num_features_of(map, candidate.query, candidate.match);
   const auto is_enough = [&](std::size_t count, int full) {
@@ -45,9 +34,9 @@ bool meets(const Map& map, const ScoredCandidate& scored, const Demand& demand) 
   };
   const VisibleShare both{scored.in_query.num_found + scored.in_match.num_found,
                           scored.in_query.num_visible + scored.in_match.num_visible};
-  return is_enough(candidate.num_inliers, demand.num_inliers) &&
-         is_enough(scored.in_query.num_found, demand.num_found) &&
-         is_enough(scored.in_match.num_found, demand.num_found) && both.share() >= kMinShare &&
+  return is_enough(candidate.num_inliers, min_inliers) &&
+         is_enough(scored.in_query.num_found, min_found) &&
+         is_enough(scored.in_match.num_found, min_found) && both.share() >= min_share &&
          scored.is_confirmed;
 }
 
@@ -60,7 +49,8 @@ bool is_loop(const Map& map, const LoopCandidate& candidate) {
 /// sub-map.
 std::optional<LoopCandidate> choose_join(const Map& map,
                                          const std::vector<ScoredCandidate>& joins,
-                                         const std::vector<ScoredCandidate>& loops) {
+                                         const std::vector<ScoredCandidate>& loops,
+                                         const VerificationOptions& options) {
   const ScoredCandidate& best = *std::ranges::max_element(
       joins, {}, [](const ScoredCandidate& one) { return one.candidate.num_inliers; });
   const bool is_clear = std::ranges::all_of(joins, [&](const ScoredCandidate& other) {
@@ -69,8 +59,9 @@ std::optional<LoopCandidate> choose_join(const Map& map,
   const bool has_alias = std::ranges::any_of(loops, [&](const ScoredCandidate& loop) {
     return is_alias(loop.candidate, best.candidate.num_inliers);
   });
-  return is_clear && !has_alias && meets(map, best, kOfJoins) ? std::optional(best.candidate)
-                                                              : std::nullopt;
+  const bool is_enough =
+      meets(map, best, options.min_inliers_of_join, options.min_found_of_join, options.min_share);
+  return is_clear && !has_alias && is_enough ? std::optional(best.candidate) : std::nullopt;
 }
 
 /// Features of a keyframe that show a landmark of its own and another one.
@@ -91,7 +82,8 @@ std::vector<LoopCandidate::Pair> pair_up(const Keyframe& keyframe,
 double find_scale(const Map& map,
                   const Rigid3& query_from_world,
                   const Rigid3& query_from_world_of_match,
-                  std::vector<LoopCandidate::Pair>& pairs) {
+                  std::vector<LoopCandidate::Pair>& pairs,
+                  double max_ratio_error) {
   const auto ratio_of = [&](const LoopCandidate::Pair& pair) {
     const Landmark& of_query = map.landmarks().at(pair.of_query);
     const Landmark& of_match = map.landmarks().at(pair.of_match);
@@ -103,7 +95,7 @@ double find_scale(const Map& map,
   for (const LoopCandidate::Pair& pair : pairs) ratios.push_back(ratio_of(pair));
   const double scale = median(ratios);
   std::erase_if(pairs, [&](const LoopCandidate::Pair& pair) {
-    return std::abs(std::log(ratio_of(pair) / scale)) > kMaxRatioError;
+    return std::abs(std::log(ratio_of(pair) / scale)) > max_ratio_error;
   });
   return scale;
 }
@@ -119,19 +111,26 @@ std::optional<LoopCandidate> LoopVerifier::verify_alike(const Map& map,
     (is_loop(map, scored.candidate) ? loops : joins).push_back(std::move(scored));
   }
   std::optional<LoopCandidate> chosen = choose_loop(map, loops);
-  if (!chosen && !joins.empty()) chosen = choose_join(map, joins, loops);
+  if (!chosen && !joins.empty()) chosen = choose_join(map, joins, loops, options_.verification);
   return chosen && is_unambiguous(map, places, *chosen) ? chosen : std::nullopt;
 }
 
 std::vector<ScoredCandidate> LoopVerifier::score_alike(const Map& map,
                                                        const PlaceIndex& places,
                                                        KeyframeId query) {
+  const VerificationOptions& options = options_.verification;
   std::vector<ScoredCandidate> found;
-  for (const KeyframeId match : find_alike(map, places, query)) {
-    const int least = adaptive_threshold(kOfLoops.num_inliers, num_features_of(map, query, match));
+  for (const KeyframeId match : find_alike(map, places, query, options_.candidates)) {
+    const int least =
+        adaptive_threshold(options.min_inliers_of_loop, num_features_of(map, query, match));
     std::optional<ScoredCandidate> scored =
         scorer_.score(map, query, match, static_cast<std::size_t>(least));
-    if (scored && meets(map, *scored, kOfLoops)) found.push_back(std::move(*scored));
+    if (scored && meets(map,
+                        *scored,
+                        options.min_inliers_of_loop,
+                        options.min_found_of_loop,
+                        options.min_share))
+      found.push_back(std::move(*scored));
   }
   return found;
 }
@@ -166,9 +165,14 @@ std::optional<LoopCandidate> LoopVerifier::compare_with_neighbour(const Map& map
   candidate.match = match;
   candidate.num_inliers = static_cast<std::size_t>(place->frame.num_inliers);
   candidate.pairs = pair_up(in_query, place->frame.landmarks);
-  const double scale =
-      find_scale(map, in_query.rig_from_world, place->frame.rig_from_world, candidate.pairs);
-  if (candidate.pairs.size() < kMinPairsOfNeighbours) return std::nullopt;
+  const double scale = find_scale(map,
+                                  in_query.rig_from_world,
+                                  place->frame.rig_from_world,
+                                  candidate.pairs,
+                                  options_.verification.max_ratio_error);
+  if (candidate.pairs.size() <
+      static_cast<std::size_t>(options_.verification.min_pairs_of_neighbours))
+    return std::nullopt;
   const Rigid3 query_from_match =
       place->frame.rig_from_world * map.keyframes().at(match).rig_from_world.inverse();
   candidate.query_from_match = Sim3(query_from_match);

@@ -10,6 +10,7 @@
 
 #include "waymark/loop/candidate_score.h"
 #include "waymark/loop/drift.h"
+#include "waymark/loop/options.h"
 #include "waymark/map/map.h"
 #include "waymark/place/place_index.h"
 #include "waymark/track/place_locator.h"
@@ -21,7 +22,8 @@ namespace waymark {
 /// says depends on the arguments only. Keeps its buffers.
 class LoopVerifier {
  public:
-  explicit LoopVerifier(std::uint64_t seed) : scorer_(seed), locator_(seed) {}
+  explicit LoopVerifier(std::uint64_t seed, const LoopOptions& options = {})
+      : options_(options), scorer_(seed, options.scores), locator_(seed, options.neighbours) {}
 
   /// Looks for the place of the query by its looks, see find_alike(). They say nothing of how the
   /// two lie to each other, so that a high score is wanted, and more between sub-maps, where there
@@ -47,6 +49,7 @@ class LoopVerifier {
                                                       KeyframeId query,
                                                       KeyframeId match);
 
+  const LoopOptions options_;
   CandidateScorer scorer_;
   PlaceLocator locator_;
 };

@@ -16,8 +16,6 @@
 namespace waymark {
 namespace {
 
-/// Keyframes that hold the window in place; those that share most with it.
-constexpr std::size_t kMaxFixed = 25;
 /// Ranges that are off by more standard deviations are of something else.
 constexpr double kMaxRangeSigmas = 3.0;
 
@@ -61,7 +59,7 @@ std::vector<LandmarkId> seen_by(const Map& map, const std::vector<KeyframeId>& k
 }
 
 /// Keyframes outside the window that see its landmarks, those that see most, ascending.
-std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window) {
+std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window, std::size_t max_fixed) {
   std::vector<KeyframeId> seers;
   for (LandmarkId id : window.landmarks) {
     KeyframeId last;
@@ -80,7 +78,7 @@ std::vector<KeyframeId> anchors(const Map& map, const BundleWindow& window) {
     begin = end;
   }
   std::sort(counts.rbegin(), counts.rend());
-  if (counts.size() > kMaxFixed) counts.resize(kMaxFixed);
+  if (counts.size() > max_fixed) counts.resize(max_fixed);
   std::vector<KeyframeId> fixed;
   for (const auto& [count, id] : counts) fixed.push_back(id);
   std::sort(fixed.begin(), fixed.end());
@@ -159,13 +157,16 @@ MapCorrection moves_of(const BundleWindow& window, const BundleProblem& problem)
 
 }  // namespace
 
-BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_keyframes) {
+BundleWindow choose_window(const Map& map,
+                           KeyframeId centre,
+                           std::size_t num_keyframes,
+                           std::size_t max_fixed) {
   BundleWindow window;
   window.moving = strongest_neighbours(map, centre, num_keyframes - 1);
   window.moving.push_back(centre);
   std::sort(window.moving.begin(), window.moving.end());
   window.landmarks = seen_by(map, window.moving);
-  window.fixed = anchors(map, window);
+  window.fixed = anchors(map, window, max_fixed);
   const KeyframeId root = map.submaps()[map.keyframes().at(centre).submap.value].root;
   if (std::erase(window.moving, root) > 0) window.fixed.push_back(root);
   if (!window.moving.empty()) fix_gauge(window);

@@ -23,7 +23,10 @@ struct BundleWindow {
 };
 
 /// The keyframes most covisible with one, what they see, and who else sees that.
-BundleWindow choose_window(const Map& map, KeyframeId centre, std::size_t num_keyframes);
+BundleWindow choose_window(const Map& map,
+                           KeyframeId centre,
+                           std::size_t num_keyframes,
+                           std::size_t max_fixed = std::size_t{25});
 
 /// A whole sub-map; its root is fixed, unless surveyed markers hold it.
 BundleWindow whole_submap(const Map& map, SubmapId submap);

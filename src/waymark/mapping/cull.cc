@@ -9,17 +9,9 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kRecentKeyframes = 3;
-constexpr double kMinFoundRatio = 0.25;
-/// A keyframe is redundant when this part of its landmarks is seen by that many others.
-constexpr double kRedundantRatio = 0.92;
-constexpr std::size_t kRedundantObservers = 3;
-/// The newest keyframes stay: the tracker and pending messages refer to them.
-constexpr std::size_t kNumNewest = 3;
-
-bool is_weak(const Map& map, const Landmark& landmark, std::size_t age) {
+bool is_weak(const Map& map, const Landmark& landmark, std::size_t age, double min_found_ratio) {
   if (landmark.num_visible >= 4 &&
-      landmark.num_found < kMinFoundRatio * static_cast<double>(landmark.num_visible)) {
+      landmark.num_found < min_found_ratio * static_cast<double>(landmark.num_visible)) {
     return true;
   }
   if (age < 2) return false;
@@ -28,7 +20,10 @@ bool is_weak(const Map& map, const Landmark& landmark, std::size_t age) {
 }
 
 /// Whether enough other keyframes see a landmark from as near or nearer, judged by size.
-bool is_seen_as_well(const Map& map, const Landmark& landmark, KeyframeId id, float size_rad) {
+std::size_t num_seeing_as_well(const Map& map,
+                               const Landmark& landmark,
+                               KeyframeId id,
+                               float size_rad) {
   std::size_t others = 0;
   KeyframeId last;
   for (const Observation& observation : landmark.observations) {
@@ -37,46 +32,54 @@ bool is_seen_as_well(const Map& map, const Landmark& landmark, KeyframeId id, fl
     const Features& features = *map.keyframes().at(observation.keyframe).features;
     others += features.size_rad[observation.feature] <= 1.3f * size_rad;
   }
-  return others >= kRedundantObservers;
+  return others;
 }
 
-bool is_redundant(const Map& map, KeyframeId id) {
+bool is_redundant(const Map& map, KeyframeId id, const CullingOptions& options) {
   const Keyframe& keyframe = map.keyframes().at(id);
   std::size_t num_landmarks = 0;
   std::size_t num_redundant = 0;
   for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
     if (!keyframe.landmarks[i].is_valid()) continue;
     ++num_landmarks;
-    num_redundant += is_seen_as_well(
-        map, map.landmarks().at(keyframe.landmarks[i]), id, keyframe.features->size_rad[i]);
+    const Landmark& landmark = map.landmarks().at(keyframe.landmarks[i]);
+    num_redundant += num_seeing_as_well(map, landmark, id, keyframe.features->size_rad[i]) >=
+                     static_cast<std::size_t>(options.redundant_observers);
   }
-  return static_cast<double>(num_redundant) > kRedundantRatio * static_cast<double>(num_landmarks);
+  return static_cast<double>(num_redundant) >
+         options.redundant_ratio * static_cast<double>(num_landmarks);
 }
 
 }  // namespace
 
-void RecentLandmarks::review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dirty) {
+void RecentLandmarks::review(Map& map,
+                             std::size_t keyframe_count,
+                             DirtyLandmarks& dirty,
+                             const CullingOptions& options) {
   std::erase_if(entries_, [&](const Entry& entry) {
     const Landmark* landmark = map.landmarks().find(entry.landmark);
     if (!landmark) return true;
     const std::size_t age = keyframe_count - entry.added_at;
-    if (is_weak(map, *landmark, age)) {
+    if (is_weak(map, *landmark, age, options.min_found_ratio)) {
       map.erase_landmark(entry.landmark);
       dirty.erase(entry.landmark);
       return true;
     }
-    return age >= kRecentKeyframes;
+    return age >= static_cast<std::size_t>(options.recent_keyframes);
   });
 }
 
 std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
                                                  KeyframeId centre,
-                                                 DirtyLandmarks& dirty) {
+                                                 DirtyLandmarks& dirty,
+                                                 const CullingOptions& options) {
   std::vector<KeyframeId> erased;
   for (KeyframeId id : strongest_neighbours(map, centre, 30)) {
     const Keyframe* keyframe = map.keyframes().find(id);
     if (!keyframe || !keyframe->parent.is_valid() || map.has_loop_edge(id)) continue;
-    if (id.value + kNumNewest > centre.value || !is_redundant(map, id)) continue;
+    if (id.value + static_cast<std::uint32_t>(options.num_newest) > centre.value ||
+        !is_redundant(map, id, options))
+      continue;
     for (LandmarkId landmark : keyframe->landmarks) {
       if (landmark.is_valid()) dirty.insert(landmark);
     }

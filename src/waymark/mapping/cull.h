@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/options.h"
 
 namespace waymark {
 
@@ -19,7 +20,10 @@ class RecentLandmarks {
 
   /// Erases those that were rarely found where they should be seen, or that too few keyframes saw
   /// in time; releases those that stood the test. keyframe_count: keyframes added so far.
-  void review(Map& map, std::size_t keyframe_count, DirtyLandmarks& dirty);
+  void review(Map& map,
+              std::size_t keyframe_count,
+              DirtyLandmarks& dirty,
+              const CullingOptions& options = {});
 
  private:
   struct Entry {
@@ -33,6 +37,7 @@ class RecentLandmarks {
 /// Erases keyframes around one whose landmarks others see just as well. Returns them.
 std::vector<KeyframeId> cull_redundant_keyframes(Map& map,
                                                  KeyframeId centre,
-                                                 DirtyLandmarks& dirty);
+                                                 DirtyLandmarks& dirty,
+                                                 const CullingOptions& options = {});
 
 }  // namespace waymark

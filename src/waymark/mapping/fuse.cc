@@ -7,15 +7,14 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxNeighbours = 12;
-constexpr std::size_t kMaxSecondNeighbours = 4;
-
 /// Neighbours of a keyframe and the strongest of theirs, without itself, ascending.
-std::vector<KeyframeId> surroundings(const Map& map, KeyframeId id) {
-  std::vector<KeyframeId> ids = strongest_neighbours(map, id, kMaxNeighbours);
+std::vector<KeyframeId> surroundings(const Map& map, KeyframeId id, const FuseOptions& options) {
+  std::vector<KeyframeId> ids =
+      strongest_neighbours(map, id, static_cast<std::size_t>(options.max_neighbours));
   const std::vector<KeyframeId> first = ids;
   for (KeyframeId neighbour : first) {
-    const auto second = strongest_neighbours(map, neighbour, kMaxSecondNeighbours);
+    const auto second = strongest_neighbours(
+        map, neighbour, static_cast<std::size_t>(options.max_second_neighbours));
     ids.insert(ids.end(), second.begin(), second.end());
   }
   std::sort(ids.begin(), ids.end());
@@ -88,8 +87,9 @@ void fuse_into(Map& map,
 void fuse_with_neighbours(Map& map,
                           KeyframeId keyframe,
                           ProjectionMatcher& matcher,
-                          DirtyLandmarks& dirty) {
-  const std::vector<KeyframeId> targets = surroundings(map, keyframe);
+                          DirtyLandmarks& dirty,
+                          const FuseOptions& options) {
+  const std::vector<KeyframeId> targets = surroundings(map, keyframe, options);
   for (KeyframeId target : targets) {
     fuse_into(map, std::span(&keyframe, 1), target, matcher, dirty);
   }

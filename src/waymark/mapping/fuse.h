@@ -5,6 +5,7 @@
 #include <span>
 
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/options.h"
 #include "waymark/match/projection.h"
 
 namespace waymark {
@@ -26,6 +27,7 @@ void merge(Map& map, LandmarkId a, LandmarkId b, DirtyLandmarks& dirty);
 void fuse_with_neighbours(Map& map,
                           KeyframeId keyframe,
                           ProjectionMatcher& matcher,
-                          DirtyLandmarks& dirty);
+                          DirtyLandmarks& dirty,
+                          const FuseOptions& options = {});
 
 }  // namespace waymark

@@ -76,21 +76,28 @@ Mapper::Changes Mapper::add(const NewSubmap& message) {
 }
 
 Mapper::Changes Mapper::add(const NewKeyframe& message) {
+  const MappingOptions& options = settings_.options;
   const KeyframeId id = insert(message);
-  recent_landmarks_.review(map_, id.value, dirty_);
+  recent_landmarks_.review(map_, id.value, dirty_, options.culling);
   const LandmarkId first_new = map_.landmarks().end_id();
   add_landmarks_from_range(map_, id, dirty_);
-  triangulate_with_neighbours(map_, id, epipolar_, dirty_);
-  triangulate_edges(map_, id, dirty_);
+  triangulate_with_neighbours(map_, id, epipolar_, dirty_, options.triangulation);
+  triangulate_edges(map_, id, dirty_, options.edges);
   for (std::uint32_t value = first_new.value; value < map_.landmarks().end_id().value; ++value) {
     recent_landmarks_.add(LandmarkId{value}, id.value);
   }
   refresh_appearances();
-  fuse_with_neighbours(map_, id, projection_, dirty_);
-  const BundleWindow window =
-      choose_window(map_, id, static_cast<std::size_t>(settings_.window_keyframes));
-  adjust_window(map_, window, {.num_rounds = 2, .max_iterations_per_round = 8}, dirty_);
-  std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_);
+  fuse_with_neighbours(map_, id, projection_, dirty_, options.fusing);
+  const BundleWindow window = choose_window(map_,
+                                            id,
+                                            static_cast<std::size_t>(settings_.window_keyframes),
+                                            static_cast<std::size_t>(options.window.max_fixed));
+  adjust_window(map_,
+                window,
+                {.num_rounds = options.window.num_rounds,
+                 .max_iterations_per_round = options.window.max_iterations_per_round},
+                dirty_);
+  std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_, options.culling);
   refresh_appearances();
   look_for_readout(id);
   return {{id}, std::move(erased)};

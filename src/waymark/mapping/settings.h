@@ -6,6 +6,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/settings.h"
+#include "waymark/mapping/options.h"
 
 namespace waymark {
 
@@ -34,7 +35,8 @@ struct CalibrationSettings {
 
 /// Landmarks and keyframes.
 struct MappingSettings {
-  int window_keyframes = 12;  ///< That local bundle adjustment moves.
+  int window_keyframes = 12;    ///< That local bundle adjustment moves.
+  MappingOptions options = {};  ///< Constants, for experiments.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

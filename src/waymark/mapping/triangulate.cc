@@ -8,13 +8,6 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxTriangulationNeighbours = 10;
-/// Baselines below this part of the scene's distance give no useful depth.
-constexpr double kMinBaselineRatio = 0.01;
-
-/// The matcher has asked for enough parallax in pixels; this only guards the division.
-constexpr double kMinParallaxRad = 1e-3;
-
 std::vector<std::uint8_t> taken_features(const Keyframe& keyframe) {
   std::vector<std::uint8_t> is_taken(keyframe.features->num_primary);
   for (std::size_t i = 0; i < is_taken.size(); ++i) is_taken[i] = keyframe.landmarks[i].is_valid();
@@ -35,11 +28,12 @@ double median_distance(const Map& map, const Keyframe& keyframe) {
 std::optional<Eigen::Vector3d> triangulate_match(const Keyframe& a,
                                                  const Keyframe& b,
                                                  const Rigid3& b_from_a,
-                                                 const FeatureMatch& match) {
+                                                 const FeatureMatch& match,
+                                                 double min_parallax_rad) {
   const auto point_in_a = triangulate(a.features->bearings[match.a].cast<double>(),
                                       b.features->bearings[match.b].cast<double>(),
                                       b_from_a.inverse(),
-                                      kMinParallaxRad);
+                                      min_parallax_rad);
   if (!point_in_a) return std::nullopt;
   const Rigid3 world_from_a = (a.rig().cameras[0].cam_from_rig * a.rig_from_world).inverse();
   const Eigen::Vector3d point = world_from_a * *point_in_a;
@@ -54,15 +48,17 @@ std::optional<Eigen::Vector3d> triangulate_match(const Keyframe& a,
 std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
                                                     KeyframeId id,
                                                     EpipolarMatcher& matcher,
-                                                    DirtyLandmarks& dirty) {
+                                                    DirtyLandmarks& dirty,
+                                                    const TriangulationOptions& options) {
   std::vector<LandmarkId> added;
   const double distance = median_distance(map, map.keyframes().at(id));
-  for (KeyframeId neighbour : strongest_neighbours(map, id, kMaxTriangulationNeighbours)) {
+  for (KeyframeId neighbour :
+       strongest_neighbours(map, id, static_cast<std::size_t>(options.max_neighbours))) {
     const Keyframe a = map.keyframes().at(id);
     const Keyframe b = map.keyframes().at(neighbour);
     const Rigid3 b_from_a = (b.rig().cameras[0].cam_from_rig * b.rig_from_world) *
                             (a.rig().cameras[0].cam_from_rig * a.rig_from_world).inverse();
-    if (b_from_a.translation.norm() < kMinBaselineRatio * distance) continue;
+    if (b_from_a.translation.norm() < options.min_baseline_ratio * distance) continue;
     const auto matches = matcher.match(*a.features,
                                        taken_features(a),
                                        *b.features,
@@ -70,7 +66,7 @@ std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
                                        b_from_a,
                                        EpipolarOptions{});
     for (const FeatureMatch& match : matches) {
-      const auto point = triangulate_match(a, b, b_from_a, match);
+      const auto point = triangulate_match(a, b, b_from_a, match, options.min_parallax_rad);
       if (!point) continue;
       const LandmarkId landmark = map.add_landmark(a.submap, *point, id);
       map.observe(id, match.a, landmark);

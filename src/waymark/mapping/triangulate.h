@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/options.h"
 #include "waymark/match/epipolar.h"
 
 namespace waymark {
@@ -14,6 +15,7 @@ namespace waymark {
 std::vector<LandmarkId> triangulate_with_neighbours(Map& map,
                                                     KeyframeId keyframe,
                                                     EpipolarMatcher& matcher,
-                                                    DirtyLandmarks& dirty);
+                                                    DirtyLandmarks& dirty,
+                                                    const TriangulationOptions& options = {});
 
 }  // namespace waymark

@@ -11,24 +11,6 @@
 namespace waymark {
 namespace {
 
-/// Keyframes in which the point is looked for.
-constexpr std::size_t kEdgeNeighbours = 10;
-/// Keyframes beside the one that the point is of.
-constexpr std::size_t kMinAgreeing = 3;
-/// The runner-up has at most this part of the votes.
-constexpr double kMaxRivalRatio = 0.5;
-/// Sine of the angle between an edge and its epipolar plane.
-constexpr double kMinEdgeSine = 0.5;
-constexpr double kMinEdgeCos = 0.9;  ///< Between directions across an edge in two keyframes.
-/// From the point on the other edge to where the epipolar plane crosses it: it is straight so far.
-constexpr double kEdgeReachPx = 8.0;
-constexpr double kMinEdgeParallaxPx = 3.0;
-/// Standard deviation of a point across its edge.
-constexpr double kEdgeSigmaPx = 0.7;
-constexpr double kAgreementSigmas = 2.0;
-/// Of the angle between the other ray and the baseline: beside it there is no crossing.
-constexpr double kMinBaselineSine = 0.05;
-
 /// A point on an edge as camera 0 of its keyframe sees it.
 struct SeenEdge {
   std::uint32_t feature;
@@ -73,15 +55,18 @@ struct Neighbour {
 };
 
 /// By the law of sines in the epipolar plane, angles measured from the baseline.
-std::optional<Crossing> cross(const SeenEdge& a, const Neighbour& neighbour, const SeenEdge& b) {
+std::optional<Crossing> cross(const SeenEdge& a,
+                              const Neighbour& neighbour,
+                              const SeenEdge& b,
+                              const EdgeOptions& options) {
   const Eigen::Matrix3d turn = neighbour.b_from_a.rotation_matrix();
-  if ((turn * a.across).dot(b.across) < kMinEdgeCos) return std::nullopt;
+  if ((turn * a.across).dot(b.across) < options.min_edge_cos) return std::nullopt;
   const Eigen::Vector3d ray_a = turn * a.bearing;
   const Eigen::Vector3d normal = neighbour.b_from_a.translation.cross(ray_a).normalized();
   const double sine = normal.dot(b.along);
-  if (!(std::abs(sine) > kMinEdgeSine)) return std::nullopt;
+  if (!(std::abs(sine) > options.min_edge_sine)) return std::nullopt;
   const double step = -normal.dot(b.bearing) / sine;
-  if (std::abs(step) > kEdgeReachPx * b.size_rad) return std::nullopt;
+  if (std::abs(step) > options.reach_px * b.size_rad) return std::nullopt;
   const Eigen::Vector3d ray_b = (b.bearing + step * b.along).normalized();
   const double baseline = neighbour.b_from_a.translation.norm();
   // From the centre of a to that of b.
@@ -91,11 +76,11 @@ std::optional<Crossing> cross(const SeenEdge& a, const Neighbour& neighbour, con
   };
   const double angle_a = angle(ray_a);
   const double parallax = angle(ray_b) - angle_a;
-  if (parallax < kMinEdgeParallaxPx * std::max(a.size_rad, b.size_rad)) return std::nullopt;
+  if (parallax < options.min_parallax_px * std::max(a.size_rad, b.size_rad)) return std::nullopt;
   const double sine_b = std::sin(angle_a + parallax);
-  if (axis.cross(ray_a).dot(axis.cross(ray_b)) <= 0.0 || sine_b < kMinBaselineSine)
+  if (axis.cross(ray_a).dot(axis.cross(ray_b)) <= 0.0 || sine_b < options.min_baseline_sine)
     return std::nullopt;
-  const double angle_sigma = kEdgeSigmaPx * std::hypot(a.size_rad, b.size_rad) / std::abs(sine);
+  const double angle_sigma = options.sigma_px * std::hypot(a.size_rad, b.size_rad) / std::abs(sine);
   return Crossing{std::sin(parallax) / (baseline * sine_b),
                   angle_sigma * std::sin(angle_a) / (baseline * sine_b * sine_b),
                   neighbour.id,
@@ -103,11 +88,13 @@ std::optional<Crossing> cross(const SeenEdge& a, const Neighbour& neighbour, con
 }
 
 /// The crossings, one per keyframe, that agree with one of them.
-std::vector<Crossing> agreeing(const std::vector<Crossing>& all, const Crossing& one) {
+std::vector<Crossing> agreeing(const std::vector<Crossing>& all,
+                               const Crossing& one,
+                               double agreement_sigmas) {
   std::vector<Crossing> chosen;
   for (const Crossing& other : all) {
     const double off = std::abs(other.inverse_range - one.inverse_range);
-    if (off > kAgreementSigmas * std::hypot(one.sigma, other.sigma)) continue;
+    if (off > agreement_sigmas * std::hypot(one.sigma, other.sigma)) continue;
     const auto same = std::ranges::find(chosen, other.keyframe, &Crossing::keyframe);
     if (same == chosen.end()) {
       chosen.push_back(other);
@@ -119,11 +106,12 @@ std::vector<Crossing> agreeing(const std::vector<Crossing>& all, const Crossing&
 }
 
 /// The largest set that agrees, if it is large enough and none that shares nothing comes near.
-std::vector<Crossing> consensus(const std::vector<Crossing>& all) {
+std::vector<Crossing> consensus(const std::vector<Crossing>& all, const EdgeOptions& options) {
   std::vector<std::vector<Crossing>> sets;
-  for (const Crossing& one : all) sets.push_back(agreeing(all, one));
+  for (const Crossing& one : all) sets.push_back(agreeing(all, one, options.agreement_sigmas));
   const auto best = std::ranges::max_element(sets, {}, &std::vector<Crossing>::size);
-  if (best == sets.end() || best->size() < kMinAgreeing) return {};
+  if (best == sets.end() || best->size() < static_cast<std::size_t>(options.min_agreeing))
+    return {};
   const auto centre = [&](const std::vector<Crossing>& set) {
     return all[static_cast<std::size_t>(&set - sets.data())];
   };
@@ -131,9 +119,9 @@ std::vector<Crossing> consensus(const std::vector<Crossing>& all) {
     const Crossing a = centre(*best);
     const Crossing b = centre(rival);
     const bool is_apart = std::abs(a.inverse_range - b.inverse_range) >
-                          2.0 * kAgreementSigmas * std::hypot(a.sigma, b.sigma);
-    if (is_apart &&
-        static_cast<double>(rival.size()) > kMaxRivalRatio * static_cast<double>(best->size())) {
+                          2.0 * options.agreement_sigmas * std::hypot(a.sigma, b.sigma);
+    if (is_apart && static_cast<double>(rival.size()) >
+                        options.max_rival_ratio * static_cast<double>(best->size())) {
       return {};
     }
   }
@@ -155,6 +143,7 @@ void add_edge_landmark(Map& map,
                        KeyframeId id,
                        const SeenEdge& edge,
                        std::vector<Crossing> seen,
+                       std::size_t min_agreeing,
                        DirtyLandmarks& dirty) {
   const Keyframe& keyframe = map.keyframes().at(id);
   const Eigen::Vector3d point =
@@ -162,7 +151,7 @@ void add_edge_landmark(Map& map,
   std::erase_if(seen, [&](const Crossing& crossing) {
     return !agrees(map.keyframes().at(crossing.keyframe), crossing.feature, point);
   });
-  if (seen.size() < kMinAgreeing) return;
+  if (seen.size() < min_agreeing) return;
   const LandmarkId landmark = map.add_landmark(keyframe.submap, point, id);
   map.observe(id, edge.feature, landmark);
   for (const Crossing& crossing : seen) map.observe(crossing.keyframe, crossing.feature, landmark);
@@ -171,12 +160,13 @@ void add_edge_landmark(Map& map,
 
 }  // namespace
 
-void triangulate_edges(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
+void triangulate_edges(Map& map, KeyframeId id, DirtyLandmarks& dirty, const EdgeOptions& options) {
   const std::vector<SeenEdge> edges = free_edges(map.keyframes().at(id));
   if (edges.empty()) return;
   const Rigid3 a_from_world = camera_pose(map.keyframes().at(id));
   std::vector<Neighbour> neighbours;
-  for (const KeyframeId other : strongest_neighbours(map, id, kEdgeNeighbours)) {
+  for (const KeyframeId other :
+       strongest_neighbours(map, id, static_cast<std::size_t>(options.max_neighbours))) {
     const Keyframe& keyframe = map.keyframes().at(other);
     const Rigid3 b_from_a = camera_pose(keyframe) * a_from_world.inverse();
     if (b_from_a.translation.norm() > 0.0) {
@@ -190,11 +180,13 @@ void triangulate_edges(Map& map, KeyframeId id, DirtyLandmarks& dirty) {
       const std::vector<LandmarkId>& landmarks = map.keyframes().at(neighbour.id).landmarks;
       for (const SeenEdge& other : neighbour.edges) {
         if (landmarks[other.feature].is_valid()) continue;
-        if (const auto crossing = cross(edge, neighbour, other)) crossings.push_back(*crossing);
+        if (const auto crossing = cross(edge, neighbour, other, options))
+          crossings.push_back(*crossing);
       }
     }
-    const std::vector<Crossing> seen = consensus(crossings);
-    if (!seen.empty()) add_edge_landmark(map, id, edge, seen, dirty);
+    const std::vector<Crossing> seen = consensus(crossings, options);
+    if (!seen.empty())
+      add_edge_landmark(map, id, edge, seen, static_cast<std::size_t>(options.min_agreeing), dirty);
   }
 }
 

@@ -3,6 +3,7 @@
 #pragma once
 
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/options.h"
 
 namespace waymark {
 
@@ -12,6 +13,9 @@ namespace waymark {
 /// crossing says little; the distance is the one that the most keyframes agree on within their
 /// standard deviations, if no other comes near (after Vogiatzis and Hernandez 2011, who fuse depth
 /// along the ray). Edges along their epipolar curve tell nothing.
-void triangulate_edges(Map& map, KeyframeId keyframe, DirtyLandmarks& dirty);
+void triangulate_edges(Map& map,
+                       KeyframeId keyframe,
+                       DirtyLandmarks& dirty,
+                       const EdgeOptions& options = {});
 
 }  // namespace waymark

@@ -19,6 +19,20 @@
 
 namespace waymark {
 
+/// The constants of all stages as settings, for experiments; they change from version to version.
+template <class Self>
+struct ExperimentFields {
+  Self& settings;
+
+  /// Lists the fields, see SettingInfo.
+  template <class Field>
+  static void describe(ExperimentFields& self, Field&& field) {
+    field("tracking", self.settings.tracking.options, {});
+    field("mapping", self.settings.mapping.options, {});
+    field("loop", self.settings.loop.options, {});
+  }
+};
+
 /// All settings of the engine, one section per module. Cameras are read separately (camchain).
 struct Settings {
   int seed = 0;                     ///< Of all random numbers.
@@ -63,6 +77,8 @@ struct Settings {
     field("calibration", self.calibration, SettingInfo{.help = "Of the cameras, estimated along."});
     field("loop", self.loop, SettingInfo{.help = "Places seen before."});
     field("markers", self.markers, SettingInfo{.help = "Square markers of known size."});
+    ExperimentFields<Self> experiment{self};
+    field("experiment", experiment, {});
   }
 };
 

@@ -16,37 +16,7 @@
 namespace waymark {
 namespace {
 
-/// A map begins with so many landmarks, or with what is enough of the features there are.
-constexpr int kMinLandmarks = 80;
-/// So many that a pose can rest on them even if the next frame finds just one in ten again.
-constexpr std::size_t kPlentyOfLandmarks = 200;
-constexpr std::size_t kMaxReferences = 8;
-/// A new reference is kept every so many frames, so that slow and fast motion find a partner.
-constexpr std::uint32_t kReferenceInterval = 3;
-/// Least parallax of a pair, in pixels of the full image: with about one pixel of noise, single
-/// points are then known to a tenth of their depth and the pair to much better.
-constexpr double kMinParallaxPx = 12.0;
-/// Four times what the tracker's prediction errs by, as here nothing is predicted.
-constexpr double kSearchRadiusPx = 60.0;
-constexpr double kSearchPart = 1.0 / 16.0;
-/// What noise moves a feature by at most; a camera at rest shows no more.
-constexpr double kRestPx = kMinParallaxPx / 4;
-
 const Camera& camera_of(const Frame& frame) { return *frame.features->rig->cameras[0].camera; }
-
-/// Around where a feature was last seen.
-double search_radius_px(const Frame& frame) {
-  return waymark::search_radius_px(camera_of(frame), kSearchRadiusPx, kSearchPart);
-}
-
-int min_landmarks(const Features& features) {
-  return adaptive_threshold(kMinLandmarks, features.num_corners());
-}
-
-/// Of a pair: the image that offers less counts.
-int min_landmarks(const Features& a, const Features& b) {
-  return std::min(min_landmarks(a), min_landmarks(b));
-}
 
 /// Primary features whose range has at most this relative standard deviation.
 std::vector<std::uint32_t> features_with_range(const Features& features,
@@ -64,9 +34,9 @@ std::vector<std::uint32_t> features_with_range(const Features& features,
 /// stereo parallax moves a landmark by sigma * d / b pixels in a view at distance d from the first,
 /// b being the baseline, however far the landmark is. So far ones serve to track the first frames
 /// as well as near ones, and later views refine them.
-std::vector<std::uint32_t> features_to_start_from(const Features& features) {
+std::vector<std::uint32_t> features_to_start_from(const Features& features, std::size_t plenty) {
   std::vector<std::uint32_t> chosen = features_with_range(features, kReliableRangeSigma);
-  if (chosen.size() >= kPlentyOfLandmarks) return chosen;
+  if (chosen.size() >= plenty) return chosen;
   return features_with_range(features, kFiniteRangeSigma);
 }
 
@@ -130,6 +100,19 @@ RigMotion motion_at(const InitialKeyframe& keyframe, const std::vector<InitialKe
 
 }  // namespace
 
+double Initializer::search_radius_px(const Frame& frame) const {
+  const InitializerOptions& options = options_.initializer;
+  return waymark::search_radius_px(camera_of(frame), options.search_radius_px, options.search_part);
+}
+
+int Initializer::min_landmarks(const Features& features) const {
+  return adaptive_threshold(options_.initializer.min_landmarks, features.num_corners());
+}
+
+int Initializer::min_landmarks(const Features& a, const Features& b) const {
+  return std::min(min_landmarks(a), min_landmarks(b));
+}
+
 std::optional<Initialization> Initializer::add(const Frame& frame) {
   if (!references_.empty() && references_.back().frame.features->rig != frame.features->rig) {
     reset();
@@ -147,7 +130,8 @@ std::optional<Initialization> Initializer::start_from_range(const Frame& frame) 
   start.submap.is_metric = true;
   start.submap.keyframes.push_back({frame.id, frame.timestamp_ns, Rigid3{}, frame.features});
   const Rigid3 world_from_cam = features.rig->cameras[0].cam_from_rig.inverse();
-  for (const std::uint32_t i : features_to_start_from(features)) {
+  const auto plenty = static_cast<std::size_t>(options_.initializer.plenty_of_landmarks);
+  for (const std::uint32_t i : features_to_start_from(features, plenty)) {
     const Eigen::Vector3d point = features.range_m[i] * features.bearings[i].cast<double>();
     start.submap.landmarks.push_back({world_from_cam * point, {i}});
   }
@@ -164,8 +148,11 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
   StationaryCamera rest;  // Goes on with the next reference.
   for (Reference& reference : references_) {
     match(reference, frame);
-    reference.rest.update(
-        camera_of(frame), *reference.frame.features, *frame.features, reference.matches);
+    reference.rest.update(camera_of(frame),
+                          *reference.frame.features,
+                          *frame.features,
+                          reference.matches,
+                          options_.stationary);
     if (reference.rest.is_at_rest()) rest = reference.rest;
   }
   std::erase_if(references_, [&](const Reference& reference) {
@@ -184,10 +171,12 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
   }
   passed_.push_back(frame);
   if (references_.empty() ||
-      (frame.id.value - references_.back().frame.id.value >= kReferenceInterval &&
+      (frame.id.value - references_.back().frame.id.value >=
+           static_cast<std::uint32_t>(options_.initializer.reference_interval) &&
        has_moved(references_.back(), frame))) {
     references_.push_back({frame, pixels_of(*frame.features), {}, rest});
-    if (references_.size() > kMaxReferences) references_.erase(references_.begin() + 1);
+    if (references_.size() > static_cast<std::size_t>(options_.initializer.max_references))
+      references_.erase(references_.begin() + 1);
   }
   while (passed_.front().id < references_.front().frame.id || passed_.size() > kMaxPassed) {
     passed_.pop_front();
@@ -236,7 +225,7 @@ void Initializer::match_near_expected(Reference& reference, const Frame& frame) 
 }
 
 bool Initializer::has_moved(const Reference& reference, const Frame& frame) const {
-  const double rest_rad = kRestPx * central_pixel_angle(camera_of(frame));
+  const double rest_rad = options_.initializer.rest_px * central_pixel_angle(camera_of(frame));
   const auto moved = [&](const FeatureMatch& match) {
     const Eigen::Vector3f& before = reference.frame.features->bearings[match.a];
     return (frame.features->bearings[match.b] - before).norm() >= rest_rad;
@@ -269,7 +258,8 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
   options.stream = frame.id.value;
   const int enough = min_landmarks(*reference.frame.features, *frame.features);
   options.min_num_points = enough;
-  options.min_parallax_rad = kMinParallaxPx * central_pixel_angle(camera_of(frame));
+  options.min_parallax_rad =
+      options_.initializer.min_parallax_px * central_pixel_angle(camera_of(frame));
   const TwoViewResult two_view = estimate_two_view(bearings.view(), options);
   if (!two_view.geometry) {
     reason_ = reason_of(two_view.status);
@@ -344,7 +334,8 @@ std::optional<Rigid3> Initializer::locate(const Frame& frame,
   }
   const PoseEstimate estimate =
       optimize_pose(*frame.features->rig, observations, guess, pose_workspace_);
-  if (estimate.num_inliers < kMinLandmarks / 3) return std::nullopt;
+  if (estimate.num_inliers < static_cast<std::size_t>(options_.initializer.min_landmarks / 3))
+    return std::nullopt;
   return estimate.rig_from_world;
 }
 

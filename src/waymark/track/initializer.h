@@ -16,6 +16,7 @@
 #include "waymark/match/rotation_alignment.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame.h"
+#include "waymark/track/options.h"
 #include "waymark/track/stationary_camera.h"
 
 namespace waymark {
@@ -36,7 +37,8 @@ class Initializer {
  public:
   static constexpr std::size_t kMaxPassed = 300;
 
-  Initializer(bool has_range, std::uint64_t seed) : has_range_(has_range), seed_(seed) {}
+  Initializer(bool has_range, std::uint64_t seed, const TrackingOptions& options = {})
+      : has_range_(has_range), seed_(seed), options_(options) {}
 
   /// Frames that were measured by cameras calibrated otherwise than this one are forgotten.
   std::optional<Initialization> add(const Frame& frame);
@@ -53,6 +55,12 @@ class Initializer {
     StationaryCamera rest = {};                    ///< Since that frame.
   };
 
+  /// Around where a feature was last seen.
+  double search_radius_px(const Frame& frame) const;
+  /// Of a map that begins.
+  int min_landmarks(const Features& features) const;
+  /// Of a pair: the image that offers less counts.
+  int min_landmarks(const Features& a, const Features& b) const;
   std::optional<Initialization> start_from_range(const Frame& frame);
   std::optional<Initialization> start_from_two_views(const Frame& frame);
   void match(Reference& reference, const Frame& frame);
@@ -72,6 +80,7 @@ class Initializer {
 
   bool has_range_;
   std::uint64_t seed_;
+  const TrackingOptions options_;
   FrameReason reason_ = FrameReason::kNone;
   AppearanceMatcher appearance_;
   RotationAligner rotation_aligner_;

@@ -11,26 +11,16 @@
 #include "waymark/features/range_precision.h"
 
 namespace waymark {
-namespace {
-
-/// Sent keyframes that may be outstanding before the tracker holds back.
-constexpr std::size_t kMaxPending = 2;
-/// Where less than this part of the features with a reliable range have a landmark, most of what
-/// the camera sees is new.
-constexpr double kMinKnownNear = 0.3;
-/// Landmarks that so many keyframes see, or all in a young map, count as established.
-constexpr std::size_t kEstablishedObservers = 3;
-
-}  // namespace
-
 KeyframeSituation compare_with_reference(const Features& features,
                                          bool has_range,
                                          const LocatedFrame& located,
                                          const Map& map,
                                          KeyframeId reference_id,
-                                         std::size_t submap_age) {
+                                         std::size_t submap_age,
+                                         const KeyframeOptions& options) {
   const Keyframe& reference = map.keyframes().at(reference_id);
-  const std::size_t established = std::min(kEstablishedObservers, submap_age);
+  const std::size_t established =
+      std::min(static_cast<std::size_t>(options.established_observers), submap_age);
   KeyframeSituation situation;
   situation.has_range = has_range;
   for (std::uint32_t i = 0; i < reference.features->num_primary; ++i) {
@@ -60,14 +50,18 @@ KeyframeSituation compare_with_reference(const Features& features,
 }
 
 bool should_make_keyframe(const KeyframeSituation& situation, const TrackingSettings& settings) {
-  if (situation.num_pending >= kMaxPending || situation.frames_since_keyframe < 1) return false;
+  const KeyframeOptions& options = settings.options.keyframes;
+  if (situation.num_pending >= static_cast<std::size_t>(options.max_pending) ||
+      situation.frames_since_keyframe < 1)
+    return false;
   const bool sees_little = situation.num_shared < settings.keyframe_ratio * situation.num_reference;
   const bool has_parallax = situation.median_parallax_px > settings.keyframe_parallax_px;
-  const bool is_overdue = situation.frames_since_keyframe >= settings.max_keyframe_interval &&
-                          situation.median_parallax_px > 0.25 * settings.keyframe_parallax_px;
+  const bool is_overdue =
+      situation.frames_since_keyframe >= settings.max_keyframe_interval &&
+      situation.median_parallax_px > options.overdue_parallax * settings.keyframe_parallax_px;
   const int num_near = situation.num_near_tracked + situation.num_near_untracked;
   const bool sees_new =
-      situation.has_range && situation.num_near_tracked < kMinKnownNear * num_near;
+      situation.has_range && situation.num_near_tracked < options.min_known_near * num_near;
   return sees_little || has_parallax || is_overdue || sees_new;
 }
 

@@ -29,7 +29,8 @@ KeyframeSituation compare_with_reference(const Features& features,
                                          const LocatedFrame& located,
                                          const Map& map,
                                          KeyframeId reference,
-                                         std::size_t submap_age);
+                                         std::size_t submap_age,
+                                         const KeyframeOptions& options = {});
 
 /// Whether a frame should become a keyframe.
 bool should_make_keyframe(const KeyframeSituation& situation, const TrackingSettings& settings);

@@ -12,36 +12,13 @@
 #include "waymark/track/place_confidence.h"
 
 namespace waymark {
-namespace {
-
-/// The candidate and those that share most landmarks with it.
-constexpr std::size_t kNumMatchedKeyframes = 3;
-/// Of the many landmarks that look alike those remain that agree on how the camera turned, unless
-/// so few do that it may be chance: where the scene is near, the parallax differs.
-constexpr AppearanceOptions kAppearance = {.max_distance = 60, .max_ratio = 0.9};
-constexpr std::size_t kMinAgreeing = 8;
-/// Fewer matches, or fewer that agree on a pose, are chance more often than not.
-constexpr int kMinMatches = 20;
-constexpr std::size_t kMinConsensus = 15;
-constexpr double kMinPlaceInlierRatio = 0.2;
-/// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
-constexpr double kFirstRadiusPx = 12.0;
-constexpr double kSecondRadiusPx = 5.0;
-/// Where drift or a guess put a pose: five degrees of a lens of 460 px.
-constexpr double kGuessRadiusPx = 40.0;
-/// Laxer than in tracking: light and cameras may have changed, and a few wrong ones do no harm.
-constexpr AppearanceOptions kGuidedAppearance = {.max_distance = 80, .max_ratio = 0.9};
-/// Or what is enough of the features there are.
-constexpr int kMinInliers = 30;
-
-}  // namespace
-
 std::optional<LocatedPlace> PlaceLocator::locate(const Features& features,
                                                  const Map& map,
                                                  KeyframeId candidate,
                                                  std::uint64_t stream,
                                                  double min_confidence) {
-  matched_keyframes_ = strongest_neighbours(map, candidate, kNumMatchedKeyframes - 1);
+  matched_keyframes_ = strongest_neighbours(
+      map, candidate, static_cast<std::size_t>(options_.num_matched_keyframes - 1));
   matched_keyframes_.insert(matched_keyframes_.begin(), candidate);
   std::optional<LocatedPlace> place =
       refine(features, map, candidate, stream, match_by_appearance(features, map));
@@ -59,7 +36,7 @@ std::optional<LocatedPlace> PlaceLocator::locate_near(const Features& features,
   gather_local_map(map, map.keyframes().at(candidate).landmarks, candidate, local_);
   local_.landmarks.keep_corners();
   std::vector<LandmarkId> landmarks =
-      locator_.find(features, local_.landmarks, guess, {.radius_px = kGuessRadiusPx});
+      locator_.find(features, local_.landmarks, guess, {.radius_px = options_.guess_radius_px});
   return refine(features, map, candidate, candidate.value, std::move(landmarks));
 }
 
@@ -71,13 +48,13 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
                                                  std::vector<LandmarkId> landmarks) {
   const int num_matches = num_valid(landmarks);
   attempt_ = {FrameReason::kTooFewMatches, num_matches, 0};
-  if (num_matches < kMinMatches) return std::nullopt;
+  if (num_matches < options_.min_matches) return std::nullopt;
   attempt_.failure = FrameReason::kTooFewInliers;
   std::optional<LocatedFrame> located = find_consensus(features, map, stream, std::move(landmarks));
   if (!located) return std::nullopt;
-  const int enough = adaptive_threshold(kMinInliers, features.num_corners());
+  const int enough = adaptive_threshold(options_.min_inliers, features.num_corners());
   const std::array<std::pair<double, int>, 2> rounds = {
-      {{kFirstRadiusPx, enough / 2}, {kSecondRadiusPx, enough}}};
+      {{options_.first_radius_px, enough / 2}, {options_.second_radius_px, enough}}};
   for (const auto& [radius_px, min_inliers] : rounds) {
     gather_local_map(map, primary_landmarks(features, located->landmarks), candidate, local_);
     local_.landmarks.keep_corners();
@@ -86,7 +63,9 @@ std::optional<LocatedPlace> PlaceLocator::refine(const Features& features,
                                     map,
                                     *std::move(located),
                                     local_.landmarks,
-                                    {.radius_px = radius_px, .appearance = kGuidedAppearance});
+                                    {.radius_px = radius_px,
+                                     .appearance = {.max_distance = options_.guided_max_distance,
+                                                    .max_ratio = options_.max_ratio}});
     attempt_.num_matches += located->num_matches - num_kept;
     attempt_.num_inliers = located->num_inliers;
     if (located->num_inliers < min_inliers) return std::nullopt;
@@ -123,10 +102,14 @@ void PlaceLocator::match_keyframe(const Features& features, const Map& map, Keyf
   for (std::uint32_t i = 0; i < keyframe.features->num_primary; ++i) {
     if (keyframe.landmarks[i].is_valid()) with_landmark_.push_back(i);
   }
-  const auto alike =
-      appearance_.match_all(*keyframe.features, with_landmark_, features, kAppearance);
+  const auto alike = appearance_.match_all(
+      *keyframe.features,
+      with_landmark_,
+      features,
+      {.max_distance = options_.max_distance, .max_ratio = options_.max_ratio});
   const auto agreeing = rotation_vote_.agreeing(*keyframe.features, features, alike);
-  for (const FeatureMatch& match : agreeing.size() >= kMinAgreeing ? agreeing : alike) {
+  for (const FeatureMatch& match :
+       agreeing.size() >= static_cast<std::size_t>(options_.min_agreeing) ? agreeing : alike) {
     matches_.push_back({match.b, keyframe.landmarks[match.a], match.distance});
   }
 }
@@ -146,13 +129,14 @@ std::optional<LocatedFrame> PlaceLocator::find_consensus(const Features& feature
   ransac_options.seed = seed_;
   ransac_options.stream = stream;
   // A sparser consensus would be refused, so that it need not be found.
-  ransac_options.min_inlier_ratio =
-      std::max(kMinPlaceInlierRatio,
-               static_cast<double>(kMinConsensus) / static_cast<double>(observations_.size()));
+  ransac_options.min_inlier_ratio = std::max(
+      options_.min_inlier_ratio,
+      static_cast<double>(options_.min_consensus) / static_cast<double>(observations_.size()));
   const std::optional<PoseEstimate> estimate =
       waymark::locate(*features.rig, observations_, ransac_options, workspace_);
   if (estimate) attempt_.num_inliers = static_cast<int>(estimate->num_inliers);
-  if (!estimate || estimate->num_inliers < kMinConsensus) return std::nullopt;
+  if (!estimate || estimate->num_inliers < static_cast<std::size_t>(options_.min_consensus))
+    return std::nullopt;
   for (std::size_t k = 0; k < feature_of_observation_.size(); ++k) {
     if (!estimate->is_inlier[k]) landmarks[feature_of_observation_[k]] = LandmarkId{};
   }

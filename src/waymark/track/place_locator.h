@@ -15,6 +15,7 @@
 #include "waymark/optimize/pose.h"
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/local_map.h"
+#include "waymark/track/options.h"
 
 namespace waymark {
 
@@ -39,10 +40,8 @@ struct PlaceAttempt {
 /// keyframe's. Keeps its buffers.
 class PlaceLocator {
  public:
-  /// Below this a pose may be that of a place that merely looks alike.
-  static constexpr double kMinConfidence = 0.3;
-
-  explicit PlaceLocator(std::uint64_t seed) : seed_(seed) {}
+  explicit PlaceLocator(std::uint64_t seed, const PlaceOptions& options = {})
+      : seed_(seed), options_(options) {}
 
   /// Nothing unless the pose rests on 30 landmarks with this confidence; all of these are of the
   /// candidate's sub-map. Same seed and stream (the frame, for example), same result.
@@ -50,7 +49,7 @@ class PlaceLocator {
                                      const Map& map,
                                      KeyframeId candidate,
                                      std::uint64_t stream,
-                                     double min_confidence = kMinConfidence);
+                                     double min_confidence = PlaceOptions{}.min_confidence);
 
   /// The same where a pose is known already, though too coarsely to look for landmarks one by one:
   /// to within some 5 degrees or a tenth of the depth of the scene. Such a pose says more than
@@ -87,6 +86,7 @@ class PlaceLocator {
                                              std::vector<LandmarkId> landmarks);
 
   std::uint64_t seed_;
+  const PlaceOptions options_;
   AppearanceMatcher appearance_;
   RotationVote rotation_vote_;
   FrameLocator locator_;

@@ -10,11 +10,6 @@
 namespace waymark {
 namespace {
 
-/// Of 1465 predictions in recordings of 10 to 30 frames per second one was off by more than 0.08
-/// (docs/decisions/track.md).
-constexpr double kMaxSurprise = 0.1;
-/// Poses nearer to each other are the same.
-constexpr double kMaxSameDistance = 0.03;
 /// Of the feature's level: what poses and landmarks that are right may be off by.
 constexpr float kMaxErrorPx = 8.0f;
 
@@ -55,9 +50,9 @@ bool PoseCheck::is_verified(const Features& features,
                             const Map& map,
                             const LocatedFrame& located,
                             FrameLocator& locator) {
-  if (predicted_ && distance_from(*predicted_, map, located) < kMaxSurprise) return true;
+  if (predicted_ && distance_from(*predicted_, map, located) < options_.max_surprise) return true;
   const auto is_same = [&](const Rigid3& other) {
-    return distance_from(other, map, located) < kMaxSameDistance;
+    return distance_from(other, map, located) < options_.max_same_distance;
   };
   if (std::ranges::any_of(rejected_, is_same)) return true;
   const Keyframe& beside = map.keyframes().at(main_observer(map, located.landmarks));

@@ -13,6 +13,7 @@
 #include "waymark/features/features.h"
 #include "waymark/map/map.h"
 #include "waymark/track/frame_locator.h"
+#include "waymark/track/options.h"
 
 namespace waymark {
 
@@ -35,6 +36,8 @@ class PoseCheck {
   /// Of part_in_place(), where nothing else speaks for a pose.
   static constexpr double kMinPartInPlace = 2.0 / 3.0;
 
+  explicit PoseCheck(const PoseCheckOptions& options = {}) : options_(options) {}
+
   /// Begins with another frame; predicted: its pose if the motion goes on, if that is known.
   void begin(const std::optional<Rigid3>& predicted);
 
@@ -48,6 +51,7 @@ class PoseCheck {
   const std::optional<FrameStatus>& refusal() const { return refusal_; }
 
  private:
+  const PoseCheckOptions options_;
   std::optional<Rigid3> predicted_;
   std::vector<Rigid3> rejected_;
   std::optional<FrameStatus> refusal_;

@@ -12,30 +12,16 @@
 namespace waymark {
 namespace {
 
-/// For a camera turned by hand the prediction is off by 12 px of 640 x 480 in one frame of 20 and
-/// by 22 px in one of 100 (docs/decisions/track.md).
-constexpr double kPredictedRadiusPx = 15.0;
-constexpr double kPredictedPart = 1.0 / 64.0;
-constexpr double kWideRadiusPx = 40.0;
-constexpr double kWidePart = 1.0 / 24.0;
-/// Around a pose that rests on what it sees; of the landmark's level (docs/decisions/track.md).
-constexpr double kLocatedRadiusPx = 5.0;
-constexpr std::size_t kRecoveryKeyframes = 12;
-/// Frames after a loss in which the camera is looked for near where it was.
-constexpr int kRecoveryFrames = 30;
-/// Frames after a loss in which a place near the last pose is believed.
-constexpr int kPatience = 5;
-
 /// Around a prediction, and when that fails.
-std::array<double, 2> search_radii_px(const Frame& frame) {
+std::array<double, 2> search_radii_px(const Frame& frame, const PoseSearchOptions& options) {
   const Camera& camera = *frame.features->rig->cameras[0].camera;
-  return {search_radius_px(camera, kPredictedRadiusPx, kPredictedPart),
-          search_radius_px(camera, kWideRadiusPx, kWidePart)};
+  return {search_radius_px(camera, options.predicted_radius_px, options.predicted_part),
+          search_radius_px(camera, options.wide_radius_px, options.wide_part)};
 }
 
 /// Whether the camera cannot be far from its last pose.
-bool is_recent(const PoseSearch::Context& context) {
-  return context.last.has_pose() && context.num_lost < kRecoveryFrames;
+bool is_recent(const PoseSearch::Context& context, const PoseSearchOptions& options) {
+  return context.last.has_pose() && context.num_lost < options.recovery_frames;
 }
 
 /// The frame as it would be with the motion that its pose shows; of a rolling shutter alone.
@@ -52,7 +38,7 @@ void straighten(Frame& frame, const PoseSearch::Context& context, const LocatedF
 struct PoseSearch::Step {
   std::string_view name;
   Stage stage;
-  bool (*is_possible)(const Context&);
+  bool (*is_possible)(const Context&, const PoseSearchOptions&);
   Found (PoseSearch::*locate)(Frame&, const Context&);
   bool is_alternative = false;  ///< Only where the steps before had nothing to be confirmed.
   bool is_confirmed = false;    ///< By itself, without the local map.
@@ -61,12 +47,16 @@ struct PoseSearch::Step {
 const std::array<PoseSearch::Step, 5> PoseSearch::kSteps = {{
     {.name = "motion",
      .stage = Stage::kPredict,
-     .is_possible = [](const Context& context) { return !context.is_lost; },
+     .is_possible = [](const Context& context,
+                       const PoseSearchOptions&) { return !context.is_lost; },
      .locate = &PoseSearch::by_motion,
      .is_alternative = true},
     {.name = "last pose",
      .stage = Stage::kRecover,
-     .is_possible = [](const Context& context) { return context.is_lost && is_recent(context); },
+     .is_possible =
+         [](const Context& context, const PoseSearchOptions& options) {
+           return context.is_lost && is_recent(context, options);
+         },
      .locate = &PoseSearch::near_last_pose,
      .is_alternative = true},
     {.name = "keyframes nearby",
@@ -76,26 +66,29 @@ const std::array<PoseSearch::Step, 5> PoseSearch::kSteps = {{
      .is_alternative = true},
     {.name = "patches",
      .stage = Stage::kRecover,
-     .is_possible = [](const Context& context) { return !context.is_lost && context.last.image(); },
+     .is_possible =
+         [](const Context& context, const PoseSearchOptions&) {
+           return !context.is_lost && context.last.image();
+         },
      .locate = &PoseSearch::by_patches,
      .is_confirmed = true},
     {.name = "places",
      .stage = Stage::kRecover,
-     .is_possible = [](const Context&) { return true; },
+     .is_possible = [](const Context&, const PoseSearchOptions&) { return true; },
      .locate = &PoseSearch::anywhere},
 }};
 
 std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
                                                const Context& context,
                                                StageTimes& times) {
-  const bool is_motion_known = !context.is_lost || is_recent(context);
+  const bool is_motion_known = !context.is_lost || is_recent(context, options());
   if (is_motion_known) context.last.carry_over(*context.visible.map);
   check_.begin(is_motion_known ? std::optional(context.last.predict(frame.timestamp_ns))
                                : std::nullopt);
   found_by_ = {};
   bool has_found = false;
   for (const Step& step : kSteps) {
-    if (!step.is_possible(context) || (step.is_alternative && has_found)) continue;
+    if (!step.is_possible(context, options()) || (step.is_alternative && has_found)) continue;
     Found found;
     {
       StageTimer timer(times, step.stage);
@@ -116,7 +109,7 @@ std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
 
 std::optional<LocatedFrame> PoseSearch::by_motion(Frame& frame, const Context& context) {
   const Rigid3 predicted = context.last.predict(frame.timestamp_ns);
-  const auto [radius_px, wide_radius_px] = search_radii_px(frame);
+  const auto [radius_px, wide_radius_px] = search_radii_px(frame, options());
   if (auto located = locate_near(frame, context, predicted, radius_px)) return located;
   Found wide = locate_near(frame, context, predicted, wide_radius_px);
   Found by_image = locate_by_image(frame, context);
@@ -128,8 +121,10 @@ std::optional<LocatedFrame> PoseSearch::near_last_pose(Frame& frame, const Conte
   const auto is_enough = [&](const Found& found) {
     return found && found->num_inliers >= settings_.min_inliers;
   };
-  Found found = locate_near(
-      frame, context, context.last.predict(frame.timestamp_ns), search_radii_px(frame).back());
+  Found found = locate_near(frame,
+                            context,
+                            context.last.predict(frame.timestamp_ns),
+                            search_radii_px(frame, options()).back());
   if (!is_enough(found)) found = locate_by_image(frame, context);
   if (!is_enough(found)) return std::nullopt;
   local_map_.forget();
@@ -162,7 +157,7 @@ std::optional<LocatedFrame> PoseSearch::by_patches(Frame& frame, const Context& 
   located.landmarks = locator_.find(*frame.features,
                                     around,
                                     located.rig_from_world,
-                                    {.radius_px = kLocatedRadiusPx},
+                                    {.radius_px = options().located_radius_px},
                                     &located.visible);
   Frame with_patches = frame;
   patch_locator_.add_features(*aligned, around, with_patches, located);
@@ -175,7 +170,7 @@ std::optional<LocatedFrame> PoseSearch::by_patches(Frame& frame, const Context& 
 std::optional<LocatedFrame> PoseSearch::anywhere(Frame& frame, const Context& context) {
   const Map& map = *context.visible.map;
   std::optional<LastPlace> last;
-  if (context.last.has_pose() && context.num_lost < kPatience) {
+  if (context.last.has_pose() && context.num_lost < options().patience_frames) {
     last = {map.resolve(context.last.reference()), context.last.rig_from_world()};
   }
   Found located = relocalizer_.locate_at_markers(frame, map);
@@ -203,7 +198,7 @@ std::optional<LocatedFrame> PoseSearch::locate_by_image(const Frame& frame,
                                                         const Context& context) {
   const std::optional<Rigid3> predicted = predict_by_image(frame, context);
   if (!predicted) return std::nullopt;
-  for (const double radius_px : search_radii_px(frame)) {
+  for (const double radius_px : search_radii_px(frame, options())) {
     if (auto located = locate_near(frame, context, *predicted, radius_px)) return located;
   }
   return std::nullopt;
@@ -231,7 +226,7 @@ std::vector<KeyframeId> PoseSearch::keyframes_nearby(const Context& context) con
     const Keyframe* keyframe = map.keyframes().find(id);
     const bool is_known = std::ranges::find(keyframes, id) != keyframes.end();
     if (keyframe && keyframe->submap == submap && !is_known) keyframes.push_back(id);
-    return keyframes.size() < kRecoveryKeyframes;
+    return keyframes.size() < static_cast<std::size_t>(options().recovery_keyframes);
   };
   for (const KeyframeId id : local_map().keyframes) {
     if (!add(id)) return keyframes;
@@ -268,7 +263,7 @@ std::optional<LocatedFrame> PoseSearch::confirm_in_local_map(const Frame& frame,
                                                map,
                                                std::move(first),
                                                local_map().landmarks,
-                                               {.radius_px = kLocatedRadiusPx});
+                                               {.radius_px = options().located_radius_px});
   if (located.num_inliers < settings_.min_inliers) return std::nullopt;
   if (check_.is_verified(*frame.features, map, located, locator_)) return located;
   local_map_.forget();

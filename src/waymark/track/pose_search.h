@@ -39,7 +39,7 @@ class PoseSearch {
   };
 
   PoseSearch(const TrackingSettings& settings, std::uint64_t seed)
-      : settings_(settings), relocalizer_(settings, seed) {}
+      : settings_(settings), relocalizer_(settings, seed), check_(settings.options.pose_check) {}
 
   /// The pose of a frame. Its features become those that the frame would have without the motion
   /// that its pose shows (of a rolling shutter), or get points that show landmarks by their
@@ -62,6 +62,8 @@ class PoseSearch {
   using Found = std::optional<LocatedFrame>;
   struct Step;
   static const std::array<Step, 5> kSteps;
+
+  const PoseSearchOptions& options() const { return settings_.options.pose_search; }
 
   Found by_motion(Frame& frame, const Context& context);
   Found near_last_pose(Frame& frame, const Context& context);

@@ -13,20 +13,11 @@
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxCandidates = 10;
-/// What merely looks alike does not get that far; the other candidates need not be tried.
-constexpr double kCertainConfidence = 0.5;
-/// How far a rig moves from one frame to the next at most, by the distance of what it sees.
-constexpr double kMaxMovedPart = 0.5;
-
 /// How the search may end, from what is furthest; other reasons come before all of these.
 constexpr std::array kEnds = {FrameReason::kNone,
                               FrameReason::kNotVerified,
                               FrameReason::kTooFewInliers,
                               FrameReason::kTooFewMatches};
-
-/// Keyframes near where a marker has the rig, compared by appearance if its pose is too coarse.
-constexpr std::size_t kMaxNearMarker = 4;
 
 /// The poses that the markers of a frame leave open.
 std::vector<MarkerPose> poses_by_markers(const MarkerObservations& observations,
@@ -50,7 +41,7 @@ std::vector<MarkerPose> poses_by_markers(const MarkerObservations& observations,
 }
 
 /// Keyframes that look at a marker from nearest to a pose, the nearest first.
-std::vector<KeyframeId> keyframes_at(const Map& map, const MarkerPose& pose) {
+std::vector<KeyframeId> keyframes_at(const Map& map, const MarkerPose& pose, std::size_t max_num) {
   const Eigen::Vector3d centre = pose.rig_from_world.origin_in_source();
   const Eigen::Vector3d to_marker = (pose.rig_from_world * pose.marker_in_world).normalized();
   const double range = (pose.marker_in_world - centre).norm();
@@ -64,16 +55,19 @@ std::vector<KeyframeId> keyframes_at(const Map& map, const MarkerPose& pose) {
   std::ranges::sort(found);
   std::vector<KeyframeId> keyframes;
   for (const auto& [distance, id] : found) {
-    if (keyframes.size() < kMaxNearMarker) keyframes.push_back(id);
+    if (keyframes.size() < max_num) keyframes.push_back(id);
   }
   return keyframes;
 }
 
-bool is_near(const LastPlace& last, const Map& map, const LocatedFrame& located) {
+bool is_near(const LastPlace& last,
+             const Map& map,
+             const LocatedFrame& located,
+             double max_moved_part) {
   const Eigen::Vector3d centre = located.rig_from_world.origin_in_source();
   const double moved = (centre - last.rig_from_world.origin_in_source()).norm();
   return moved * median_inverse_range(map, located.rig_from_world, located.landmarks) <
-         kMaxMovedPart;
+         max_moved_part;
 }
 
 }  // namespace
@@ -83,7 +77,7 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
                                                 const PlaceIndex& places,
                                                 const std::optional<LastPlace>& last) {
   const PlaceQuery query = {
-      .max_candidates = kMaxCandidates,
+      .max_candidates = static_cast<std::size_t>(options_.max_candidates),
       .is_excluded = [&](const PlaceRow& row) { return !map.keyframes().contains(row.keyframe); }};
   std::vector<KeyframeId> candidates;
   if (last) candidates.push_back(last->keyframe);
@@ -96,7 +90,8 @@ std::optional<LocatedFrame> Relocalizer::locate(const Frame& frame,
 std::optional<LocatedFrame> Relocalizer::locate_at(const Frame& frame,
                                                    const Map& map,
                                                    const MarkerPose& pose) {
-  const std::vector<KeyframeId> near = keyframes_at(map, pose);
+  const std::vector<KeyframeId> near =
+      keyframes_at(map, pose, static_cast<std::size_t>(options_.max_near_marker));
   if (near.empty()) return std::nullopt;
   auto place = locator_.locate_near(*frame.features, map, near.front(), pose.rig_from_world);
   if (place && place->frame.num_inliers >= min_inliers_) return std::move(place->frame);
@@ -124,21 +119,22 @@ std::optional<LocatedFrame> Relocalizer::locate_among(const Frame& frame,
   diagnosis_ = {.reason = FrameReason::kNoCandidate};
   for (const KeyframeId candidate : candidates) {
     if (std::ranges::find(tried, candidate) != tried.end()) continue;
-    const double min_confidence = last ? 0.0 : PlaceLocator::kMinConfidence;
+    const double min_confidence = last ? 0.0 : options_.min_confidence;
     auto place = locator_.locate(*frame.features, map, candidate, frame.id.value, min_confidence);
     const auto matched = locator_.matched_keyframes();
     tried.insert(tried.end(), matched.begin(), matched.end());
     const bool has_inliers = place && place->frame.num_inliers >= min_inliers_;
     PlaceAttempt attempt = locator_.attempt();
     if (place && !has_inliers) attempt.failure = FrameReason::kTooFewInliers;
-    const bool is_believed = has_inliers && (place->confidence >= PlaceLocator::kMinConfidence ||
-                                             is_near(*last, map, place->frame));
+    const bool is_believed =
+        has_inliers && (place->confidence >= options_.min_confidence ||
+                        is_near(*last, map, place->frame, options_.max_moved_part));
     if (has_inliers && !is_believed) attempt.failure = FrameReason::kNotVerified;
     note(attempt);
     if (!is_believed || (best && place->confidence <= best_confidence)) continue;
     best_confidence = place->confidence;
     best = std::move(place->frame);
-    if (best_confidence >= kCertainConfidence) break;
+    if (best_confidence >= options_.certain_confidence) break;
   }
   return best;
 }

@@ -37,7 +37,9 @@ struct MarkerPose {
 class Relocalizer {
  public:
   Relocalizer(const TrackingSettings& settings, std::uint64_t seed)
-      : locator_(seed), min_inliers_(settings.min_inliers) {}
+      : options_(settings.options.relocalization),
+        locator_(seed, options_),
+        min_inliers_(settings.min_inliers) {}
 
   /// Pose of a frame in whichever sub-map shows the place. The index may know more or fewer
   /// keyframes than the map.
@@ -64,6 +66,7 @@ class Relocalizer {
   void note(const PlaceAttempt& attempt);
   std::optional<LocatedFrame> locate_at(const Frame& frame, const Map& map, const MarkerPose& pose);
 
+  const PlaceOptions options_;
   PlaceLocator locator_;
   int min_inliers_;
   FrameStatus diagnosis_;

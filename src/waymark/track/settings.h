@@ -3,6 +3,7 @@
 #pragma once
 
 #include "waymark/base/settings.h"
+#include "waymark/track/options.h"
 
 namespace waymark {
 
@@ -12,6 +13,7 @@ struct TrackingSettings {
   double keyframe_ratio = 0.45;        ///< Of the landmarks of the reference keyframe.
   double keyframe_parallax_px = 60.0;  ///< Median against the reference keyframe.
   int max_keyframe_interval = 30;      ///< In frames.
+  TrackingOptions options = {};        ///< Constants, for experiments.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

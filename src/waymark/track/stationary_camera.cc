@@ -13,18 +13,6 @@
 namespace waymark {
 namespace {
 
-/// Matches that tell what a cell of the image does.
-constexpr std::size_t kMinCellMatches = 3;
-/// Of those that stayed before, so many have to stay.
-constexpr std::size_t kMinStillCells = 2;
-/// Of its cells, the share that stays where the camera rests: a third of what remains of the view
-/// when things have 60 % of the features; of a moving camera hardly any do.
-constexpr double kRestShare = 0.15;
-constexpr double kRestShareAllAround = 0.75;
-/// How far the features of a cell are off in the median, in pixels of the full image: what is far
-/// away stays within a pixel, too, but with each turn of the camera all of it moves by more.
-constexpr double kStayPx = 0.5;
-
 using Displacements = std::vector<Eigen::Vector3f>;  ///< Of bearings of unit length.
 
 /// Component by component; reorders them.
@@ -45,9 +33,12 @@ int cell_of(double position_px, int size_px, int count) {
 
 }  // namespace
 
-bool StationaryCamera::are_all_over(const Cells& staying, const Cells& telling, bool wraps) {
+bool StationaryCamera::are_all_over(const Cells& staying,
+                                    const Cells& telling,
+                                    bool wraps,
+                                    const StationaryOptions& options) {
   const auto share = static_cast<double>(staying.count()) / static_cast<double>(telling.count());
-  if (wraps) return share > kRestShareAllAround;
+  if (wraps) return share > options.rest_share_all_around;
   std::bitset<kRows> staying_rows, telling_rows;
   std::bitset<kColumns> staying_columns, telling_columns;
   for (std::size_t i = 0; i < telling.size(); ++i) {
@@ -55,14 +46,15 @@ bool StationaryCamera::are_all_over(const Cells& staying, const Cells& telling, 
     telling_rows.set(i / kColumns), telling_columns.set(i % kColumns);
     if (staying[i]) staying_rows.set(i / kColumns), staying_columns.set(i % kColumns);
   }
-  return share > kRestShare && 2 * staying_rows.count() > telling_rows.count() &&
+  return share > options.rest_share && 2 * staying_rows.count() > telling_rows.count() &&
          2 * staying_columns.count() >= telling_columns.count();
 }
 
 void StationaryCamera::update(const Camera& camera,
                               const Features& before,
                               const Features& now,
-                              std::span<const FeatureMatch> matches) {
+                              std::span<const FeatureMatch> matches,
+                              const StationaryOptions& options) {
   std::array<Displacements, kColumns * kRows> cells;
   for (const FeatureMatch& match : matches) {
     const Keypoint& keypoint = now.keypoints[match.b];
@@ -71,15 +63,17 @@ void StationaryCamera::update(const Camera& camera,
     cells[static_cast<std::size_t>(row * kColumns + column)].push_back(now.bearings[match.b] -
                                                                        before.bearings[match.a]);
   }
-  const double stay_rad = kStayPx * central_pixel_angle(camera);
+  const double stay_rad = options.stay_px * central_pixel_angle(camera);
   Cells telling, staying;
   for (std::size_t i = 0; i < cells.size(); ++i) {
-    telling[i] = cells[i].size() >= kMinCellMatches;
+    telling[i] = cells[i].size() >= static_cast<std::size_t>(options.min_cell_matches);
     staying[i] = telling[i] && median_of(cells[i]).norm() < stay_rad;
   }
   const std::size_t num_still = (staying & staying_).count();
-  const bool goes_on = num_still >= kMinStillCells && 2 * num_still >= staying_.count();
-  const bool rests = goes_on || are_all_over(staying, telling, camera.wrap_width_px() > 0.0);
+  const bool goes_on = num_still >= static_cast<std::size_t>(options.min_still_cells) &&
+                       2 * num_still >= staying_.count();
+  const bool rests =
+      goes_on || are_all_over(staying, telling, camera.wrap_width_px() > 0.0, options);
   staying_ = rests ? staying : Cells{};
 }
 

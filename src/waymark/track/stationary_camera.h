@@ -8,6 +8,7 @@
 #include "waymark/camera/camera.h"
 #include "waymark/features/features.h"
 #include "waymark/match/appearance.h"
+#include "waymark/track/options.h"
 
 namespace waymark {
 
@@ -24,14 +25,18 @@ class StationaryCamera {
   void update(const Camera& camera,
               const Features& before,
               const Features& now,
-              std::span<const FeatureMatch> matches);
+              std::span<const FeatureMatch> matches,
+              const StationaryOptions& options = {});
   bool is_at_rest() const { return staying_.any(); }
 
  private:
   static constexpr int kColumns = 6, kRows = 4;
   using Cells = std::bitset<kColumns * kRows>;
 
-  static bool are_all_over(const Cells& staying, const Cells& telling, bool wraps);
+  static bool are_all_over(const Cells& staying,
+                           const Cells& telling,
+                           bool wraps,
+                           const StationaryOptions& options);
 
   Cells staying_;  ///< In the last frame at rest; none where the camera is not.
 };

@@ -19,7 +19,7 @@ constexpr int kMinLost = 5;
 Tracker::Tracker(bool has_range, const TrackingSettings& settings, std::uint64_t seed)
     : has_range_(has_range),
       settings_(settings),
-      initializer_(has_range, seed),
+      initializer_(has_range, seed, settings.options),
       search_(settings, seed) {}
 
 void Tracker::begin_in(const Map& map, TrackingPurpose purpose) {
@@ -78,7 +78,8 @@ bool Tracker::is_keyframe(const Frame& frame, const LocatedFrame& located) const
                                                        located,
                                                        map,
                                                        search_.local_map().reference,
-                                                       ids_.submap_age(map));
+                                                       ids_.submap_age(map),
+                                                       settings_.options.keyframes);
   situation.num_pending = ids_.num_pending(map);
   situation.frames_since_keyframe = static_cast<int>(frame.id.value - ids_.newest_frame().value);
   return should_make_keyframe(situation, settings_);
@@ -94,12 +95,8 @@ std::optional<MapperMessage> Tracker::accept(const Frame& frame,
   const RelativePose pose{reference_id,
                           reference.applied_scale,
                           located.rig_from_world * reference.rig_from_world.inverse()};
-  result.state = FrameState::kTracked;
-  result.num_matches = located.num_matches;
-  result.num_inliers = located.num_inliers;
+  set_located(located, result);
   result.submap = reference.submap;
-  result.world_from_rig = located.rig_from_world.inverse();
-  result.covariance = located.covariance;
   result.is_relocalized = mode_ == Mode::kLost;
   result.is_keyframe = is_keyframe(frame, located);
   result.frame_in_map = frame.id;
