@@ -117,7 +117,7 @@ class Session(ViewerTest):
         client.wait_for(lambda c: c.status and c.status["doing"].startswith("calibration"))
         self.assertEqual((client.status["phase"], client.status["frames"]), ("starting", 0))
         self.assertIn("no session yet", client.ask("pause")["error"])
-        client.wait_for(lambda c: c.status["doing"] == "" and c.status["frames"] > 0)
+        client.wait_for(lambda c: c.status["doing"] == "" and c.status["frames"] > 0, seconds=300)
         self.assertEqual(client.hello["setup"], "mono")
         self.assertTrue(client.ask("stop")["ok"])
         self.process.communicate(timeout=120)
@@ -242,7 +242,7 @@ class Hostile(ViewerTest):
         with self.assertRaises(urllib.error.HTTPError):
             urllib.request.urlopen(here + "status", timeout=20)
         client = self.connect(f"{here}?token={token}")
-        client.wait_for(lambda c: c.is_complete)
+        client.wait_for(lambda c: c.is_complete and c.status["tracked"] > 0)
         client.ask("stop")
         self.end()
 

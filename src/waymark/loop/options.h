@@ -17,7 +17,7 @@ struct CandidateOptions {
   int max_candidates = 4;  ///< Of the query's sub-map, and again of the others.
   /// Of keyframes that see the same, so many are candidates, so that others have their turn.
   int max_of_one_place = 2;
-  int num_ranked = 12;
+  int num_ranked = 12;              ///< Keyframes of the place index that are looked at.
   int num_near_steps = 2;           ///< Keyframes so many steps away are the query's surroundings.
   double min_relative_score = 0.1;  ///< Of the best score within the surroundings.
 
@@ -36,7 +36,7 @@ struct CandidateOptions {
 struct ScoreOptions {
   int min_matches = 15;  ///< By appearance; fewer are not worth the time.
   int min_inliers = 10;  ///< Among them; fewer are not worth the time either.
-  int max_distance = 64;
+  int max_distance = 64;   ///< Between descriptors, in bits.
   double max_ratio = 0.8;  ///< Of that of the next best.
   /// Standard deviation of the residuals of landmarks that were mapped independently, in pixels of
   /// the level: their own errors count, too.
@@ -45,11 +45,10 @@ struct ScoreOptions {
   double observation_radius_px = 4.0;  ///< Search for what else should be seen.
   int num_surroundings = 8;            ///< Keyframes on either side whose landmarks should be seen.
   int min_observers = 3;  ///< Landmarks that so many keyframes saw are expected to be seen again.
-  /// A keyframe near the query confirms if it finds so many landmarks, or what is enough of its
-  /// features, and such a share.
-  int max_confirming = 5;
+  int max_confirming = 5;  ///< Keyframes near the query that may confirm.
+  /// Landmarks by which one does, or what is enough of its features.
   int min_found_to_confirm = 25;
-  double min_share_to_confirm = 0.1;
+  double min_share_to_confirm = 0.1;  ///< Of the landmarks that it should see.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -72,15 +71,15 @@ struct ScoreOptions {
 /// Of loop/verify.h.
 struct VerificationOptions {
   int min_inliers_of_loop = 25;  ///< Or what is enough of the features, as those below.
-  int min_found_of_loop = 40;
+  int min_found_of_loop = 40;    ///< Landmarks of the other side.
   /// Between sub-maps there is no odometry to contradict.
   int min_inliers_of_join = 30;
-  int min_found_of_join = 60;
+  int min_found_of_join = 60;  ///< Landmarks of the other side.
   double min_share = 0.15;  ///< Of what both sides should see.
   /// Features of the query that show landmarks of both sides, and their distances in the same
   /// ratio.
   int min_pairs_of_neighbours = 10;
-  double max_ratio_error = 0.15;
+  double max_ratio_error = 0.15;  ///< Relative.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

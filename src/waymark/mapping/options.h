@@ -15,9 +15,9 @@ namespace waymark {
 struct CullingOptions {
   int recent_keyframes = 3;       ///< In which a new landmark has to be found again.
   double min_found_ratio = 0.25;  ///< Of the frames in which it should have been seen.
-  /// A keyframe is redundant when this part of its landmarks is seen by that many others.
+  /// A keyframe is redundant when this part of its landmarks is seen by enough others.
   double redundant_ratio = 0.92;
-  int redundant_observers = 3;
+  int redundant_observers = 3;  ///< So many are enough.
   int num_newest = 3;  ///< These stay: the tracker and pending messages refer to them.
 
   /// Lists the fields, see SettingInfo.
@@ -58,9 +58,9 @@ struct EdgeOptions {
   /// From the point on the other edge to where the epipolar plane crosses it: it is straight so
   /// far.
   double reach_px = 8.0;
-  double min_parallax_px = 3.0;
+  double min_parallax_px = 3.0;  ///< Between the two edges, along the epipolar line.
   double sigma_px = 0.7;  ///< Standard deviation of a point across its edge.
-  double agreement_sigmas = 2.0;
+  double agreement_sigmas = 2.0;  ///< Inverse ranges that differ less agree.
   /// Of the angle between the other ray and the baseline: beside it there is no crossing.
   double min_baseline_sine = 0.05;
 
@@ -97,7 +97,7 @@ struct FuseOptions {
 struct WindowOptions {
   int max_fixed = 25;  ///< Keyframes that hold the window in place; those that share most with it.
   int num_rounds = 2;  ///< Of adjustment, with outliers left out in between.
-  int max_iterations_per_round = 8;
+  int max_iterations_per_round = 8;  ///< Of Levenberg-Marquardt.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>

@@ -22,7 +22,7 @@ namespace waymark {
 /// The constants of all stages as settings, for experiments; they change from version to version.
 template <class Self>
 struct ExperimentFields {
-  Self& settings;
+  Self& settings;  ///< Settings, or const Settings.
 
   /// Lists the fields, see SettingInfo.
   template <class Field>

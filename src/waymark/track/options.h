@@ -139,10 +139,10 @@ struct PlaceOptions {
   int min_agreeing = 8;    ///< On how the camera turned.
   int min_matches = 20;    ///< Fewer are chance more often than not.
   int min_consensus = 15;  ///< On a pose; fewer are chance, too.
-  double min_inlier_ratio = 0.2;
+  double min_inlier_ratio = 0.2;  ///< Of the matches.
   /// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
   double first_radius_px = 12.0;
-  double second_radius_px = 5.0;
+  double second_radius_px = 5.0;  ///< After a first refinement.
   /// Where drift or a guess put a pose: five degrees of a lens of 460 px.
   double guess_radius_px = 40.0;
   /// Laxer than in tracking: light and cameras may have changed, and a few wrong ones do no harm.
