@@ -3,6 +3,7 @@
 #include "waymark/input/bag_calibration.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "waymark/input/foreign_calibration.h"
 
@@ -42,6 +43,22 @@ std::vector<double> intrinsics_of_images(const RosCameraInfo& info, bool is_rect
           (pv - info.roi_y_px) / binning_y};
 }
 
+/// The camera info that belongs to images: beside them, or of the same coordinate frame.
+std::optional<RosCameraInfo> find_info(Bag& bag, const ImageTopic& image) {
+  std::optional<RosCameraInfo> of_frame;
+  std::vector<bool> is_seen(bag.content().topics.size());
+  for (const BagMessage& message : bag.content().messages) {
+    const BagTopic& topic = bag.content().topics[message.topic];
+    if (is_seen[message.topic] || topic.type != "sensor_msgs/CameraInfo") continue;
+    is_seen[message.topic] = true;
+    std::optional<RosCameraInfo> info = parse_ros_camera_info(bag.read(message), topic.encoding);
+    if (!info) continue;
+    if (std::ranges::count(image.info_names(), topic.name) > 0) return info;
+    if (!image.frame_id.empty() && info->frame_id == image.frame_id) of_frame = std::move(info);
+  }
+  return of_frame;
+}
+
 }  // namespace
 
 std::optional<ChainCamera> camera_of_info(const RosCameraInfo& info,
@@ -79,6 +96,26 @@ std::optional<Rigid3> right_from_left(const RosCameraInfo& left,
   return rectified_from_camera(right, is_rectified, where).inverse() *
          Rigid3(Eigen::Quaterniond::Identity(), baseline) *
          rectified_from_camera(left, is_rectified, where);
+}
+
+std::optional<CameraChain> calibration_of(Bag& bag, const TopicChoice& choice) {
+  const bool is_rectified = choice.first.is_rectified();
+  const std::optional<RosCameraInfo> left = find_info(bag, choice.first);
+  if (!left) return std::nullopt;
+  std::optional<ChainCamera> camera = camera_of_info(*left, is_rectified, choice.first.name);
+  if (!camera) return std::nullopt;
+  CameraChain chain;
+  chain.cameras.push_back(*std::move(camera));
+  if (choice.setup != Setup::kStereo) return chain;
+  const std::string& where = choice.second->name;
+  const std::optional<RosCameraInfo> right = find_info(bag, *choice.second);
+  if (!right) return std::nullopt;
+  camera = camera_of_info(*right, choice.second->is_rectified(), where);
+  const std::optional<Rigid3> cam_from_rig = right_from_left(*left, *right, is_rectified, where);
+  if (!camera || !cam_from_rig) return std::nullopt;
+  camera->cam_from_rig = *cam_from_rig;
+  chain.cameras.push_back(*std::move(camera));
+  return chain;
 }
 
 }  // namespace waymark

@@ -7,6 +7,7 @@
 
 #include "waymark/bag/ros_messages.h"
 #include "waymark/camera/camchain.h"
+#include "waymark/input/bag_topics.h"
 
 namespace waymark {
 
@@ -25,5 +26,8 @@ std::optional<Rigid3> right_from_left(const RosCameraInfo& left,
                                       const RosCameraInfo& right,
                                       bool is_rectified,
                                       const std::string& where);
+
+/// The calibration that the bag carries for the topics. Nothing where it has none of one of them.
+std::optional<CameraChain> calibration_of(Bag& bag, const TopicChoice& choice);
 
 }  // namespace waymark

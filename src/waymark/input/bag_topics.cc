@@ -12,6 +12,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/bag_image.h"
 #include "waymark/input/pairing.h"
 
 namespace waymark {
@@ -105,6 +106,27 @@ std::vector<std::string> ImageTopic::info_names() const {
 bool ImageTopic::is_rectified() const {
   const std::string whole = base();
   return has(std::string_view(whole).substr(camera().size()), "rect");
+}
+
+std::vector<ImageTopic> list_image_topics(Bag& bag) {
+  std::vector<ImageTopic> images;
+  std::vector<bool> is_seen(bag.content().topics.size());
+  for (const BagMessage& message : bag.content().messages) {
+    const BagTopic& topic = bag.content().topics[message.topic];
+    if (is_seen[message.topic] || topic.type == "sensor_msgs/CameraInfo") continue;
+    is_seen[message.topic] = true;
+    ImageTopic& image = images.emplace_back(
+        ImageTopic{message.topic, topic.name, "", "damaged", false, topic.num_messages});
+    try {
+      const BagImageHeader header = read_bag_image_header(bag.read(message), topic, topic.name);
+      image.frame_id = header.frame_id;
+      image.encoding = header.encoding;
+      image.is_depth = header.is_depth;
+    } catch (const InputError&) {
+      // A later message may be whole.
+    }
+  }
+  return images;
 }
 
 std::vector<TopicChoice> find_topics(const std::vector<ImageTopic>& topics) {

@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "waymark/bag/bag.h"
 #include "waymark/input/input.h"
 
 namespace waymark {
@@ -31,6 +32,9 @@ struct ImageTopic {
   /// Whether its images are those of an ideal camera, by its name.
   bool is_rectified() const;
 };
+
+/// Every topic of images with what its first message tells.
+std::vector<ImageTopic> list_image_topics(Bag& bag);
 
 /// The topics to use. second: the images of camera 1, or the depth of camera 0.
 struct TopicChoice {

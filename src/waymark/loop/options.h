@@ -34,8 +34,8 @@ struct CandidateOptions {
 
 /// Of loop/candidate_score.h.
 struct ScoreOptions {
-  int min_matches = 15;  ///< By appearance; fewer are not worth the time.
-  int min_inliers = 10;  ///< Among them; fewer are not worth the time either.
+  int min_matches = 15;    ///< By appearance; fewer are not worth the time.
+  int min_inliers = 10;    ///< Among them; fewer are not worth the time either.
   int max_distance = 64;   ///< Between descriptors, in bits.
   double max_ratio = 0.8;  ///< Of that of the next best.
   /// Standard deviation of the residuals of landmarks that were mapped independently, in pixels of
@@ -44,7 +44,7 @@ struct ScoreOptions {
   double guided_radius_px = 8.0;       ///< Search for more matches of the two keyframes.
   double observation_radius_px = 4.0;  ///< Search for what else should be seen.
   int num_surroundings = 8;            ///< Keyframes on either side whose landmarks should be seen.
-  int min_observers = 3;  ///< Landmarks that so many keyframes saw are expected to be seen again.
+  int min_observers = 3;   ///< Landmarks that so many keyframes saw are expected to be seen again.
   int max_confirming = 5;  ///< Keyframes near the query that may confirm.
   /// Landmarks by which one does, or what is enough of its features.
   int min_found_to_confirm = 25;
@@ -75,7 +75,7 @@ struct VerificationOptions {
   /// Between sub-maps there is no odometry to contradict.
   int min_inliers_of_join = 30;
   int min_found_of_join = 60;  ///< Landmarks of the other side.
-  double min_share = 0.15;  ///< Of what both sides should see.
+  double min_share = 0.15;     ///< Of what both sides should see.
   /// Features of the query that show landmarks of both sides, and their distances in the same
   /// ratio.
   int min_pairs_of_neighbours = 10;

@@ -18,7 +18,7 @@ struct CullingOptions {
   /// A keyframe is redundant when this part of its landmarks is seen by enough others.
   double redundant_ratio = 0.92;
   int redundant_observers = 3;  ///< So many are enough.
-  int num_newest = 3;  ///< These stay: the tracker and pending messages refer to them.
+  int num_newest = 3;           ///< These stay: the tracker and pending messages refer to them.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -58,8 +58,8 @@ struct EdgeOptions {
   /// From the point on the other edge to where the epipolar plane crosses it: it is straight so
   /// far.
   double reach_px = 8.0;
-  double min_parallax_px = 3.0;  ///< Between the two edges, along the epipolar line.
-  double sigma_px = 0.7;  ///< Standard deviation of a point across its edge.
+  double min_parallax_px = 3.0;   ///< Between the two edges, along the epipolar line.
+  double sigma_px = 0.7;          ///< Standard deviation of a point across its edge.
   double agreement_sigmas = 2.0;  ///< Inverse ranges that differ less agree.
   /// Of the angle between the other ray and the baseline: beside it there is no crossing.
   double min_baseline_sine = 0.05;

@@ -135,10 +135,10 @@ struct PlaceOptions {
   /// Of the many landmarks that look alike those remain that agree on how the camera turned, unless
   /// so few do that it may be chance: where the scene is near, the parallax differs.
   int max_distance = 60;
-  double max_ratio = 0.9;  ///< Of that of the next best.
-  int min_agreeing = 8;    ///< On how the camera turned.
-  int min_matches = 20;    ///< Fewer are chance more often than not.
-  int min_consensus = 15;  ///< On a pose; fewer are chance, too.
+  double max_ratio = 0.9;         ///< Of that of the next best.
+  int min_agreeing = 8;           ///< On how the camera turned.
+  int min_matches = 20;           ///< Fewer are chance more often than not.
+  int min_consensus = 15;         ///< On a pose; fewer are chance, too.
   double min_inlier_ratio = 0.2;  ///< Of the matches.
   /// The pose of a dozen inliers is off by some pixels, that of a hundred by less than one.
   double first_radius_px = 12.0;
