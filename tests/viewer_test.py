@@ -113,7 +113,7 @@ class Session(ViewerTest):
         self.assertEqual(waymark("map", "check", self.map).returncode, 0)
 
     def test_the_page_is_there_while_the_calibration_is_found(self):
-        client = self.connect(self.start("run", self.image_folder(), "-o", self.out, "--viewer", "0", "--pace", "0.1"))
+        client = self.connect(self.start("run", self.image_folder(), "-o", self.out, "--viewer", "0", "--pace", "0.1", "--frames", "20"))
         client.wait_for(lambda c: c.status and c.status["doing"].startswith("calibration"))
         self.assertEqual((client.status["phase"], client.status["frames"]), ("starting", 0))
         self.assertIn("no session yet", client.ask("pause")["error"])
