@@ -11,21 +11,27 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/camera/pixel_angles.h"
 
 namespace waymark {
 namespace {
 
 /// Numbers of at least this size are lengths in pixels: focal lengths and principal points.
 constexpr double kMinPixels = 10.0;
-/// Calibrations are that good, of another day, lens setting or temperature.
-constexpr double kPixelsSigma = 0.002;  // Relative to the length.
+/// Calibrations are that good, of another day, lens setting or temperature, and of images that were
+/// rectified by one (docs/decisions/calibrate.md).
+constexpr double kFocalSigma = 0.001;   // Relative.
+constexpr double kCentreSigma = 0.002;  // Relative to its place in the image.
 constexpr double kAspectSigma = 0.002;  // Pixels are square.
 constexpr double kShapeSigma = 0.005;   // xi, alpha, beta, ...
-constexpr double kRadialSigma = 0.01;
+constexpr double kRadialSigma = 0.02;
 constexpr double kTangentialSigma = 5e-4;
-constexpr double kTurnSigma = 5e-4;  // rad
+constexpr double kTurnSigma = 1e-3;  // rad
 /// A camera that turns and a sensor that shifts look nearly the same; cameras of a rig turn.
 constexpr double kSensorSigma = 0.05;  // px
+/// Of the terms of a BearingError at the side of the image: linear and quadratic.
+constexpr double kLinearErrorSigma = 0.5;     // px
+constexpr double kQuadraticErrorSigma = 1.0;  // px
 /// Models with more numbers are taken as they are.
 constexpr std::size_t kMaxIntrinsics = 27;
 
@@ -40,6 +46,17 @@ constexpr std::array<const char*, 4> kPlaneNames = {"fu", "fv", "pu", "pv"};
 constexpr std::array<const char*, 5> kTurnNames = {
     "turn_x", "turn_y", "turn_z", "baseline_a", "baseline_b"};
 constexpr std::size_t kNumTurns = 3;
+constexpr int kNumErrors = 2 * BearingError::kNumTerms;
+constexpr std::array<const char*, kNumErrors> kErrorNames = {"along_x",
+                                                             "along_y",
+                                                             "along_xx",
+                                                             "along_xy",
+                                                             "along_yy",
+                                                             "across_x",
+                                                             "across_y",
+                                                             "across_xx",
+                                                             "across_xy",
+                                                             "across_yy"};
 
 std::string distortion_name(const CameraDescription& description, std::size_t i) {
   if (description.distortion_model != "radtan") return fmt::format("k{}", i + 1);
@@ -62,7 +79,9 @@ CalibrationParameters::CalibrationParameters(const Rig& given) : given_(given) {
   for (std::size_t c = 0; c < given_.cameras.size(); ++c) {
     blocks_.push_back({list_.size(), 0, false});
     add_intrinsics(c);
-    if (c > 0 && given_.cameras[c].cam_from_rig.translation.norm() > 0.0) add_extrinsics(c);
+    if (c == 0 || !(given_.cameras[c].cam_from_rig.translation.norm() > 0.0)) continue;
+    add_bearing_error(c);
+    add_extrinsics(c);
   }
   const auto count = static_cast<Eigen::Index>(list_.size());
   ties_.setZero(count, count);
@@ -78,16 +97,12 @@ CalibrationParameters::CalibrationParameters(const Rig& given) : given_(given) {
   }
 }
 
-Eigen::MatrixXd CalibrationParameters::prior_information(
-    const Eigen::VectorXd& change, const std::vector<std::uint8_t>& is_free) const {
+Eigen::MatrixXd CalibrationParameters::prior_information(const std::vector<double>& sigmas) const {
   Eigen::MatrixXd information = ties_;
-  for (Eigen::Index i = 0; i < change.size(); ++i) {
-    const CalibrationParameter& parameter = list_[static_cast<std::size_t>(i)];
-    const double sigma = parameter.prior_sigma;
-    const double held = kHeld * parameter.usual_sigma;
-    information(i, i) += is_free[static_cast<std::size_t>(i)] && sigma > 0.0
-                             ? 1.0 / (sigma * sigma + change[i] * change[i])
-                             : 1.0 / (held * held);
+  for (std::size_t i = 0; i < list_.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double sigma = sigmas[i] > 0.0 ? sigmas[i] : kHeld * list_[i].usual_sigma;
+    information(at, at) += 1.0 / (sigma * sigma);
   }
   return information;
 }
@@ -128,17 +143,20 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
   const std::size_t num_shape = intrinsics.size() < 4 ? intrinsics.size() : intrinsics.size() - 4;
   const std::string prefix = fmt::format("cam{}.", camera);
   for (std::size_t i = 0; i < intrinsics.size(); ++i) {
-    const double pixels_sigma = kPixelsSigma * std::max(std::abs(intrinsics[i]), kMinPixels);
+    const double size_px = std::max(std::abs(intrinsics[i]), kMinPixels);
     CalibrationParameter parameter;
     parameter.given = intrinsics[i];
-    parameter.usual_sigma = pixels_sigma;
+    parameter.usual_sigma = kFocalSigma * size_px;
     if (i < num_shape) {
       parameter.name = prefix + fmt::format("shape{}", i + 1);
       parameter.group = CalibrationGroup::kRadial;
       if (std::abs(intrinsics[i]) < kMinPixels) parameter.usual_sigma = kShapeSigma;
     } else {
       parameter.name = prefix + kPlaneNames[i - num_shape];
-      if (i - num_shape >= 2) parameter.group = CalibrationGroup::kCentre;
+      if (i - num_shape >= 2) {
+        parameter.group = CalibrationGroup::kCentre;
+        parameter.usual_sigma = kCentreSigma * size_px;
+      }
     }
     add(std::move(parameter), calibrated.sigmas.intrinsics, i);
   }
@@ -150,6 +168,23 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
          .usual_sigma = is_tangential ? kTangentialSigma : kRadialSigma},
         calibrated.sigmas.distortion_coeffs,
         i);
+  }
+  blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
+}
+
+void CalibrationParameters::add_bearing_error(std::size_t camera) {
+  const Camera& model = *given_.cameras[camera].camera;
+  const double pixel_rad = central_pixel_angle(model);
+  const double side = std::min(0.5 * model.width_px() * pixel_rad, 1.0);
+  for (int i = 0; i < kNumErrors; ++i) {
+    const bool is_linear = i % BearingError::kNumTerms < 2;
+    const double sigma_px =
+        is_linear ? kLinearErrorSigma / side : kQuadraticErrorSigma / (side * side);
+    add({.name = fmt::format("cam{}.{}", camera, kErrorNames[static_cast<std::size_t>(i)]),
+         .group = CalibrationGroup::kBearing,
+         .usual_sigma = sigma_px * pixel_rad},
+        {},
+        0);
   }
   blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
 }
@@ -178,16 +213,22 @@ std::vector<CalibrationSigmas> CalibrationParameters::by_camera(
       return std::vector<double>(first, next);
     };
     CalibrationSigmas& of_camera = by_camera.emplace_back();
-    if (blocks_[c].num_intrinsics > 0) {
+    if (has_projection(c)) {
       const CameraDescription& description = *given_.cameras[c].description;
       of_camera.intrinsics = take(description.intrinsics.size());
       of_camera.distortion_coeffs = take(description.distortion_coeffs.size());
     }
     if (!blocks_[c].has_extrinsics) continue;
+    take(kNumErrors);
     of_camera.rotation_rad = take(kNumTurns);
     of_camera.baseline_direction_rad = take(kTurnNames.size() - kNumTurns);
   }
   return by_camera;
+}
+
+bool CalibrationParameters::has_projection(std::size_t camera) const {
+  const Block& block = blocks_[camera];
+  return block.num_intrinsics > (block.has_extrinsics ? std::size_t{kNumErrors} : 0);
 }
 
 CameraDescription CalibrationParameters::description_at(std::size_t camera,
@@ -204,7 +245,7 @@ std::optional<Rig> CalibrationParameters::rig_at(const Eigen::VectorXd& change) 
   Rig rig = given_;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     RigCamera& camera = rig.cameras[c];
-    if (blocks_[c].num_intrinsics > 0) {
+    if (has_projection(c)) {
       camera.description = description_at(c, change);
       try {
         camera.camera = camera.remake(*camera.description);
@@ -213,9 +254,11 @@ std::optional<Rig> CalibrationParameters::rig_at(const Eigen::VectorXd& change) 
       }
     }
     if (blocks_[c].has_extrinsics) {
-      const std::size_t first = blocks_[c].first + blocks_[c].num_intrinsics;
-      camera.cam_from_rig =
-          turned(camera.cam_from_rig, change.segment<5>(static_cast<Eigen::Index>(first)));
+      const auto first = static_cast<Eigen::Index>(blocks_[c].first + blocks_[c].num_intrinsics);
+      camera.cam_from_rig = turned(camera.cam_from_rig, change.segment<5>(first));
+      constexpr int kNumTerms = BearingError::kNumTerms;
+      camera.bearing_error.along_rad += change.segment<kNumTerms>(first - kNumErrors);
+      camera.bearing_error.across_rad += change.segment<kNumTerms>(first - kNumTerms);
     }
   }
   return rig;
@@ -236,7 +279,8 @@ std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
         .remake(description_at(camera, stepped))
         ->project(bearings, pixels, is_visible);
   };
-  for (std::size_t p = 0; p < block.num_intrinsics; ++p) {
+  const std::size_t num_terms = block.has_extrinsics ? std::size_t{kNumErrors} : 0;
+  for (std::size_t p = 0; p + num_terms < block.num_intrinsics; ++p) {
     const std::size_t parameter = block.first + p;
     const double step = kStep * list_[parameter].usual_sigma;
     try {
@@ -251,7 +295,41 @@ std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
       Eigen::Map<Eigen::Vector2d>{derivative} = (above[i] - below[i]) / (2.0 * step);
     }
   }
+  if (block.has_extrinsics) differentiate_by_bearing_error(camera, bearings, derivatives);
   return derivatives;
+}
+
+void CalibrationParameters::differentiate_by_bearing_error(
+    std::size_t camera,
+    std::span<const Eigen::Vector3d> bearings,
+    std::vector<double>& derivatives) const {
+  constexpr int kNumTerms = BearingError::kNumTerms;
+  const auto by_angles = pixel_by_epipolar_angles(given_.cameras[camera], bearings);
+  const std::size_t num_intrinsics = blocks_[camera].num_intrinsics;
+  for (std::size_t i = 0; i < bearings.size(); ++i) {
+    const BearingError::Terms terms = BearingError::terms(bearings[i]);
+    double* const first = derivatives.data() + 2 * (num_intrinsics * (i + 1) - kNumErrors);
+    Eigen::Map<Eigen::Matrix<double, 2, kNumErrors>> by_errors(first);
+    by_errors.leftCols<kNumTerms>() = by_angles[i].col(0) * terms.transpose();
+    by_errors.rightCols<kNumTerms>() = by_angles[i].col(1) * terms.transpose();
+  }
+}
+
+std::vector<Eigen::Matrix2d> pixel_by_epipolar_angles(const RigCamera& camera,
+                                                      std::span<const Eigen::Vector3d> bearings) {
+  std::vector<Eigen::Vector2d> pixels(bearings.size());
+  std::vector<Matrix23d> jacobians(bearings.size());
+  std::vector<std::uint8_t> is_visible(bearings.size());
+  camera.camera->project_with_jacobian(bearings, pixels, jacobians, is_visible);
+  const Eigen::Vector3d baseline = camera.cam_from_rig.translation.normalized();
+  std::vector<Eigen::Matrix2d> by_angles(bearings.size(), Eigen::Matrix2d::Zero());
+  for (std::size_t i = 0; i < bearings.size(); ++i) {
+    const Eigen::Vector3d toward = baseline - baseline.dot(bearings[i]) * bearings[i];
+    if (!is_visible[i] || !(toward.norm() > 0.0)) continue;
+    const Eigen::Vector3d along = toward.normalized();
+    by_angles[i] << jacobians[i] * along, jacobians[i] * bearings[i].cross(along);
+  }
+  return by_angles;
 }
 
 std::optional<CameraChain> chain_of(const Rig& rig,

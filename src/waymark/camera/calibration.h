@@ -32,6 +32,7 @@ enum class CalibrationGroup {
   kCentre,      ///< The principal point.
   kRadial,      ///< Distortion along the radius, and the shape of wide models.
   kTangential,  ///< Distortion across it.
+  kBearing,     ///< What the bearings of a pair are off by.
   kExtrinsics,  ///< Turns of a camera and of its baseline.
 };
 
@@ -58,16 +59,18 @@ struct CalibrationEstimate {
 };
 
 /// The numbers of a rig as one vector: per camera the intrinsics and the distortion; of each camera
-/// but the first then its turn about its own centre (3, rad) and that of the baseline across itself
-/// (2, rad), whose length is the unit of all lengths and cannot be told. Cameras that cannot be
-/// made anew (RigCamera::remake) and those of 360 degree images have only the latter.
+/// but the first then its BearingError (10, rad), its turn about its own centre (3, rad) and that
+/// of the baseline across itself (2, rad), whose length is the unit of all lengths and cannot be
+/// told. Cameras that cannot be made anew (RigCamera::remake) and those of 360 degree images have
+/// only the latter three.
 class CalibrationParameters {
  public:
   /// Where the parameters of a camera are.
   struct Block {
-    std::size_t first = 0;           ///< Its index in list().
-    std::size_t num_intrinsics = 0;  ///< Of the projection, distortion included.
-    bool has_extrinsics = false;     ///< Whether five more follow.
+    std::size_t first = 0;  ///< Its index in list().
+    /// Of the projection, with distortion and bearing error.
+    std::size_t num_intrinsics = 0;
+    bool has_extrinsics = false;  ///< Whether five more follow.
     /// How many there are.
     std::size_t size() const { return num_intrinsics + (has_extrinsics ? 5 : 0); }
   };
@@ -82,12 +85,9 @@ class CalibrationParameters {
   std::size_t size() const { return list_.size(); }
   /// Per camera.
   const std::vector<Block>& blocks() const { return blocks_; }
-  /// Inverse covariance of the change from what was given, as it counts for a change of about this:
-  /// calibrations are good, or wrong by anything, so that the prior has the tails of Cauchy's
-  /// distribution, by reweighting.
-  /// is_free: per parameter; those that are not are held as given, as are exact ones.
-  Eigen::MatrixXd prior_information(const Eigen::VectorXd& change,
-                                    const std::vector<std::uint8_t>& is_free) const;
+  /// Inverse covariance of the change from what was given, for these standard deviations of each
+  /// parameter; those with 0 are held.
+  Eigen::MatrixXd prior_information(const std::vector<double>& sigmas) const;
 
   /// Standard deviations in the order of list(), per camera as its calibration carries them.
   std::vector<CalibrationSigmas> by_camera(const std::vector<double>& sigmas) const;
@@ -108,9 +108,14 @@ class CalibrationParameters {
  private:
   void add(CalibrationParameter parameter, const std::vector<double>& sigmas, std::size_t i);
   void add_intrinsics(std::size_t camera);
+  void add_bearing_error(std::size_t camera);
   void add_extrinsics(std::size_t camera);
+  void differentiate_by_bearing_error(std::size_t camera,
+                                      std::span<const Eigen::Vector3d> bearings,
+                                      std::vector<double>& derivatives) const;
   std::vector<std::size_t> find(std::string_view ending) const;
   void tie(std::size_t a, std::size_t b, double ratio, double sigma);
+  bool has_projection(std::size_t camera) const;
   CameraDescription description_at(std::size_t camera, const Eigen::VectorXd& change) const;
 
   Rig given_;
@@ -123,6 +128,11 @@ class CalibrationParameters {
 /// of the rig, which is measured with them; empty: it is as sure as it says. Nothing where a camera
 /// has no description.
 std::optional<CameraChain> chain_of(const Rig& rig, std::span<const CalibrationEstimate> estimates);
+
+/// Derivatives of the pixels of unit bearings by angles along the epipolar lines of camera 0,
+/// towards near points, and across them, px per rad; zero where a bearing does not project.
+std::vector<Eigen::Matrix2d> pixel_by_epipolar_angles(const RigCamera& camera,
+                                                      std::span<const Eigen::Vector3d> bearings);
 
 /// Two unit vectors across a baseline, as columns: the directions in which it may turn.
 Eigen::Matrix<double, 3, 2> across_baseline(const Eigen::Vector3d& baseline);

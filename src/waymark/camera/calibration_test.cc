@@ -40,10 +40,11 @@ TEST(CalibrationParameters, AreThoseOfTheModelAndTheRig) {
   const Rig rig = rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0}), 2);
   const CalibrationParameters parameters(rig);
   const std::vector<std::string> names = names_of(parameters);
-  ASSERT_EQ(names.size(), std::size_t{2 * 8 + 5});
+  ASSERT_EQ(names.size(), std::size_t{2 * 8 + 10 + 5});
   EXPECT_EQ(names.front(), "cam0.fu");
   EXPECT_EQ(names[4], "cam0.k1") << "an undistorted camera may turn out to be distorted";
-  EXPECT_EQ(names[16], "cam1.turn_x");
+  EXPECT_EQ(names[16], "cam1.along_x");
+  EXPECT_EQ(names[26], "cam1.turn_x");
   EXPECT_EQ(names_of(CalibrationParameters(
                 rig_of(described("ds", {-0.2, 0.6, 300.0, 300.0, 320.0, 240.0})))),
             (std::vector<std::string>{
@@ -62,8 +63,9 @@ TEST(CalibrationParameters, ChangeTheRig) {
   Eigen::VectorXd change = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
   change[0] = 10.0;
   change[4] = -0.1;
-  change[17] = 2e-3;  // cam1.turn_y
-  change[19] = 1e-3;
+  change[18] = 3e-3;  // cam1.along_xx
+  change[27] = 2e-3;  // cam1.turn_y
+  change[29] = 1e-3;
   const std::optional<Rig> changed = parameters.rig_at(change);
   ASSERT_TRUE(changed.has_value());
   EXPECT_EQ(changed->cameras[0].description->intrinsics[0], 410.0);
@@ -71,6 +73,7 @@ TEST(CalibrationParameters, ChangeTheRig) {
   const Rigid3& turned = changed->cameras[1].cam_from_rig;
   EXPECT_NEAR(so3_log(turned.rotation).y(), 2e-3, 1e-12);
   EXPECT_NEAR(turned.translation.norm(), 0.1, 1e-12) << "the baseline keeps its length";
+  EXPECT_EQ(changed->cameras[1].bearing_error.along_rad[2], 3e-3);
   change[0] = -500.0;
   EXPECT_FALSE(parameters.rig_at(change).has_value()) << "there is no such camera";
 }
@@ -107,29 +110,50 @@ TEST(CalibrationParameters, AreAsSureAsTheCalibrationSays) {
   for (const CalibrationParameter& each : parameters.list()) sigmas.push_back(each.prior_sigma);
   EXPECT_EQ(sigmas[0], 0.1);
   EXPECT_EQ(sigmas[2], 0.0);
-  EXPECT_EQ(sigmas[4], 0.01) << "nothing is said of distortion";
-  EXPECT_EQ(sigmas[16], 5e-4) << "nor of the turn";
-  EXPECT_EQ(sigmas[20], 0.02);
+  EXPECT_EQ(sigmas[4], 0.02) << "nothing is said of distortion";
+  EXPECT_EQ(sigmas[26], 1e-3) << "nor of the turn";
+  EXPECT_EQ(sigmas[30], 0.02);
   const std::vector<CalibrationSigmas> again = parameters.by_camera(sigmas);
   EXPECT_EQ(again[0].intrinsics, chain.cameras[0].sigmas.intrinsics);
   EXPECT_EQ(again[1].distortion_coeffs.size(), 4u);
-  EXPECT_EQ(again[1].rotation_rad, (std::vector<double>{5e-4, 5e-4, 5e-4}));
+  EXPECT_EQ(again[1].rotation_rad, (std::vector<double>{1e-3, 1e-3, 1e-3}));
   EXPECT_EQ(again[1].baseline_direction_rad, chain.cameras[1].sigmas.baseline_direction_rad);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(21);
-  const std::vector<std::uint8_t> all_free(21, 1);
-  EXPECT_GT(parameters.prior_information(zero, all_free)(2, 2), 1e6) << "it is exact";
+  EXPECT_GT(parameters.prior_information(sigmas)(2, 2), 1e6) << "it is exact";
 }
 
-TEST(CalibrationParameters, AreHeldLessTheFurtherTheyAreOff) {
+TEST(CalibrationParameters, DifferentiateByErrorsOfBearings) {
+  const Rig rig = rig_of(described("pinhole", {400.0, 410.0, 320.0, 240.0}), 2);
+  const CalibrationParameters parameters(rig);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
+  const std::vector<Eigen::Vector3d> bearings = {Eigen::Vector3d(0.3, -0.2, 1.0).normalized()};
+  const auto derivatives = parameters.pixel_by_intrinsics(1, zero, bearings);
+  ASSERT_TRUE(derivatives.has_value());
+  ASSERT_EQ(derivatives->size(), std::size_t{2 * 18});
+  // The epipolar line of a parallel pair is a row; near points are further to the left.
+  const Eigen::Vector3d& bearing = bearings[0];
+  const double x = bearing.x();
+  EXPECT_LT((*derivatives)[16], 0.0) << "u by along_x";
+  EXPECT_NEAR((*derivatives)[17], 0.0, 1e-9) << "v by along_x";
+  EXPECT_NEAR((*derivatives)[20] / (*derivatives)[16], x, 1e-9) << "along_xx by along_x";
+  BearingError error;
+  error.along_rad[0] = 1e-6;
+  const Eigen::Vector3d toward = (-Eigen::Vector3d::UnitX() + x * bearing).normalized();
+  const std::vector<Eigen::Vector3d> off = {bearing + error.at(bearing)[0] * toward};
+  std::vector<Eigen::Vector2d> before(1), after(1);
+  std::vector<std::uint8_t> is_visible(1);
+  rig.cameras[1].camera->project(bearings, before, is_visible);
+  rig.cameras[1].camera->project(off, after, is_visible);
+  EXPECT_NEAR((*derivatives)[16], (after[0] - before[0]).x() / 1e-6, 1e-2);
+}
+
+TEST(CalibrationParameters, AreHeldByAStandardDeviationOfZero) {
   const CalibrationParameters parameters(
       rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0})));
-  Eigen::VectorXd change = Eigen::VectorXd::Zero(8);
-  const std::vector<std::uint8_t> is_free(8, 1);
-  const double near = parameters.prior_information(change, is_free)(4, 4);
-  change[4] = 10.0 * parameters.list()[4].prior_sigma;
-  EXPECT_NEAR(parameters.prior_information(change, is_free)(4, 4), near / 101.0, 1e-9 * near);
-  const std::vector<std::uint8_t> none_free(8, 0);
-  EXPECT_GT(parameters.prior_information(change, none_free)(4, 4), 1e6 * near);
+  std::vector<double> sigmas(8, 0.1);
+  const double near = parameters.prior_information(sigmas)(4, 4);
+  EXPECT_NEAR(near, 100.0, 1e-9);
+  sigmas[4] = 0.0;
+  EXPECT_GT(parameters.prior_information(sigmas)(4, 4), 1e6 * near);
 }
 
 }  // namespace

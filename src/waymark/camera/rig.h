@@ -14,6 +14,7 @@
 #include <optional>
 #include <vector>
 
+#include "waymark/camera/bearing_error.h"
 #include "waymark/camera/camera.h"
 #include "waymark/geometry/rigid3.h"
 
@@ -45,6 +46,8 @@ struct RigCamera {
   double readout_s = 0.0;
   /// How sure the calibration is.
   CalibrationSigmas sigmas = {};
+  /// Of the second camera of a stereo pair: what is taken out of its bearings.
+  BearingError bearing_error = {};
 };
 
 /// 1..N cameras that move as one body. Mono and RGB-D have 1, stereo has 2.

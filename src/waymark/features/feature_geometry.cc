@@ -105,13 +105,15 @@ Eigen::Vector3d edge_normal_in_cam(const Features& features, std::size_t feature
 void measure_stereo_ranges(const Rig& rig, Features& features) {
   constexpr double kFarAway = 1e9;  // In metres: as good as infinite.
   const Rigid3 cam1_from_cam0 = rig.cameras[1].cam_from_rig * rig.cameras[0].cam_from_rig.inverse();
+  const BearingError& error = rig.cameras[1].bearing_error;
   for (std::size_t i = 0; i < features.num_primary; ++i) {
     const std::uint32_t partner = features.partner[i];
     if (partner == kNoFeature) continue;
     features.range_m[i] = features.inverse_range_sigma[i] = 0.0f;
     const EpipolarRay ray(cam1_from_cam0, features.bearings[i].cast<double>().normalized());
     const Eigen::Vector3d seen = features.bearings[partner].cast<double>();
-    const double angle_rad = std::atan2(seen.dot(ray.toward), seen.dot(ray.infinity));
+    const double angle_rad =
+        std::atan2(seen.dot(ray.toward), seen.dot(ray.infinity)) - error.at(seen)[0];
     const double off_rad = kStereoSigmaPx * features.size_rad[partner];
     const double inverse_range = ray.inverse_range(angle_rad);
     const double sigma =

@@ -8,30 +8,34 @@
 #include <memory>
 #include <utility>
 
+#include "waymark/mapping/calibration_choice.h"
 #include "waymark/mapping/camera_measurements.h"
 #include "waymark/solver/residual.h"
 
 namespace waymark {
 namespace {
 
-/// The intrinsics act linearly in an adjustment: it is repeated until they move no more.
-constexpr int kMaxPasses = 15;
-/// An estimate so many standard deviations from what was given is no chance: of exact calibrations
-/// the estimates scatter by 1.5, and the worst of twenty parameters by up to 5
-/// (docs/decisions/calibrate.md).
-constexpr double kMinSigmas = 7.0;
+/// An adjustment is linear in the intrinsics: it is repeated until they move no more.
+constexpr int kMaxPasses = 5;
+/// What was given is replaced by what makes parts of the way that it was not fitted to likelier by
+/// so many nats, and their squared residuals smaller by this share: what gains less is as well
+/// explained by errors of matching (docs/decisions/calibrate.md).
+constexpr double kMinGain = 10.0;
+constexpr double kMinShare = 0.01;
+/// What was found before, by what is likelier by two standard deviations.
+constexpr double kLeastGain = 2.0;
 /// Parts of a way with fewer keyframes share most of what they see, err alike, and scatter by less
 /// than they err, in the ratio of the numbers.
 constexpr double kManyKeyframes = 30.0;
-/// A calibration is replaced by one that differs by this many.
-constexpr double kMinChange = 2.0;
 /// Where the parts of the way contradict each other by this much more than corners scatter, what is
-/// wrong is not the calibration: a rolling shutter, a stabilised video.
-constexpr double kMaxDisagreement = 6.0;
-/// By less than this part of its standard deviation.
-constexpr double kStill = 0.1;
-/// What is below this part of what is asked for, and moves by less than is left, will stay there.
-constexpr double kPlainly = 0.5;
+/// wrong is not the calibration: a rolling shutter (5.5), a constant offset of inverse depths (5),
+/// a stabilised video. Where it is, they do by up to 3.6.
+constexpr double kMaxDisagreement = 4.0;
+/// Before parts can be compared, errors that last are taken to make the variance of residuals
+/// larger by this factor.
+constexpr double kLastingErrors = 5.0;
+/// A step that gains fewer nats is none.
+constexpr double kStill = 0.5;
 /// More tell hardly more, and take longer.
 constexpr std::size_t kMaxObservations = 12000;
 
@@ -62,141 +66,104 @@ bool add_derivatives(const CalibrationParameters& parameters,
 struct Trial {
   std::shared_ptr<const Rig> rig;
   Eigen::VectorXd change;
-  Eigen::VectorXd sigma;
   /// Of a residual's component, in px^2, by what the parts of the way disagree: more than its
   /// noise, since errors that last count only once.
   double variance = 1.0;
-  double noise_px = 1.0;  ///< Of a residual's component.
+  double noise = 1.0;  ///< The same without the parts, px^2.
 };
 
-/// Standard deviations from what an adjustment with this prior told, and the variance of residuals
-/// that they follow from.
-void judge(const CalibrationEvidence& evidence,
-           const Eigen::MatrixXd& prior_information,
-           Trial& trial) {
-  const Eigen::MatrixXd covariance = evidence.information.ldlt().solve(
-      Eigen::MatrixXd::Identity(evidence.information.rows(), evidence.information.cols()));
-  const Eigen::MatrixXd of_residuals = evidence.information - trial.variance * prior_information;
-  const Eigen::MatrixXd sandwich =
-      covariance * (evidence.scatter + trial.variance * trial.variance * prior_information) *
-      covariance;
-  const Eigen::VectorXd plain = trial.variance * covariance.diagonal();
-  trial.sigma = plain.cwiseMax(sandwich.diagonal()).cwiseSqrt();
-  const double expected = (covariance * of_residuals).trace();
-  const double seen = (covariance * evidence.scatter).trace();
-  const double least = trial.noise_px * trial.noise_px;
-  trial.variance = expected > 0.0 ? std::max(seen / expected, least) : least;
-}
-
-/// One adjustment from the calibration reached; whether there is one.
-bool adjust_once(const CalibrationParameters& parameters,
-                 const std::vector<CameraMeasurements>& cameras,
-                 const std::vector<std::uint8_t>& is_free,
-                 BundleProblem& problem,
-                 Trial& trial) {
+/// The calibration reached as unknowns; nothing where there is no such camera. prior_information:
+/// empty: they are measured, and do not move.
+std::optional<BundleCalibration> unknowns(const CalibrationParameters& parameters,
+                                          const std::vector<CameraMeasurements>& cameras,
+                                          const Eigen::MatrixXd& prior_information,
+                                          const Trial& trial,
+                                          BundleProblem& problem) {
   BundleCalibration calibration;
   calibration.rig = trial.rig.get();
   calibration.blocks = parameters.blocks();
   calibration.first_derivative.assign(problem.observations.size(), 0);
-  for (std::size_t c = 0; c < cameras.size(); ++c) {
-    const RigCamera& camera = trial.rig->cameras[c];
-    const auto directions = predict(cameras[c], camera.cam_from_rig, problem);
-    linearize(cameras[c], *camera.camera, directions, problem);
-    if (!add_derivatives(parameters, c, trial.change, cameras[c], directions, calibration)) {
-      return false;
-    }
-  }
-  const Eigen::MatrixXd prior = parameters.prior_information(trial.change, is_free);
-  calibration.prior_information = trial.variance * prior;
   calibration.prior_change = -trial.change;
   calibration.change.setZero(trial.change.size());
   calibration.has_depths = true;
-  problem.calibration = std::move(calibration);
-  const BundleResult result =
-      adjust_bundle(problem, {.num_rounds = 2, .max_iterations_per_round = 2});
-  const BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
-  Eigen::VectorXd change = trial.change + found.change;
+  calibration.prior_information = trial.variance * prior_information;
+  if (prior_information.size() == 0) {
+    // Any that keeps the equations solvable.
+    std::vector<double> sigmas;
+    for (const CalibrationParameter& one : parameters.list()) sigmas.push_back(one.usual_sigma);
+    calibration.prior_information = parameters.prior_information(sigmas);
+  }
+  for (std::size_t c = 0; c < cameras.size(); ++c) {
+    const RigCamera& camera = trial.rig->cameras[c];
+    const auto directions = predict(cameras[c], camera.cam_from_rig, problem);
+    linearize(cameras[c], camera, directions, problem);
+    if (!add_derivatives(parameters, c, trial.change, cameras[c], directions, calibration)) {
+      return std::nullopt;
+    }
+  }
+  return calibration;
+}
+
+/// Moves a trial by what an adjustment found; whether there is such a camera.
+bool move(const CalibrationParameters& parameters,
+          const Eigen::VectorXd& step,
+          BundleProblem& problem,
+          Trial& trial) {
+  Eigen::VectorXd change = trial.change + step;
   for (std::size_t i = 0; i < parameters.size(); ++i) {
     if (parameters.list()[i].prior_sigma == 0.0) change[static_cast<Eigen::Index>(i)] = 0.0;
   }
   const std::optional<Rig> rig = parameters.rig_at(change);
-  if (!rig || found.evidence.information.size() == 0) return false;
+  if (!rig) return false;
   auto next = std::make_shared<const Rig>(*rig);
   use_rig(*trial.rig, *next, problem);
   trial.rig = std::move(next);
   trial.change = std::move(change);
-  trial.noise_px = result.noise_px;
-  judge(found.evidence, prior, trial);
   return true;
 }
 
-/// Adjusts until the calibration moves no more, or until it is plain that no change comes near to
-/// so many standard deviations; whether there is one.
-bool adjust(const CalibrationParameters& parameters,
-            const std::vector<CameraMeasurements>& cameras,
-            const std::vector<std::uint8_t>& is_free,
-            double min_sigmas,
-            BundleProblem& problem,
-            Trial& trial) {
-  for (int pass = 0; pass < kMaxPasses; ++pass) {
-    const Eigen::VectorXd before = trial.change;
-    if (!adjust_once(parameters, cameras, is_free, problem, trial)) return false;
-    const Eigen::ArrayXd moved = (trial.change - before).array().abs() / trial.sigma.array();
-    if (moved.maxCoeff() < kStill) break;
-    // The first pass knows nothing of the noise yet.
-    const Eigen::ArrayXd changed = trial.change.array().abs() / trial.sigma.array();
-    if (pass > 0 && (changed + moved).maxCoeff() < kPlainly * min_sigmas) break;
-  }
-  return trial.variance < std::pow(kMaxDisagreement * trial.noise_px, 2);
+/// Adjusts from the calibration reached, with a prior; without one measures only. What the images
+/// tell then, if anything.
+std::optional<CalibrationCost> adjust(const CalibrationParameters& parameters,
+                                      const std::vector<CameraMeasurements>& cameras,
+                                      const Eigen::MatrixXd& prior_information,
+                                      BundleProblem& problem,
+                                      Trial& trial) {
+  problem.calibration = unknowns(parameters, cameras, prior_information, trial, problem);
+  if (!problem.calibration) return std::nullopt;
+  const int num_steps = prior_information.size() == 0 ? 0 : 2;
+  const BundleResult result = adjust_bundle(
+      problem, {.num_rounds = num_steps == 0 ? 1 : 2, .max_iterations_per_round = num_steps});
+  BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
+  if (found.evidence.is_empty()) return std::nullopt;
+  if (num_steps > 0 && !move(parameters, found.change, problem, trial)) return std::nullopt;
+  trial.noise = result.noise_px * result.noise_px;
+  return CalibrationCost{trial.change, std::move(found.evidence), trial.variance};
 }
 
-/// What is looked at unless all is asked for. Centres and tangential distortion take up errors of
-/// other kinds, such as those of a rolling shutter; a centre that is off can hardly be told from a
-/// turn, and calibrations hardly err in it.
-std::vector<std::uint8_t> likely_wrong(const std::vector<CalibrationParameter>& parameters) {
-  std::vector<std::uint8_t> is_free;
-  for (const CalibrationParameter& parameter : parameters) {
-    is_free.push_back(parameter.group != CalibrationGroup::kCentre &&
-                      parameter.group != CalibrationGroup::kTangential);
-  }
-  return is_free;
+/// What images and the likeliest prior tell, where residuals have this variance. Parts of few
+/// keyframes err alike.
+CalibrationPosterior posterior_with(double variance,
+                                    const CalibrationParameters& parameters,
+                                    const KnownCalibration& known,
+                                    std::size_t num_keyframes,
+                                    CalibrationCost& cost) {
+  const double few = std::max(1.0, kManyKeyframes / static_cast<double>(num_keyframes));
+  cost.variance = few * few * variance;
+  return choose_prior(parameters, cost, known.is_always_refined);
 }
 
-/// Of these the groups in which an estimate contradicts what was given. The distortion of other
-/// cameras and where they stand is told by two images of one moment, and hard to tell apart: all or
-/// none of that.
-std::vector<std::uint8_t> contradicted(const std::vector<CalibrationParameter>& parameters,
-                                       const Trial& trial,
-                                       double min_sigmas,
-                                       const std::vector<std::uint8_t>& is_free) {
-  std::vector<CalibrationGroup> groups;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const auto at = static_cast<Eigen::Index>(i);
-    if (is_free[i] && std::abs(trial.change[at]) > min_sigmas * trial.sigma[at]) {
-      groups.push_back(parameters[i].group);
-    }
+/// Whether what was found is to replace what is in use. What was given is asked more for than what
+/// has replaced it already.
+bool is_better(const CalibrationCost& cost,
+               const CalibrationPosterior& found,
+               const KnownCalibration& known,
+               double squared_residuals) {
+  if (known.is_always_refined || known.is_changed()) {
+    return gain(cost, found, known.change) > kLeastGain;
   }
-  std::vector<std::uint8_t> is_contradicted;
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const CalibrationParameter& parameter = parameters[i];
-    const bool is_of_pair =
-        !parameter.name.starts_with("cam0.") && parameter.group != CalibrationGroup::kFocalLength;
-    const bool is_in_group = std::ranges::find(groups, parameter.group) != groups.end();
-    is_contradicted.push_back(is_free[i] && !groups.empty() && (is_of_pair || is_in_group));
-  }
-  return is_contradicted;
-}
-
-/// The largest change of a free parameter, in standard deviations.
-double largest_change(const Trial& trial,
-                      const KnownCalibration& known,
-                      const std::vector<std::uint8_t>& is_free) {
-  double largest = 0.0;
-  for (Eigen::Index i = 0; i < trial.change.size(); ++i) {
-    if (!is_free[static_cast<std::size_t>(i)]) continue;
-    largest = std::max(largest, std::abs(trial.change[i] - known.change[i]) / trial.sigma[i]);
-  }
-  return largest;
+  const double predicted = predicted_gain(cost, found, known.change);
+  return predicted > kMinGain && predicted * cost.variance > kMinShare * squared_residuals;
 }
 
 /// A part of the points with all of their observations: what tells a calibration does so soon.
@@ -237,6 +204,54 @@ CalibrationSample sample(const Map& map,
     add(observation, {observed[i].keyframe, partner});
   }
   return sample;
+}
+
+/// What was known, with what a trial found.
+KnownCalibration with_found(const KnownCalibration& known,
+                            const CalibrationPosterior& found,
+                            Trial trial) {
+  KnownCalibration next = known;
+  next.rig = std::move(trial.rig);
+  next.change = std::move(trial.change);
+  for (std::size_t i = 0; i < known.parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    next.sigma[at] =
+        found.prior_sigmas[i] > 0.0 ? found.sigma[at] : known.parameters[i].prior_sigma;
+  }
+  return next;
+}
+
+/// Adjusts a sample until the calibration moves no more; nothing as soon as it is plain that what
+/// is in use stays. trial: in use, and what was found.
+std::optional<CalibrationPosterior> adjust_until_still(
+    const CalibrationParameters& parameters,
+    const std::vector<CameraMeasurements>& cameras,
+    const KnownCalibration& known,
+    BundleProblem& problem,
+    Trial& trial) {
+  const std::size_t num_keyframes = problem.rig_from_world.size();
+  const auto num_observations = static_cast<double>(problem.observations.size());
+  auto cost = adjust(parameters, cameras, {}, problem, trial);
+  if (!cost) return std::nullopt;
+  CalibrationPosterior found =
+      posterior_with(kLastingErrors * trial.noise, parameters, known, num_keyframes, *cost);
+  if (gain(*cost, found, known.change) < kLeastGain) return std::nullopt;
+  // What is wrong by much is found from the widest prior, and judged then.
+  found.prior_information = widest_prior(parameters, known.is_always_refined);
+  trial.variance = cost->variance;
+  for (int pass = 0; pass < kMaxPasses; ++pass) {
+    cost = adjust(parameters, cameras, found.prior_information, problem, trial);
+    if (!cost) return std::nullopt;
+    found = posterior_with(trial.variance, parameters, known, num_keyframes, *cost);
+    trial.variance = std::max(variance_between_parts(*cost, found), trial.noise);
+    found = posterior_with(trial.variance, parameters, known, num_keyframes, *cost);
+    if (trial.variance > kMaxDisagreement * kMaxDisagreement * trial.noise ||
+        !is_better(*cost, found, known, trial.noise * num_observations)) {
+      return std::nullopt;
+    }
+    if (gain(*cost, found, trial.change) < kStill) break;
+  }
+  return found;
 }
 
 }  // namespace
@@ -292,37 +307,13 @@ std::optional<KnownCalibration> recalibrate(const Map& map,
   if (parameters.size() == 0) return std::nullopt;
   CalibrationSample part = sample(map, *known.rig, problem, observed);
   const auto cameras = collect(map, part.observed, *known.rig, part.problem);
-  const Trial start{known.rig, known.change, known.sigma};
-  std::vector<std::uint8_t> is_free = known.is_always_refined
-                                          ? std::vector<std::uint8_t>(parameters.size(), 1)
-                                          : likely_wrong(known.parameters);
-  const auto num_keyframes = static_cast<double>(part.problem.rig_from_world.size());
-  const double inflation = std::max(1.0, kManyKeyframes / num_keyframes);
-  Trial trial = start;
-  BundleProblem adjusted = part.problem;
-  const double min_sigmas = known.is_always_refined ? 0.0 : kMinSigmas * inflation;
-  if (!adjust(parameters, cameras, is_free, min_sigmas, adjusted, trial)) return std::nullopt;
-  // What the images do not tell stays as given, or it would take up errors of other kinds.
-  if (!known.is_always_refined) {
-    is_free = contradicted(known.parameters, trial, min_sigmas, is_free);
-    if (std::ranges::count(is_free, 1) == 0) return std::nullopt;
-    adjusted = part.problem;
-    trial = start;
-    if (!adjust(parameters, cameras, is_free, 0.0, adjusted, trial)) return std::nullopt;
-  }
-  if (largest_change(trial, known, is_free) < kMinChange) return std::nullopt;
-  problem.rig_from_world = adjusted.rig_from_world;
-  problem.points = adjusted.points;
+  Trial trial{known.rig, known.change};
+  const auto found = adjust_until_still(parameters, cameras, known, part.problem, trial);
+  if (!found) return std::nullopt;
+  problem.rig_from_world = part.problem.rig_from_world;
+  problem.points = part.problem.points;
   recompute(map, observed, *known.rig, trial.rig, problem);
-  KnownCalibration found = known;
-  found.rig = std::move(trial.rig);
-  found.change = std::move(trial.change);
-  for (std::size_t i = 0; i < parameters.size(); ++i) {
-    const bool is_estimated = is_free[i] && parameters.list()[i].prior_sigma > 0.0;
-    const auto at = static_cast<Eigen::Index>(i);
-    found.sigma[at] = is_estimated ? inflation * trial.sigma[at] : parameters.list()[i].prior_sigma;
-  }
-  return found;
+  return with_found(known, *found, std::move(trial));
 }
 
 }  // namespace waymark

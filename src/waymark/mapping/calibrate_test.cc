@@ -77,6 +77,16 @@ TEST_F(CalibrateTest, FindsTheTurnOfTheSecondCamera) {
   EXPECT_LT(std::abs(error_in_sigmas(found, "cam1.turn_y", 2e-3)), 3.0);
 }
 
+TEST_F(CalibrateTest, FindsWhatTheBearingsOfAPairAreOffBy) {
+  const auto truth = make_described(2, make_test_pinhole(420.0));
+  Rig told = *truth;
+  told.cameras[1].bearing_error.along_rad[2] = 5e-3;
+  told.cameras[1].bearing_error.across_rad[3] = -8e-3;
+  const GlobalAdjustment found = adjust(truth, std::make_shared<const Rig>(told));
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam1.along_xx", -5e-3)), 3.0);
+  EXPECT_LT(std::abs(error_in_sigmas(found, "cam1.across_xy", 8e-3)), 3.0);
+}
+
 TEST_F(CalibrateTest, LeavesWhatIsExact) {
   const auto truth = make_described(1, make_test_pinhole(420.0, {-0.2, 0.03, 0.0, 0.0}));
   Rig told = *make_described(1, make_test_pinhole(420.0));

@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 
+#include "waymark/camera/calibration.h"
 #include "waymark/camera/tangent.h"
 #include "waymark/features/feature_geometry.h"
 #include "waymark/features/pyramid.h"
@@ -55,14 +56,20 @@ std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
 }
 
 void linearize(const CameraMeasurements& measured,
-               const Camera& camera,
+               const RigCamera& calibrated,
                const std::vector<Eigen::Vector3d>& directions,
                BundleProblem& problem) {
+  const Camera& camera = *calibrated.camera;
   const std::size_t count = directions.size();
   std::vector<Eigen::Vector2d> pixels(count);
   std::vector<Matrix23d> jacobians(count);
   std::vector<std::uint8_t> is_visible(count);
   camera.project_with_jacobian(directions, pixels, jacobians, is_visible);
+  const BearingError& error = calibrated.bearing_error;
+  if (!error.along_rad.isZero(0.0) || !error.across_rad.isZero(0.0)) {
+    const auto by_angles = pixel_by_epipolar_angles(calibrated, directions);
+    for (std::size_t k = 0; k < count; ++k) pixels[k] += by_angles[k] * error.at(directions[k]);
+  }
   for (std::size_t k = 0; k < count; ++k) {
     BundleObservation& observation = problem.observations[measured.indices[k]];
     const Eigen::Vector3d& direction = directions[k];

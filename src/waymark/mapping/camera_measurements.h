@@ -41,7 +41,7 @@ std::vector<Eigen::Vector3d> predict(const CameraMeasurements& measured,
 /// one that is as far from the prediction, in the plane that touches the sphere there, as the
 /// pixels are. What cannot be told so counts as an outlier. directions: of predict().
 void linearize(const CameraMeasurements& measured,
-               const Camera& camera,
+               const RigCamera& camera,
                const std::vector<Eigen::Vector3d>& directions,
                BundleProblem& problem);
 

@@ -70,6 +70,7 @@ std::optional<LinearCalibration> adjust_offset(const KnownCalibration& known,
                            .given = one(known.given_depth_offset),
                            .prior_sigma = one(kDepthOffsetPrior),
                            .value = one(known.rig->inverse_depth_offset)};
+  if (!may_be_contradicted(*known.rig, problem, offset, kMinOffsetSigmas)) return std::nullopt;
   for (int pass = 0; pass < kNumPasses; ++pass) {
     const auto change = adjust_linear(*known.rig, problem, offset);
     if (!change) return std::nullopt;

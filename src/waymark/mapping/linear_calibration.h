@@ -32,4 +32,11 @@ std::optional<Eigen::VectorXd> adjust_linear(const Rig& rig,
                                              BundleProblem& problem,
                                              LinearCalibration& calibration);
 
+/// Whether an adjustment could find numbers that are so many standard deviations from what was
+/// given and not those in use: by what one step promises, with none taken.
+bool may_be_contradicted(const Rig& rig,
+                         BundleProblem& problem,
+                         const LinearCalibration& calibration,
+                         double min_sigmas);
+
 }  // namespace waymark

@@ -95,7 +95,8 @@ Mapper::Changes Mapper::add(const NewKeyframe& message) {
   adjust_window(map_,
                 window,
                 {.num_rounds = options.window.num_rounds,
-                 .max_iterations_per_round = options.window.max_iterations_per_round},
+                 .max_iterations_per_round = options.window.max_iterations_per_round,
+                 .relative_cost_tolerance = options.window.cost_tolerance},
                 dirty_);
   std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_, options.culling);
   refresh_appearances();

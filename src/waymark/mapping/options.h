@@ -98,6 +98,8 @@ struct WindowOptions {
   int max_fixed = 25;  ///< Keyframes that hold the window in place; those that share most with it.
   int num_rounds = 2;  ///< Of adjustment, with outliers left out in between.
   int max_iterations_per_round = 8;  ///< Of Levenberg-Marquardt.
+  /// A round ends when an iteration lowers the cost by less than this part of it.
+  double cost_tolerance = 1e-5;
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -105,6 +107,7 @@ struct WindowOptions {
     field("max_fixed", self.max_fixed, within(2, 1000));
     field("num_rounds", self.num_rounds, within(1, 100));
     field("max_iterations_per_round", self.max_iterations_per_round, within(1, 1000));
+    field("cost_tolerance", self.cost_tolerance, within(1e-12, 1));
   }
 };
 

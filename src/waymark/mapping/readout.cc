@@ -76,6 +76,7 @@ std::optional<KnownCalibration> find_readout(const Map& map,
   }
   BundleProblem adjusted = problem;
   LinearCalibration readout = readout_of(known, by_readout, problem);
+  if (!may_be_contradicted(*known.rig, adjusted, readout, kMinReadoutSigmas)) return std::nullopt;
   constexpr int kNumPasses = 3;
   for (int pass = 0; pass < kNumPasses; ++pass) {
     const auto change = adjust_linear(*known.rig, adjusted, readout);

@@ -20,15 +20,25 @@ struct BundleObservation : Measurement {
   std::uint32_t point = 0;  ///< Index in BundleProblem::points.
 };
 
-/// What a bundle adjustment tells of a calibration where it ended, all else free to follow.
-struct CalibrationEvidence {
-  /// Of residuals, as if each were an independent pixel's, and prior together; empty where the
-  /// equations have no solution.
+/// What the residuals of a bundle adjustment tell of a calibration where it ended, all else free to
+/// follow: second and first derivative of the cost, as if each residual were an independent
+/// pixel's.
+struct CalibrationTold {
   Eigen::MatrixXd information;
-  /// Covariance of the pull of the residuals, as the parts of the way show it that differ in what
-  /// they pull to: the "meat" of a sandwich estimate with time as clusters (White 1980; Liang and
-  /// Zeger 1986). Equal to the information of the residuals where they are independent with 1 px.
-  Eigen::MatrixXd scatter;
+  Eigen::VectorXd gradient;
+};
+
+/// The same, and what each part of the way has to do with it: errors that last make parts
+/// contradict each other by more than the noise of their residuals explains.
+struct CalibrationEvidence {
+  CalibrationTold whole;               ///< Empty where the equations have no solution.
+  std::vector<CalibrationTold> parts;  ///< In the order of time, of about as many poses each.
+
+  bool is_empty() const { return whole.gradient.size() == 0; }
+  /// Covariance of the gradient after a step, as the parts show it that differ in what they pull
+  /// to: the "meat" of a sandwich estimate with time as clusters (White 1980; Liang and Zeger
+  /// 1986). Equal to the information where residuals are independent with 1 px.
+  Eigen::MatrixXd scatter_after(const Eigen::VectorXd& step) const;
 };
 
 /// The calibration of one rig as unknowns of the adjustment, by how much it differs from what the

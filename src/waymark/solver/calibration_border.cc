@@ -5,14 +5,6 @@
 #include <Eigen/Cholesky>
 
 namespace waymark {
-namespace {
-
-/// The way is divided into so many parts: enough to compare them, and long enough each for errors
-/// that last to stay within one.
-constexpr Eigen::Index kNumParts = 10;
-
-}  // namespace
-
 CalibrationBorder::CalibrationBorder(std::size_t num_parameters,
                                      std::size_t num_slots,
                                      std::size_t num_points) {
@@ -21,7 +13,7 @@ CalibrationBorder::CalibrationBorder(std::size_t num_parameters,
   gradient_.resize(count);
   poses_.resize(count, static_cast<Eigen::Index>(6 * num_slots));
   points_.resize(count, static_cast<Eigen::Index>(3 * num_points));
-  scores_.setZero(count, kNumParts);
+  parts_.assign(kNumParts, {Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)});
 }
 
 void CalibrationBorder::begin(const BundleCalibration& calibration, const Eigen::VectorXd& change) {
@@ -72,16 +64,17 @@ Eigen::Vector3d CalibrationBorder::share_of_point(std::size_t point) const {
   return of_point(point).transpose() * solution_;
 }
 
-void CalibrationBorder::add_score(std::size_t pose,
-                                  std::size_t num_poses,
-                                  const Eigen::VectorXd& score) {
-  const auto part = static_cast<Eigen::Index>(pose * kNumParts / num_poses);
-  scores_.col(part) += score;
-}
-
 CalibrationEvidence CalibrationBorder::evidence() const {
-  const Eigen::MatrixXd off = scores_.colwise() - scores_.rowwise().mean();
-  return {reduced_information_, off * off.transpose() * (kNumParts / (kNumParts - 1.0))};
+  CalibrationEvidence evidence;
+  evidence.whole = {Eigen::MatrixXd::Zero(gradient_.size(), gradient_.size()),
+                    Eigen::VectorXd::Zero(gradient_.size())};
+  for (const CalibrationTold& told : parts_) {
+    const Eigen::MatrixXd information = told.information.selfadjointView<Eigen::Lower>();
+    evidence.parts.push_back({information, told.gradient});
+    evidence.whole.information += information;
+    evidence.whole.gradient += told.gradient;
+  }
+  return evidence;
 }
 
 }  // namespace waymark

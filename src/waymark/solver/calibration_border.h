@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <span>
+#include <vector>
 
 #include "waymark/solver/block_cholesky.h"
 #include "waymark/solver/bundle_problem.h"
@@ -14,7 +15,7 @@ namespace waymark {
 
 /// Derivative of the residual rows of an observation by the parameters of its camera, transposed: a
 /// column per residual row. Parameters lie side by side wherever there are some, for SIMD.
-using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 32, 3>;
+using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 42, 3>;
 
 /// The unknown calibration in the normal equations of bundle adjustment: few rows and columns in
 /// which every pose and point takes part, hence a dense border around the sparse reduced system
@@ -87,11 +88,24 @@ class CalibrationBorder {
   auto solved(std::size_t slot) const {
     return solved_.middleCols<6>(static_cast<Eigen::Index>(6 * slot));
   }
-  /// Adds the pull of an observation at a pose of so many, in the order of time.
-  void add_score(std::size_t pose, std::size_t num_poses, const Eigen::VectorXd& score);
+  /// Adds what an observation at a pose of so many, in the order of time, tells, all else
+  /// following: the derivatives of its rows, a row per parameter, and its residual.
+  template <class Residual>
+  void add_told(std::size_t pose,
+                std::size_t num_poses,
+                const Eigen::MatrixXd& by_calibration,
+                const Residual& residual) {
+    CalibrationTold& part = parts_[pose * kNumParts / num_poses];
+    part.information.selfadjointView<Eigen::Lower>().rankUpdate(by_calibration);
+    part.gradient += by_calibration.lazyProduct(residual);
+  }
   CalibrationEvidence evidence() const;
 
  private:
+  /// The way is divided into so many parts: enough to compare them, and long enough each for errors
+  /// that last to stay within one.
+  static constexpr std::size_t kNumParts = 10;
+
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
   Eigen::MatrixXd poses_;   // 6 columns per slot.
@@ -102,7 +116,7 @@ class CalibrationBorder {
   Eigen::MatrixXd reduced_poses_;
   Eigen::VectorXd solution_;
   Eigen::MatrixXd solved_;  // The reduced poses, times the inverse of their own equations.
-  Eigen::MatrixXd scores_;  // A column per part of the way.
+  std::vector<CalibrationTold> parts_;
 };
 
 }  // namespace waymark

@@ -22,9 +22,20 @@ void SchurSolver::move_cameras(BundleState& state) const {
   }
 }
 
-/// The pull of each observation of a point on the calibration, all else following. Of equations
-/// that were reduced: point and links are times M.
-void SchurSolver::add_scores(std::size_t entry) {
+Eigen::MatrixXd CalibrationEvidence::scatter_after(const Eigen::VectorXd& step) const {
+  const auto count = static_cast<double>(parts.size());
+  const Eigen::VectorXd mean = (whole.gradient + whole.information * step) / count;
+  Eigen::MatrixXd scatter = Eigen::MatrixXd::Zero(step.size(), step.size());
+  for (const CalibrationTold& part : parts) {
+    const Eigen::VectorXd off = part.gradient + part.information * step - mean;
+    scatter += off * off.transpose();
+  }
+  return scatter * (count / (count - 1.0));
+}
+
+/// What each observation of a point tells of the calibration, all else following. Of equations that
+/// were reduced: point and links are times M.
+void SchurSolver::add_told(std::size_t entry) {
   Eigen::MatrixX3d calibration_by_point = border_->of_point(entry);
   for (std::uint32_t link = plan_.first_link[entry]; link < plan_.first_link[entry + 1]; ++link) {
     calibration_by_point -=
@@ -45,7 +56,7 @@ void SchurSolver::add_scores(std::size_t entry) {
         const auto first = static_cast<Eigen::Index>(calibration->blocks[observation.camera].first);
         total.middleRows(first, by.by_calibration.rows()) += by.by_calibration;
       }
-      border_->add_score(observation.pose, problem_.rigs.size(), total.lazyProduct(rows.residual));
+      border_->add_told(observation.pose, problem_.rigs.size(), total, rows.residual);
     });
   }
 }
@@ -54,7 +65,7 @@ CalibrationEvidence SchurSolver::calibration_evidence() {
   linearize();
   reduce(kLeastDamping);
   if (!solve_reduced()) return {};
-  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) add_scores(entry);
+  for (std::size_t entry = 0; entry < plan_.points.size(); ++entry) add_told(entry);
   return border_->evidence();
 }
 

@@ -155,7 +155,7 @@ class SchurSolver {
                              const Eigen::Vector3d& point_in_rig) const;
   template <class Visit>
   void visit_rows(std::size_t i, const Visit& visit) const;
-  void add_scores(std::size_t entry);
+  void add_told(std::size_t entry);
   /// Builds the reduced system of the damped equations; the links are eliminated ones after it.
   void reduce(double damping);
   void eliminate_point(std::size_t entry, double damping);

@@ -1,0 +1,148 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/mapping/calibration_choice.h"
+
+#include <Eigen/Cholesky>
+#include <array>
+#include <cmath>
+#include <utility>
+#include <vector>
+
+namespace waymark {
+namespace {
+
+/// Standard deviations of a group, relative to the usual ones, and how likely a calibration has
+/// them.
+struct Spread {
+  double factor;
+  double probability;
+};
+constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-4}}};
+
+/// Which spread each of the three groups has.
+using Spreads = std::array<std::size_t, 3>;
+
+/// Whether images are asked for a number: centres and tangential distortion take up errors of other
+/// kinds, such as those of a rolling shutter, and calibrations hardly err in them.
+bool is_likely_wrong(const CalibrationParameter& parameter) {
+  return parameter.group != CalibrationGroup::kCentre &&
+         parameter.group != CalibrationGroup::kTangential;
+}
+
+double factor_of(CalibrationGroup group, const Spreads& spreads) {
+  switch (group) {
+    case CalibrationGroup::kFocalLength:
+      return kSpreads[spreads[0]].factor;
+    case CalibrationGroup::kRadial:
+      return kSpreads[spreads[1]].factor;
+    case CalibrationGroup::kExtrinsics:
+      return kSpreads[spreads[2]].factor;
+    default:
+      return 1.0;
+  }
+}
+
+std::vector<double> sigmas_of(const CalibrationParameters& parameters,
+                              const Spreads& spreads,
+                              bool is_all_free) {
+  std::vector<double> sigmas;
+  for (const CalibrationParameter& parameter : parameters.list()) {
+    const bool is_free = is_all_free || is_likely_wrong(parameter);
+    sigmas.push_back(is_free ? factor_of(parameter.group, spreads) * parameter.prior_sigma : 0.0);
+  }
+  return sigmas;
+}
+
+double log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  return 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+}
+
+/// Second derivative of the cost by the change and its pull from no change, of images alone.
+CalibrationTold at_given(const CalibrationCost& cost, const CalibrationTold& told) {
+  return {told.information / cost.variance,
+          (told.gradient - told.information * cost.at) / cost.variance};
+}
+
+CalibrationPosterior posterior(const CalibrationParameters& parameters,
+                               const CalibrationTold& told,
+                               std::vector<double> prior_sigmas) {
+  CalibrationPosterior result;
+  result.prior_information = parameters.prior_information(prior_sigmas);
+  result.prior_sigmas = std::move(prior_sigmas);
+  const Eigen::LLT<Eigen::MatrixXd> factor(told.information + result.prior_information);
+  const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior_information);
+  result.change = -factor.solve(told.gradient);
+  const auto size = result.change.size();
+  result.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
+  result.log_evidence = 0.5 * (log_determinant(of_prior) - log_determinant(factor) -
+                               told.gradient.dot(result.change));
+  return result;
+}
+
+}  // namespace
+
+double predicted_gain(const CalibrationCost& cost,
+                      const CalibrationPosterior& posterior,
+                      const Eigen::VectorXd& other) {
+  const CalibrationTold whole = at_given(cost, cost.evidence.whole);
+  double gain = 0.0;
+  for (const CalibrationTold& told : cost.evidence.parts) {
+    const CalibrationTold part = at_given(cost, told);
+    const Eigen::MatrixXd information =
+        whole.information - part.information + posterior.prior_information;
+    const Eigen::VectorXd change = information.llt().solve(part.gradient - whole.gradient);
+    const auto cost_of = [&](const Eigen::VectorXd& x) {
+      return x.dot(part.gradient + 0.5 * (part.information * x));
+    };
+    gain += cost_of(other) - cost_of(change);
+  }
+  return gain;
+}
+
+double gain(const CalibrationCost& cost,
+            const CalibrationPosterior& posterior,
+            const Eigen::VectorXd& other) {
+  const Eigen::VectorXd off = other - posterior.change;
+  const Eigen::MatrixXd information =
+      cost.evidence.whole.information / cost.variance + posterior.prior_information;
+  return 0.5 * off.dot(information * off);
+}
+
+double variance_between_parts(const CalibrationCost& cost, const CalibrationPosterior& posterior) {
+  const CalibrationEvidence& evidence = cost.evidence;
+  const Eigen::LLT<Eigen::MatrixXd> information(evidence.whole.information +
+                                                cost.variance * posterior.prior_information);
+  const double expected = information.solve(evidence.whole.information).trace();
+  const double seen = information.solve(evidence.scatter_after(posterior.change - cost.at)).trace();
+  return expected > 0.0 ? seen / expected : 0.0;
+}
+
+Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, bool is_all_free) {
+  constexpr std::size_t kWidest = kSpreads.size() - 1;
+  return parameters.prior_information(
+      sigmas_of(parameters, {kWidest, kWidest, kWidest}, is_all_free));
+}
+
+CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
+                                  const CalibrationCost& cost,
+                                  bool is_all_free) {
+  const CalibrationTold told = at_given(cost, cost.evidence.whole);
+  CalibrationPosterior best;
+  best.log_evidence = -HUGE_VAL;
+  Spreads spreads;
+  for (spreads[0] = 0; spreads[0] < kSpreads.size(); ++spreads[0]) {
+    for (spreads[1] = 0; spreads[1] < kSpreads.size(); ++spreads[1]) {
+      for (spreads[2] = 0; spreads[2] < kSpreads.size(); ++spreads[2]) {
+        CalibrationPosterior one =
+            posterior(parameters, told, sigmas_of(parameters, spreads, is_all_free));
+        for (const std::size_t spread : spreads) {
+          one.log_evidence += std::log(kSpreads[spread].probability);
+        }
+        if (one.log_evidence > best.log_evidence) best = std::move(one);
+      }
+    }
+  }
+  return best;
+}
+
+}  // namespace waymark

@@ -1,0 +1,56 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <vector>
+
+#include "waymark/camera/calibration.h"
+#include "waymark/solver/bundle_problem.h"
+
+namespace waymark {
+
+/// What images tell of a calibration at a change from what was given.
+struct CalibrationCost {
+  Eigen::VectorXd at;            ///< The change.
+  CalibrationEvidence evidence;  ///< There, all else following.
+  double variance = 1.0;         ///< Of residuals, px^2, that its cost is to be divided by.
+};
+
+/// What images and a prior tell together.
+struct CalibrationPosterior {
+  std::vector<double> prior_sigmas;  ///< 0 of what is held.
+  Eigen::MatrixXd prior_information;
+  Eigen::VectorXd change;  ///< The most likely one, from what was given.
+  Eigen::VectorXd sigma;   ///< Its standard deviations.
+  double log_evidence = 0.0;
+};
+
+/// By how much the images are likelier, in nats, with what they and a prior tell than with another
+/// change: each part of the way with what the other parts tell.
+double predicted_gain(const CalibrationCost& cost,
+                      const CalibrationPosterior& posterior,
+                      const Eigen::VectorXd& other);
+
+/// By how much what images and a prior tell is likelier than another change, in nats.
+double gain(const CalibrationCost& cost,
+            const CalibrationPosterior& posterior,
+            const Eigen::VectorXd& other);
+
+/// The variance of residuals by what the parts of the way contradict each other at that: more than
+/// their noise, since errors that last count only once.
+double variance_between_parts(const CalibrationCost& cost, const CalibrationPosterior& posterior);
+
+/// Of the priors that say how calibrations err, the one that makes the images likeliest, and what
+/// follows from it. A calibration is as good as usual or, which is rarer, wrong by more, in its
+/// focal lengths, its distortion and its turns each for itself: among explanations that fit alike
+/// the one wins that needs the smaller and fewer errors (MacKay, 1992, "Bayesian interpolation").
+/// Centres and tangential distortion are held unless all is asked for.
+CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
+                                  const CalibrationCost& cost,
+                                  bool is_all_free);
+
+/// The widest of these priors, as information.
+Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, bool is_all_free);
+
+}  // namespace waymark
