@@ -32,6 +32,11 @@ constexpr double kSensorSigma = 0.05;  // px
 /// Of the terms of a BearingError at the side of the image: linear and quadratic.
 constexpr double kLinearErrorSigma = 0.5;     // px
 constexpr double kQuadraticErrorSigma = 1.0;  // px
+/// However many images tell the same, disparities are off by so much, as where surfaces are
+/// slanted, and focal lengths and distortions by this part of the usual standard deviation: so much
+/// do recordings of one camera differ.
+constexpr double kSystematicErrorPx = 0.2;
+constexpr double kSystematicPart = 0.15;
 /// Models with more numbers are taken as they are.
 constexpr std::size_t kMaxIntrinsics = 27;
 
@@ -151,11 +156,14 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
       parameter.name = prefix + fmt::format("shape{}", i + 1);
       parameter.group = CalibrationGroup::kRadial;
       if (std::abs(intrinsics[i]) < kMinPixels) parameter.usual_sigma = kShapeSigma;
+      parameter.systematic_sigma = kSystematicPart * parameter.usual_sigma;
     } else {
       parameter.name = prefix + kPlaneNames[i - num_shape];
+      parameter.systematic_sigma = kSystematicPart * parameter.usual_sigma;
       if (i - num_shape >= 2) {
         parameter.group = CalibrationGroup::kCentre;
         parameter.usual_sigma = kCentreSigma * size_px;
+        parameter.systematic_sigma = 0.0;
       }
     }
     add(std::move(parameter), calibrated.sigmas.intrinsics, i);
@@ -165,7 +173,8 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
     add({.name = prefix + distortion_name(description, i),
          .given = description.distortion_coeffs[i],
          .group = is_tangential ? CalibrationGroup::kTangential : CalibrationGroup::kRadial,
-         .usual_sigma = is_tangential ? kTangentialSigma : kRadialSigma},
+         .usual_sigma = is_tangential ? kTangentialSigma : kRadialSigma,
+         .systematic_sigma = is_tangential ? 0.0 : kSystematicPart * kRadialSigma},
         calibrated.sigmas.distortion_coeffs,
         i);
   }
@@ -178,11 +187,11 @@ void CalibrationParameters::add_bearing_error(std::size_t camera) {
   const double side = std::min(0.5 * model.width_px() * pixel_rad, 1.0);
   for (int i = 0; i < kNumErrors; ++i) {
     const bool is_linear = i % BearingError::kNumTerms < 2;
-    const double sigma_px =
-        is_linear ? kLinearErrorSigma / side : kQuadraticErrorSigma / (side * side);
+    const double to_bearing = pixel_rad / (is_linear ? side : side * side);
     add({.name = fmt::format("cam{}.{}", camera, kErrorNames[static_cast<std::size_t>(i)]),
          .group = CalibrationGroup::kBearing,
-         .usual_sigma = sigma_px * pixel_rad},
+         .usual_sigma = to_bearing * (is_linear ? kLinearErrorSigma : kQuadraticErrorSigma),
+         .systematic_sigma = to_bearing * kSystematicErrorPx},
         {},
         0);
   }
@@ -192,11 +201,13 @@ void CalibrationParameters::add_bearing_error(std::size_t camera) {
 void CalibrationParameters::add_extrinsics(std::size_t camera) {
   blocks_[camera].has_extrinsics = true;
   const CalibrationSigmas& sigmas = given_.cameras[camera].sigmas;
+  const double pixel_rad = central_pixel_angle(*given_.cameras[camera].camera);
   for (std::size_t i = 0; i < kTurnNames.size(); ++i) {
     const bool is_turn = i < kNumTurns;
     add({.name = fmt::format("cam{}.{}", camera, kTurnNames[i]),
          .group = CalibrationGroup::kExtrinsics,
-         .usual_sigma = kTurnSigma},
+         .usual_sigma = kTurnSigma,
+         .systematic_sigma = kSystematicErrorPx * pixel_rad},
         is_turn ? sigmas.rotation_rad : sigmas.baseline_direction_rad,
         is_turn ? i : i - kNumTurns);
   }

@@ -44,6 +44,9 @@ struct CalibrationParameter {
   /// How far the truth may lie from that, in its unit (px, rad, 1); 0: it is exact.
   double prior_sigma = 0.0;
   double usual_sigma = 0.0;  ///< The same of calibrations in general.
+  /// What images tell of it is off by as much, however many they are: by errors of matching that
+  /// last, such as those of slanted surfaces, and by what no model has. 0: of what is held.
+  double systematic_sigma = 0.0;
 };
 
 /// What the images told of one number of a calibration.

@@ -16,12 +16,15 @@ namespace waymark {
 namespace {
 
 /// An adjustment is linear in the intrinsics: it is repeated until they move no more.
-constexpr int kMaxPasses = 5;
+constexpr int kMaxPasses = 10;
 /// What was given is replaced by what makes parts of the way that it was not fitted to likelier by
 /// so many nats, and their squared residuals smaller by this share: what gains less is as well
 /// explained by errors of matching (docs/decisions/calibrate.md).
 constexpr double kMinGain = 10.0;
 constexpr double kMinShare = 0.01;
+/// By so many nats where systematic errors of what images tell are taken for known: three standard
+/// deviations.
+constexpr double kMinSystematicGain = 4.5;
 /// What was found before, by what is likelier by two standard deviations.
 constexpr double kLeastGain = 2.0;
 /// Parts of a way with fewer keyframes share most of what they see, err alike, and scatter by less
@@ -163,7 +166,8 @@ bool is_better(const CalibrationCost& cost,
     return gain(cost, found, known.change) > kLeastGain;
   }
   const double predicted = predicted_gain(cost, found, known.change);
-  return predicted > kMinGain && predicted * cost.variance > kMinShare * squared_residuals;
+  return found.gain > kMinSystematicGain && predicted > kMinGain &&
+         predicted * cost.variance > kMinShare * squared_residuals;
 }
 
 /// A part of the points with all of their observations: what tells a calibration does so soon.
@@ -239,18 +243,19 @@ std::optional<CalibrationPosterior> adjust_until_still(
   // What is wrong by much is found from the widest prior, and judged then.
   found.prior_information = widest_prior(parameters, known.is_always_refined);
   trial.variance = cost->variance;
+  bool do_agree = false;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
     cost = adjust(parameters, cameras, found.prior_information, problem, trial);
     if (!cost) return std::nullopt;
     found = posterior_with(trial.variance, parameters, known, num_keyframes, *cost);
     trial.variance = std::max(variance_between_parts(*cost, found), trial.noise);
     found = posterior_with(trial.variance, parameters, known, num_keyframes, *cost);
-    if (trial.variance > kMaxDisagreement * kMaxDisagreement * trial.noise ||
-        !is_better(*cost, found, known, trial.noise * num_observations)) {
-      return std::nullopt;
-    }
-    if (gain(*cost, found, trial.change) < kStill) break;
+    if (!is_better(*cost, found, known, trial.noise * num_observations)) return std::nullopt;
+    // Before it is found, parts contradict each other in what is wrong, too.
+    do_agree = trial.variance < kMaxDisagreement * kMaxDisagreement * trial.noise;
+    if (do_agree && gain(*cost, found, trial.change) < kStill) break;
   }
+  if (!do_agree) return std::nullopt;
   return found;
 }
 

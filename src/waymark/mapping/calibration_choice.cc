@@ -3,6 +3,7 @@
 #include "waymark/mapping/calibration_choice.h"
 
 #include <Eigen/Cholesky>
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <utility>
@@ -18,6 +19,9 @@ struct Spread {
   double probability;
 };
 constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-4}}};
+
+/// In place of no systematic error, so that all have one.
+constexpr double kNone = 1e-7;
 
 /// Which spread each of the three groups has.
 using Spreads = std::array<std::size_t, 3>;
@@ -63,19 +67,37 @@ CalibrationTold at_given(const CalibrationCost& cost, const CalibrationTold& tol
           (told.gradient - told.information * cost.at) / cost.variance};
 }
 
+/// The same where what images tell has systematic errors: of a covariance V^-1 + S in place of
+/// V^-1, with V their information.
+CalibrationTold with_systematic_errors(const CalibrationParameters& parameters,
+                                       const CalibrationTold& told) {
+  Eigen::MatrixXd sum = told.information;
+  for (std::size_t i = 0; i < parameters.size(); ++i) {
+    const auto at = static_cast<Eigen::Index>(i);
+    const double sigma = std::max(parameters.list()[i].systematic_sigma, kNone);
+    sum(at, at) += 1.0 / (sigma * sigma);
+  }
+  const Eigen::LLT<Eigen::MatrixXd> factor(sum);
+  return {told.information - told.information * factor.solve(told.information),
+          told.gradient - told.information * factor.solve(told.gradient)};
+}
+
+/// With what images tell, and the same with systematic errors, which says how sure that is.
 CalibrationPosterior posterior(const CalibrationParameters& parameters,
                                const CalibrationTold& told,
+                               const CalibrationTold& told_with_errors,
                                std::vector<double> prior_sigmas) {
   CalibrationPosterior result;
   result.prior_information = parameters.prior_information(prior_sigmas);
   result.prior_sigmas = std::move(prior_sigmas);
-  const Eigen::LLT<Eigen::MatrixXd> factor(told.information + result.prior_information);
+  result.change = -(told.information + result.prior_information).llt().solve(told.gradient);
+  const Eigen::LLT<Eigen::MatrixXd> factor(told_with_errors.information + result.prior_information);
   const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior_information);
-  result.change = -factor.solve(told.gradient);
   const auto size = result.change.size();
   result.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
-  result.log_evidence = 0.5 * (log_determinant(of_prior) - log_determinant(factor) -
-                               told.gradient.dot(result.change));
+  const Eigen::VectorXd& gradient = told_with_errors.gradient;
+  result.gain = 0.5 * gradient.dot(factor.solve(gradient));
+  result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
   return result;
 }
 
@@ -127,6 +149,7 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
                                   const CalibrationCost& cost,
                                   bool is_all_free) {
   const CalibrationTold told = at_given(cost, cost.evidence.whole);
+  const CalibrationTold with_errors = with_systematic_errors(parameters, told);
   CalibrationPosterior best;
   best.log_evidence = -HUGE_VAL;
   Spreads spreads;
@@ -134,7 +157,7 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
     for (spreads[1] = 0; spreads[1] < kSpreads.size(); ++spreads[1]) {
       for (spreads[2] = 0; spreads[2] < kSpreads.size(); ++spreads[2]) {
         CalibrationPosterior one =
-            posterior(parameters, told, sigmas_of(parameters, spreads, is_all_free));
+            posterior(parameters, told, with_errors, sigmas_of(parameters, spreads, is_all_free));
         for (const std::size_t spread : spreads) {
           one.log_evidence += std::log(kSpreads[spread].probability);
         }

@@ -22,8 +22,10 @@ struct CalibrationPosterior {
   std::vector<double> prior_sigmas;  ///< 0 of what is held.
   Eigen::MatrixXd prior_information;
   Eigen::VectorXd change;  ///< The most likely one, from what was given.
-  Eigen::VectorXd sigma;   ///< Its standard deviations.
-  double log_evidence = 0.0;
+  // Where what images tell has systematic errors:
+  Eigen::VectorXd sigma;      ///< Standard deviations of the change.
+  double log_evidence = 0.0;  ///< Of the prior, over that of no change.
+  double gain = 0.0;          ///< By how much a change is likelier than none, in nats.
 };
 
 /// By how much the images are likelier, in nats, with what they and a prior tell than with another
