@@ -20,7 +20,7 @@ namespace {
 constexpr double kMinPixels = 10.0;
 /// Calibrations are that good, of another day, lens setting or temperature, and of images that were
 /// rectified by one (docs/decisions/calibrate.md).
-constexpr double kFocalSigma = 0.001;   // Relative.
+constexpr double kFocalSigma = 0.002;   // Relative.
 constexpr double kCentreSigma = 0.002;  // Relative to its place in the image.
 constexpr double kAspectSigma = 0.002;  // Pixels are square.
 constexpr double kShapeSigma = 0.005;   // xi, alpha, beta, ...

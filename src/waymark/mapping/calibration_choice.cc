@@ -23,8 +23,14 @@ constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-
 /// In place of no systematic error, so that all have one.
 constexpr double kNone = 1e-7;
 
+/// A pair whose bearings are off smoothly over the image is as likely.
+constexpr double kBearingErrorProbability = 1e-3;
+
 /// Which spread each of the three groups has.
-using Spreads = std::array<std::size_t, 3>;
+struct Spreads {
+  std::array<std::size_t, 3> groups = {};
+  bool has_bearing_error = false;
+};
 
 /// Whether images are asked for a number: centres and tangential distortion take up errors of other
 /// kinds, such as those of a rolling shutter, and calibrations hardly err in them.
@@ -36,11 +42,13 @@ bool is_likely_wrong(const CalibrationParameter& parameter) {
 double factor_of(CalibrationGroup group, const Spreads& spreads) {
   switch (group) {
     case CalibrationGroup::kFocalLength:
-      return kSpreads[spreads[0]].factor;
+      return kSpreads[spreads.groups[0]].factor;
     case CalibrationGroup::kRadial:
-      return kSpreads[spreads[1]].factor;
+      return kSpreads[spreads.groups[1]].factor;
     case CalibrationGroup::kExtrinsics:
-      return kSpreads[spreads[2]].factor;
+      return kSpreads[spreads.groups[2]].factor;
+    case CalibrationGroup::kBearing:
+      return spreads.has_bearing_error ? 1.0 : 0.0;
     default:
       return 1.0;
   }
@@ -142,7 +150,7 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
 Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, bool is_all_free) {
   constexpr std::size_t kWidest = kSpreads.size() - 1;
   return parameters.prior_information(
-      sigmas_of(parameters, {kWidest, kWidest, kWidest}, is_all_free));
+      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true}, is_all_free));
 }
 
 CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
@@ -152,18 +160,19 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
   const CalibrationTold with_errors = with_systematic_errors(parameters, told);
   CalibrationPosterior best;
   best.log_evidence = -HUGE_VAL;
-  Spreads spreads;
-  for (spreads[0] = 0; spreads[0] < kSpreads.size(); ++spreads[0]) {
-    for (spreads[1] = 0; spreads[1] < kSpreads.size(); ++spreads[1]) {
-      for (spreads[2] = 0; spreads[2] < kSpreads.size(); ++spreads[2]) {
-        CalibrationPosterior one =
-            posterior(parameters, told, with_errors, sigmas_of(parameters, spreads, is_all_free));
-        for (const std::size_t spread : spreads) {
-          one.log_evidence += std::log(kSpreads[spread].probability);
-        }
-        if (one.log_evidence > best.log_evidence) best = std::move(one);
-      }
+  constexpr std::size_t kNumSpreads = kSpreads.size();
+  for (std::size_t i = 0; i < 2 * kNumSpreads * kNumSpreads * kNumSpreads; ++i) {
+    const std::size_t j = i / 2;
+    const Spreads spreads{
+        {j % kNumSpreads, j / kNumSpreads % kNumSpreads, j / kNumSpreads / kNumSpreads},
+        i % 2 == 1};
+    CalibrationPosterior one =
+        posterior(parameters, told, with_errors, sigmas_of(parameters, spreads, is_all_free));
+    if (spreads.has_bearing_error) one.log_evidence += std::log(kBearingErrorProbability);
+    for (const std::size_t spread : spreads.groups) {
+      one.log_evidence += std::log(kSpreads[spread].probability);
     }
+    if (one.log_evidence > best.log_evidence) best = std::move(one);
   }
   return best;
 }
