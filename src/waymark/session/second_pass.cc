@@ -57,6 +57,12 @@ bool is_said_to_be_ideal(const ChainCamera& camera) {
 }
 
 /// With stereo or depth the map is straight enough to mend the calibration by itself.
+constexpr const char* kMissingDistortion =
+    "calibration: the images contradict a lens without distortion, as the stated zeros say: they "
+    "are taken as unknown";
+/// Distortions larger than this were not left out for being small.
+constexpr double kLargeDistortion = 0.1;
+
 std::optional<ChainCamera> with_missing_distortion(const Session& session) {
   const InputInfo& info = session.input->info();
   ChainCamera camera = info.calibration->cameras.front();
@@ -89,15 +95,18 @@ std::optional<SecondPass> calibration_for_second_pass(const Session& session) {
   SecondPass pass{*info.calibration};
   if (const auto distorted = with_missing_distortion(session)) {
     pass.calibration.cameras[0] = *distorted;
-    pass.mistake =
-        "calibration: the images contradict a lens without distortion, as the stated zeros say: "
-        "they are taken as unknown";
+    pass.mistake = kMissingDistortion;
   } else {
     const std::shared_ptr<const Rig> rig = session.system->rig();
     const auto found =
         image_shift(session.rig, *rig) < kMinShift ? std::nullopt : chain_of(*rig, {});
     if (!found) return std::nullopt;
     pass.calibration.cameras = found->cameras;
+    const std::vector<double>& coeffs = found->cameras[0].description.distortion_coeffs;
+    if (is_said_to_be_ideal(info.calibration->cameras[0]) && !coeffs.empty() &&
+        std::abs(coeffs[0]) > kLargeDistortion) {
+      pass.mistake = kMissingDistortion;
+    }
   }
   pass.calibration = session.input->of_unchanged_images(std::move(pass.calibration));
   return pass;
