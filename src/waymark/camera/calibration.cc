@@ -20,8 +20,7 @@ namespace {
 constexpr double kMinPixels = 10.0;
 /// Calibrations are that good, of another day, lens setting or temperature, and of images that were
 /// rectified by one (docs/decisions/calibrate.md).
-constexpr double kFocalSigma = 0.002;   // Relative.
-constexpr double kCentreSigma = 0.002;  // Relative to its place in the image.
+constexpr double kPixelsSigma = 0.002;  // Relative to the length.
 constexpr double kAspectSigma = 0.002;  // Pixels are square.
 constexpr double kShapeSigma = 0.005;   // xi, alpha, beta, ...
 constexpr double kRadialSigma = 0.02;
@@ -148,23 +147,19 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
   const std::size_t num_shape = intrinsics.size() < 4 ? intrinsics.size() : intrinsics.size() - 4;
   const std::string prefix = fmt::format("cam{}.", camera);
   for (std::size_t i = 0; i < intrinsics.size(); ++i) {
-    const double size_px = std::max(std::abs(intrinsics[i]), kMinPixels);
     CalibrationParameter parameter;
     parameter.given = intrinsics[i];
-    parameter.usual_sigma = kFocalSigma * size_px;
+    parameter.usual_sigma = kPixelsSigma * std::max(std::abs(intrinsics[i]), kMinPixels);
     if (i < num_shape) {
       parameter.name = prefix + fmt::format("shape{}", i + 1);
       parameter.group = CalibrationGroup::kRadial;
       if (std::abs(intrinsics[i]) < kMinPixels) parameter.usual_sigma = kShapeSigma;
-      parameter.systematic_sigma = kSystematicPart * parameter.usual_sigma;
     } else {
       parameter.name = prefix + kPlaneNames[i - num_shape];
+      if (i - num_shape >= 2) parameter.group = CalibrationGroup::kCentre;
+    }
+    if (parameter.group != CalibrationGroup::kCentre) {
       parameter.systematic_sigma = kSystematicPart * parameter.usual_sigma;
-      if (i - num_shape >= 2) {
-        parameter.group = CalibrationGroup::kCentre;
-        parameter.usual_sigma = kCentreSigma * size_px;
-        parameter.systematic_sigma = 0.0;
-      }
     }
     add(std::move(parameter), calibrated.sigmas.intrinsics, i);
   }

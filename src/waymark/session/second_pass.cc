@@ -11,6 +11,12 @@
 namespace waymark {
 namespace {
 
+constexpr const char* kMissingDistortion =
+    "calibration: the images contradict a lens without distortion, as the stated zeros say: they "
+    "are taken as unknown";
+/// Distortions larger than this were not left out for being small.
+constexpr double kLargeDistortion = 0.1;
+
 /// A focal length that is 3 % off, or distortion that was left out. Less is mended well enough when
 /// the map is, and does not pay for the time.
 constexpr double kMinShift = 0.01;
@@ -57,12 +63,6 @@ bool is_said_to_be_ideal(const ChainCamera& camera) {
 }
 
 /// With stereo or depth the map is straight enough to mend the calibration by itself.
-constexpr const char* kMissingDistortion =
-    "calibration: the images contradict a lens without distortion, as the stated zeros say: they "
-    "are taken as unknown";
-/// Distortions larger than this were not left out for being small.
-constexpr double kLargeDistortion = 0.1;
-
 std::optional<ChainCamera> with_missing_distortion(const Session& session) {
   const InputInfo& info = session.input->info();
   ChainCamera camera = info.calibration->cameras.front();
