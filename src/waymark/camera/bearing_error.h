@@ -10,7 +10,8 @@ namespace waymark {
 /// the epipolar lines that are smooth over the image: what rectification and lens models leave. A
 /// quadratic polynomial of the bearing, without the constant, which is a turn of the camera.
 struct BearingError {
-  static constexpr int kNumTerms = 5;
+  static constexpr int kNumTerms = 5;  ///< Of the polynomial.
+  /// Coefficients of the polynomial, or its terms, as terms() orders them.
   using Terms = Eigen::Matrix<double, kNumTerms, 1>;
 
   Terms along_rad = Terms::Zero();   ///< Per term: seen too far along the line, as if too near.
