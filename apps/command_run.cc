@@ -125,7 +125,7 @@ void start_viewer(const RunOptions& options, Reporter& reporter, std::optional<L
 
 /// The first pass over the input, which is saved, where there is a second.
 struct FirstPass {
-  CameraChain calibration;  ///< Found by it.
+  SecondPass found;
   SessionResults results;
 };
 
@@ -210,7 +210,7 @@ std::optional<int> finish(const RunOptions& options,
   };
   save_results(options, session, results, autosave, last, reporter);
   if (!again) return status_of(results);
-  first = FirstPass{again->calibration, std::move(results)};
+  first = FirstPass{*again, std::move(results)};
   return std::nullopt;
 }
 
@@ -277,7 +277,10 @@ int run(RunOptions options, Reporter& reporter) {
   std::optional<FirstPass> first;
   if (const auto status = map_once(options, shown, first, reporter)) return *status;
   reporter.info("the calibration is another than stated: once more with what the images tell");
-  options.session.calibration = first->calibration;
+  options.session.calibration = first->found.calibration;
+  if (const double offset = first->found.inverse_depth_offset; offset != 0.0) {
+    options.session.assignments.push_back(fmt::format("depth.inverse_offset={:.9g}", offset));
+  }
   return *map_once(options, shown, first, reporter);
 }
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <numbers>
 #include <utility>
@@ -12,7 +13,6 @@
 #include "waymark/base/check.h"
 #include "waymark/calibrate/image_circle.h"
 #include "waymark/calibrate/model_selection.h"
-#include "waymark/calibrate/refine.h"
 #include "waymark/camera/registry.h"
 #include "waymark/image/convert.h"
 #include "waymark/system/system.h"
@@ -27,11 +27,12 @@ constexpr std::size_t kMinFrames = 15;
 constexpr double kMaxPixels = 6e5;
 /// An image that is seen further off its centre than this was taken by a fisheye lens.
 constexpr double kFisheyeRad = 70.0 * kRadiansPerDegree;
-constexpr int kMaxRounds = 5;
+constexpr int kMaxRounds = 4;
 /// Two maps of the same frames differ by about this much in the focal length.
 constexpr double kRepeatability = 0.004;
-/// Matches that are wrong together make the focal length less certain than the residuals tell.
-constexpr double kHonesty = 2.0;
+/// Smaller maps tell nothing.
+constexpr std::size_t kMinKeyframes = 5;
+constexpr std::size_t kMinLandmarks = 100;
 constexpr double kSure = 0.03;
 /// How far a focal length may be off, relatively: any, by a data sheet, that of most cameras.
 constexpr double kAnyFocalLength = 1.0;
@@ -121,13 +122,51 @@ double corner_angle(const DivisionLens& lens, const CameraDescription& size) {
   return std::atan2(radius, 1.0 + lens.division * radius * radius);
 }
 
-/// A map of a stretch, as far as it goes.
-std::shared_ptr<const Map> map_stretch(const Stretch& stretch,
-                                       const CameraDescription& lens,
-                                       const CalibrateOptions& options) {
+/// What a map tells of a lens.
+struct MappedLens {
+  CameraDescription description;
+  LensChange sigmas = LensChange::Zero();
+  std::size_t num_keyframes = 0;
+};
+
+/// How far the truth may lie from a lens that is likely.
+CalibrationSigmas sigmas_around(const CameraDescription& lens, double focal_sigma) {
+  const LensChange sigmas = lens_sigmas(lens.width_px, focal_sigma);
+  CalibrationSigmas of_camera;
+  for (const std::size_t i : {0u, 1u}) {
+    of_camera.intrinsics.push_back(focal_sigma * lens.intrinsics[i]);
+  }
+  of_camera.intrinsics.insert(of_camera.intrinsics.end(), {sigmas[2], sigmas[3]});
+  of_camera.distortion_coeffs = {sigmas[4], sigmas[5], 0.0, 0.0};
+  return of_camera;
+}
+
+/// The estimates of a run as numbers of a lens.
+MappedLens lens_of(const System& system) {
+  MappedLens lens{*system.rig()->cameras[0].description, {}, system.map()->keyframes().size()};
+  const std::vector<CalibrationEstimate> estimates = system.calibration();
+  constexpr std::array<const char*, 6> kNames = {
+      "cam0.fu", "cam0.fv", "cam0.pu", "cam0.pv", "cam0.k1", "cam0.k2"};
+  for (std::size_t i = 0; i < kNames.size(); ++i) {
+    const auto told = std::ranges::find(estimates, kNames[i], &CalibrationEstimate::name);
+    lens.sigmas[static_cast<Eigen::Index>(i)] = told == estimates.end() ? HUGE_VAL : told->sigma;
+  }
+  lens.sigmas[0] /= lens.description.intrinsics[0];
+  lens.sigmas[1] = lens_sigmas(lens.description.width_px, 1.0)[1];
+  return lens;
+}
+
+/// Maps a stretch as far as it goes, the lens along with it. Nothing where the map is too small.
+std::optional<MappedLens> map_stretch(const Stretch& stretch,
+                                      const CameraDescription& lens,
+                                      double focal_sigma,
+                                      const CalibrateOptions& options) {
   Settings settings;
   settings.seed = options.seed;
-  System system({{{make_if_possible(lens), Rigid3(), lens}}}, settings, Timing::kInline);
+  settings.calibration.refine = "on";
+  CameraChain chain;
+  chain.cameras.push_back({lens, Rigid3(), 0.0, sigmas_around(lens, focal_sigma)});
+  System system(make_rig(chain), settings, Timing::kInline);
   for (std::size_t i = 0; i < stretch.images.size() && !is_stopped(options); ++i) {
     FrameImages frame;
     frame.timestamp_ns = static_cast<std::int64_t>(i) * 1'000'000'000 / 30;
@@ -136,20 +175,22 @@ std::shared_ptr<const Map> map_stretch(const Stretch& stretch,
     system.feed(frame);
   }
   system.finish();
-  return system.map();
+  const Map& map = *system.map();
+  if (map.keyframes().size() < kMinKeyframes || map.landmarks().size() < kMinLandmarks) {
+    return std::nullopt;
+  }
+  return lens_of(system);
 }
 
-/// Map and refinement in turns, until the focal length stays.
-std::optional<RefinedLens> refine_by_mapping(const Stretch& stretch,
-                                             CameraDescription lens,
-                                             double focal_sigma,
-                                             const CalibrateOptions& options) {
-  CameraDescription assumed = lens;
-  std::fill(assumed.distortion_coeffs.begin(), assumed.distortion_coeffs.end(), 0.0);
-  std::optional<RefinedLens> refined;
+/// Maps with what the map before told, until the focal length stays.
+std::optional<MappedLens> refine_by_mapping(const Stretch& stretch,
+                                            CameraDescription lens,
+                                            double focal_sigma,
+                                            const CalibrateOptions& options) {
+  std::optional<MappedLens> refined;
   double change = 1.0;
   for (int round = 0; round < kMaxRounds && !is_stopped(options); ++round) {
-    auto next = refine_lens(*map_stretch(stretch, lens, options), assumed, lens, focal_sigma);
+    auto next = map_stretch(stretch, lens, focal_sigma, options);
     if (!next) break;
     change = std::abs(std::log(next->description.intrinsics[0] / lens.intrinsics[0]));
     lens = next->description;
@@ -162,7 +203,6 @@ std::optional<RefinedLens> refine_by_mapping(const Stretch& stretch,
     if (change < kRepeatability) break;
   }
   if (refined) {
-    refined->sigmas *= kHonesty;
     refined->sigmas[0] = std::hypot(refined->sigmas[0], std::max(change, kRepeatability));
   }
   return refined;
@@ -204,7 +244,6 @@ EstimatedCalibration calibrate_stretch(const Stretch& stretch, const CalibrateOp
   calibration.sigmas = lens_sigmas(calibration.camera.width_px, kOfMost);
   if (!refined) return calibration;
   calibration.num_keyframes = refined->num_keyframes;
-  calibration.reprojection_px = refined->reprojection_px;
   calibration.sigmas = refined->sigmas;
   calibration.sigmas.segment<2>(2) /= stretch.factor;
   calibration.is_sure = refined->sigmas[0] < kSure;
@@ -266,10 +305,8 @@ std::vector<std::string> report(const EstimatedCalibration& calibration) {
                               sigmas[4],
                               distortion[1],
                               sigmas[5]));
-  lines.push_back(fmt::format("from: {} keyframes of {} frames, reprojection error {:.2f} px",
-                              calibration.num_keyframes,
-                              calibration.num_frames,
-                              calibration.reprojection_px));
+  lines.push_back(fmt::format(
+      "from: {} keyframes of {} frames", calibration.num_keyframes, calibration.num_frames));
   return lines;
 }
 

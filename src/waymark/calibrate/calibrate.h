@@ -39,7 +39,6 @@ struct EstimatedCalibration {
   std::string reason;          ///< What decided, in words.
   std::size_t num_frames = 0;  ///< That were looked at.
   std::size_t num_keyframes = 0;  ///< Of the map that the numbers are from; 0: there was none.
-  double reprojection_px = 0.0;   ///< Root mean square in that map, px of the features' levels.
 
   /// As for -c.
   CameraChain chain() const;
@@ -54,11 +53,11 @@ std::vector<std::string> report(const EstimatedCalibration& calibration);
 ///
 /// 360 degree images are known by their borders, fisheye lenses by the circle they light or by
 /// their field of view. Fields of view and distortions compete in how well pairs of images, matched
-/// by pixels, agree with any motion; from the best, map and bundle adjustment with free calibration
-/// take turns until they agree. That is tried on stretches of 300 frames, the first that tells
-/// being the last; a camera has one. Where the motion does not tell, the likeliest is taken and
-/// is_sure is false. Takes its frames from the input; only camera 0 counts. Throws InputError where
-/// there is no image. Repeatable by bits.
+/// by pixels, agree with any motion; from the best on, images are mapped with a calibration that is
+/// free (recalibrate()), with what the map before told, until it stays. That is tried on stretches
+/// of 300 frames, the first that tells being the last; a camera has one. Where the motion does not
+/// tell, the likeliest is taken and is_sure is false. Takes its frames from the input; only camera
+/// 0 counts. Throws InputError where there is no image. Repeatable by bits.
 EstimatedCalibration calibrate(Input& input, const CalibrateOptions& options);
 
 }  // namespace waymark

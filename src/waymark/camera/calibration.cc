@@ -25,7 +25,9 @@ constexpr double kAspectSigma = 0.002;  // Pixels are square.
 constexpr double kShapeSigma = 0.005;   // xi, alpha, beta, ...
 constexpr double kRadialSigma = 0.02;
 constexpr double kTangentialSigma = 5e-4;
-constexpr double kTurnSigma = 1e-3;  // rad
+constexpr double kTurnSigma = 1e-3;         // rad
+constexpr double kReadoutSigma = 20.0;      // ms
+constexpr double kDepthOffsetSigma = 0.02;  // 1/m
 /// A camera that turns and a sensor that shifts look nearly the same; cameras of a rig turn.
 constexpr double kSensorSigma = 0.05;  // px
 /// Of the terms of a BearingError at the side of the image: linear and quadratic.
@@ -36,15 +38,17 @@ constexpr double kQuadraticErrorSigma = 1.0;  // px
 /// do recordings of one camera differ.
 constexpr double kSystematicErrorPx = 0.2;
 constexpr double kSystematicPart = 0.15;
+/// Rectified images of cars on the road look like readouts of 7 ms from the bottom up.
+constexpr double kSystematicReadout = 2.5;       // ms
+constexpr double kSystematicDepthOffset = 2e-3;  // 1/m
+/// All cameras of a rig read their rows in the same time.
+constexpr double kSameReadout = 1e-3;  // ms
 /// Models with more numbers are taken as they are.
 constexpr std::size_t kMaxIntrinsics = 27;
 
 /// What is held may change by this part of its usual standard deviation; what is surer than that is
 /// exact.
 constexpr double kHeld = 1e-4;
-
-/// Differences are taken over this part of a usual standard deviation to either side.
-constexpr double kStep = 0.01;
 
 constexpr std::array<const char*, 4> kPlaneNames = {"fu", "fv", "pu", "pv"};
 constexpr std::array<const char*, 5> kTurnNames = {
@@ -81,23 +85,33 @@ CameraDescription described_fully(CameraDescription description) {
 
 CalibrationParameters::CalibrationParameters(const Rig& given) : given_(given) {
   for (std::size_t c = 0; c < given_.cameras.size(); ++c) {
-    blocks_.push_back({list_.size(), 0, false});
-    add_intrinsics(c);
-    if (c == 0 || !(given_.cameras[c].cam_from_rig.translation.norm() > 0.0)) continue;
-    add_bearing_error(c);
-    add_extrinsics(c);
+    Block block{list_.size(), 0, 0, false};
+    add_projection(c);
+    block.num_projection = list_.size() - block.first;
+    block.has_extrinsics = c > 0 && given_.cameras[c].cam_from_rig.translation.norm() > 0.0;
+    if (block.has_extrinsics) add_bearing_error(c);
+    if (given_.cameras.size() > 1 || block.num_projection > 0) add_sensor(c);
+    block.num_intrinsics = list_.size() - block.first;
+    if (block.has_extrinsics) add_extrinsics(c);
+    blocks_.push_back(block);
   }
+  tie_alike();
+}
+
+/// Pixels are square; cameras of a rig are of one kind.
+void CalibrationParameters::tie_alike() {
   const auto count = static_cast<Eigen::Index>(list_.size());
   ties_.setZero(count, count);
   for (const std::size_t fu : find(".fu")) {
     const double ratio = list_[fu].given / list_[fu + 1].given;
     tie(fu, fu + 1, ratio, kAspectSigma * list_[fu].given);
   }
-  for (const char* name : {".pu", ".pv"}) {
+  for (const auto& [name, sigma] : {std::pair{".pu", kSensorSigma},
+                                    std::pair{".pv", kSensorSigma},
+                                    std::pair{"readout_ms", kSameReadout}}) {
     const std::vector<std::size_t> of_cameras = find(name);
-    for (std::size_t i = 1; i < of_cameras.size(); ++i) {
-      tie(of_cameras[0], of_cameras[i], 1.0, kSensorSigma);
-    }
+    for (std::size_t i = 1; i < of_cameras.size(); ++i)
+      tie(of_cameras[0], of_cameras[i], 1.0, sigma);
   }
 }
 
@@ -119,6 +133,12 @@ std::vector<std::size_t> CalibrationParameters::find(std::string_view ending) co
   return found;
 }
 
+std::optional<std::size_t> CalibrationParameters::find(CalibrationGroup group) const {
+  const auto found = std::ranges::find(list_, group, &CalibrationParameter::group);
+  if (found == list_.end()) return std::nullopt;
+  return static_cast<std::size_t>(found - list_.begin());
+}
+
 /// Change a is `ratio` times change b, up to a standard deviation.
 void CalibrationParameters::tie(std::size_t a, std::size_t b, double ratio, double sigma) {
   Eigen::VectorXd difference = Eigen::VectorXd::Zero(ties_.rows());
@@ -137,7 +157,7 @@ void CalibrationParameters::add(CalibrationParameter parameter,
   list_.push_back(std::move(parameter));
 }
 
-void CalibrationParameters::add_intrinsics(std::size_t camera) {
+void CalibrationParameters::add_projection(std::size_t camera) {
   RigCamera& calibrated = given_.cameras[camera];
   if (!calibrated.description || !calibrated.remake) return;
   calibrated.description = described_fully(*calibrated.description);
@@ -173,7 +193,6 @@ void CalibrationParameters::add_intrinsics(std::size_t camera) {
         calibrated.sigmas.distortion_coeffs,
         i);
   }
-  blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
 }
 
 void CalibrationParameters::add_bearing_error(std::size_t camera) {
@@ -190,11 +209,28 @@ void CalibrationParameters::add_bearing_error(std::size_t camera) {
         {},
         0);
   }
-  blocks_[camera].num_intrinsics = list_.size() - blocks_[camera].first;
+}
+
+/// How the sensor measures: the readout and, of a single camera, the depth image.
+void CalibrationParameters::add_sensor(std::size_t camera) {
+  add({.name = camera == 0 ? "readout_ms" : fmt::format("cam{}.readout_ms", camera),
+       .given = 1e3 * given_.cameras[camera].readout_s,
+       .group = CalibrationGroup::kReadout,
+       .usual_sigma = kReadoutSigma,
+       .systematic_sigma = kSystematicReadout},
+      {},
+      0);
+  if (given_.cameras.size() > 1) return;
+  add({.name = "depth.inverse_offset",
+       .given = given_.inverse_depth_offset,
+       .group = CalibrationGroup::kDepthOffset,
+       .usual_sigma = kDepthOffsetSigma,
+       .systematic_sigma = kSystematicDepthOffset},
+      {},
+      0);
 }
 
 void CalibrationParameters::add_extrinsics(std::size_t camera) {
-  blocks_[camera].has_extrinsics = true;
   const CalibrationSigmas& sigmas = given_.cameras[camera].sigmas;
   const double pixel_rad = central_pixel_angle(*given_.cameras[camera].camera);
   for (std::size_t i = 0; i < kTurnNames.size(); ++i) {
@@ -219,22 +255,17 @@ std::vector<CalibrationSigmas> CalibrationParameters::by_camera(
       return std::vector<double>(first, next);
     };
     CalibrationSigmas& of_camera = by_camera.emplace_back();
-    if (has_projection(c)) {
+    if (blocks_[c].num_projection > 0) {
       const CameraDescription& description = *given_.cameras[c].description;
       of_camera.intrinsics = take(description.intrinsics.size());
       of_camera.distortion_coeffs = take(description.distortion_coeffs.size());
     }
     if (!blocks_[c].has_extrinsics) continue;
-    take(kNumErrors);
+    take(blocks_[c].num_intrinsics - blocks_[c].num_projection);
     of_camera.rotation_rad = take(kNumTurns);
     of_camera.baseline_direction_rad = take(kTurnNames.size() - kNumTurns);
   }
   return by_camera;
-}
-
-bool CalibrationParameters::has_projection(std::size_t camera) const {
-  const Block& block = blocks_[camera];
-  return block.num_intrinsics > (block.has_extrinsics ? std::size_t{kNumErrors} : 0);
 }
 
 CameraDescription CalibrationParameters::description_at(std::size_t camera,
@@ -251,7 +282,7 @@ std::optional<Rig> CalibrationParameters::rig_at(const Eigen::VectorXd& change) 
   Rig rig = given_;
   for (std::size_t c = 0; c < rig.cameras.size(); ++c) {
     RigCamera& camera = rig.cameras[c];
-    if (has_projection(c)) {
+    if (blocks_[c].num_projection > 0) {
       camera.description = description_at(c, change);
       try {
         camera.camera = camera.remake(*camera.description);
@@ -259,92 +290,31 @@ std::optional<Rig> CalibrationParameters::rig_at(const Eigen::VectorXd& change) 
         return std::nullopt;  // No such camera: the step was too long.
       }
     }
-    if (blocks_[c].has_extrinsics) {
-      const auto first = static_cast<Eigen::Index>(blocks_[c].first + blocks_[c].num_intrinsics);
-      camera.cam_from_rig = turned(camera.cam_from_rig, change.segment<5>(first));
+    const Block& block = blocks_[c];
+    auto at = static_cast<Eigen::Index>(block.first + block.num_projection);
+    if (block.has_extrinsics) {
       constexpr int kNumTerms = BearingError::kNumTerms;
-      camera.bearing_error.along_rad += change.segment<kNumTerms>(first - kNumErrors);
-      camera.bearing_error.across_rad += change.segment<kNumTerms>(first - kNumTerms);
+      camera.bearing_error.along_rad += change.segment<kNumTerms>(at);
+      camera.bearing_error.across_rad += change.segment<kNumTerms>(at + kNumTerms);
+      at += kNumErrors;
+      const auto turns = static_cast<Eigen::Index>(block.first + block.num_intrinsics);
+      camera.cam_from_rig = turned(camera.cam_from_rig, change.segment<5>(turns));
     }
+    if (block.num_intrinsics > 0) camera.readout_s += 1e-3 * change[at];
+  }
+  if (const auto at = find(CalibrationGroup::kDepthOffset)) {
+    rig.inverse_depth_offset += change[static_cast<Eigen::Index>(*at)];
   }
   return rig;
-}
-
-std::optional<std::vector<double>> CalibrationParameters::pixel_by_intrinsics(
-    std::size_t camera,
-    const Eigen::VectorXd& change,
-    std::span<const Eigen::Vector3d> bearings) const {
-  const Block& block = blocks_[camera];
-  std::vector<double> derivatives(2 * block.num_intrinsics * bearings.size(), 0.0);
-  std::vector<Eigen::Vector2d> above(bearings.size()), below(bearings.size());
-  std::vector<std::uint8_t> is_above(bearings.size()), is_below(bearings.size());
-  const auto project = [&](std::size_t parameter, double step, auto& pixels, auto& is_visible) {
-    Eigen::VectorXd stepped = change;
-    stepped[static_cast<Eigen::Index>(parameter)] += step;
-    given_.cameras[camera]
-        .remake(description_at(camera, stepped))
-        ->project(bearings, pixels, is_visible);
-  };
-  const std::size_t num_terms = block.has_extrinsics ? std::size_t{kNumErrors} : 0;
-  for (std::size_t p = 0; p + num_terms < block.num_intrinsics; ++p) {
-    const std::size_t parameter = block.first + p;
-    const double step = kStep * list_[parameter].usual_sigma;
-    try {
-      project(parameter, step, above, is_above);
-      project(parameter, -step, below, is_below);
-    } catch (const InputError&) {
-      return std::nullopt;
-    }
-    for (std::size_t i = 0; i < bearings.size(); ++i) {
-      if (!is_above[i] || !is_below[i]) continue;
-      double* const derivative = derivatives.data() + 2 * (block.num_intrinsics * i + p);
-      Eigen::Map<Eigen::Vector2d>{derivative} = (above[i] - below[i]) / (2.0 * step);
-    }
-  }
-  if (block.has_extrinsics) differentiate_by_bearing_error(camera, bearings, derivatives);
-  return derivatives;
-}
-
-void CalibrationParameters::differentiate_by_bearing_error(
-    std::size_t camera,
-    std::span<const Eigen::Vector3d> bearings,
-    std::vector<double>& derivatives) const {
-  constexpr int kNumTerms = BearingError::kNumTerms;
-  const auto by_angles = pixel_by_epipolar_angles(given_.cameras[camera], bearings);
-  const std::size_t num_intrinsics = blocks_[camera].num_intrinsics;
-  for (std::size_t i = 0; i < bearings.size(); ++i) {
-    const BearingError::Terms terms = BearingError::terms(bearings[i]);
-    double* const first = derivatives.data() + 2 * (num_intrinsics * (i + 1) - kNumErrors);
-    Eigen::Map<Eigen::Matrix<double, 2, kNumErrors>> by_errors(first);
-    by_errors.leftCols<kNumTerms>() = by_angles[i].col(0) * terms.transpose();
-    by_errors.rightCols<kNumTerms>() = by_angles[i].col(1) * terms.transpose();
-  }
-}
-
-std::vector<Eigen::Matrix2d> pixel_by_epipolar_angles(const RigCamera& camera,
-                                                      std::span<const Eigen::Vector3d> bearings) {
-  std::vector<Eigen::Vector2d> pixels(bearings.size());
-  std::vector<Matrix23d> jacobians(bearings.size());
-  std::vector<std::uint8_t> is_visible(bearings.size());
-  camera.camera->project_with_jacobian(bearings, pixels, jacobians, is_visible);
-  const Eigen::Vector3d baseline = camera.cam_from_rig.translation.normalized();
-  std::vector<Eigen::Matrix2d> by_angles(bearings.size(), Eigen::Matrix2d::Zero());
-  for (std::size_t i = 0; i < bearings.size(); ++i) {
-    const Eigen::Vector3d toward = baseline - baseline.dot(bearings[i]) * bearings[i];
-    if (!is_visible[i] || !(toward.norm() > 0.0)) continue;
-    const Eigen::Vector3d along = toward.normalized();
-    by_angles[i] << jacobians[i] * along, jacobians[i] * bearings[i].cross(along);
-  }
-  return by_angles;
 }
 
 std::optional<CameraChain> chain_of(const Rig& rig,
                                     std::span<const CalibrationEstimate> estimates) {
   const CalibrationParameters parameters(rig);
   std::vector<double> sigmas;
-  // After these the readout is told.
-  for (const CalibrationEstimate& estimate : estimates) {
-    if (sigmas.size() < parameters.size()) sigmas.push_back(estimate.sigma);
+  for (const CalibrationParameter& parameter : parameters.list()) {
+    const auto told = std::ranges::find(estimates, parameter.name, &CalibrationEstimate::name);
+    sigmas.push_back(told == estimates.end() ? parameter.prior_sigma : told->sigma);
   }
   std::vector<CalibrationSigmas> told;
   if (!estimates.empty()) told = parameters.by_camera(sigmas);

@@ -40,15 +40,23 @@ TEST(CalibrationParameters, AreThoseOfTheModelAndTheRig) {
   const Rig rig = rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0}), 2);
   const CalibrationParameters parameters(rig);
   const std::vector<std::string> names = names_of(parameters);
-  ASSERT_EQ(names.size(), std::size_t{2 * 8 + 10 + 5});
+  ASSERT_EQ(names.size(), std::size_t{2 * (8 + 1) + 10 + 5});
   EXPECT_EQ(names.front(), "cam0.fu");
   EXPECT_EQ(names[4], "cam0.k1") << "an undistorted camera may turn out to be distorted";
-  EXPECT_EQ(names[16], "cam1.along_x");
-  EXPECT_EQ(names[26], "cam1.turn_x");
+  EXPECT_EQ(names[8], "readout_ms");
+  EXPECT_EQ(names[17], "cam1.along_x");
+  EXPECT_EQ(names[27], "cam1.readout_ms");
+  EXPECT_EQ(names[28], "cam1.turn_x");
   EXPECT_EQ(names_of(CalibrationParameters(
                 rig_of(described("ds", {-0.2, 0.6, 300.0, 300.0, 320.0, 240.0})))),
-            (std::vector<std::string>{
-                "cam0.shape1", "cam0.shape2", "cam0.fu", "cam0.fv", "cam0.pu", "cam0.pv"}));
+            (std::vector<std::string>{"cam0.shape1",
+                                      "cam0.shape2",
+                                      "cam0.fu",
+                                      "cam0.fv",
+                                      "cam0.pu",
+                                      "cam0.pv",
+                                      "readout_ms",
+                                      "depth.inverse_offset"}));
 }
 
 TEST(CalibrationParameters, LackWhatCannotBeMadeAnew) {
@@ -63,9 +71,10 @@ TEST(CalibrationParameters, ChangeTheRig) {
   Eigen::VectorXd change = Eigen::VectorXd::Zero(static_cast<Eigen::Index>(parameters.size()));
   change[0] = 10.0;
   change[4] = -0.1;
-  change[18] = 3e-3;  // cam1.along_xx
-  change[27] = 2e-3;  // cam1.turn_y
-  change[29] = 1e-3;
+  change[8] = 20.0;   // readout_ms
+  change[19] = 3e-3;  // cam1.along_xx
+  change[29] = 2e-3;  // cam1.turn_y
+  change[31] = 1e-3;
   const std::optional<Rig> changed = parameters.rig_at(change);
   ASSERT_TRUE(changed.has_value());
   EXPECT_EQ(changed->cameras[0].description->intrinsics[0], 410.0);
@@ -74,20 +83,31 @@ TEST(CalibrationParameters, ChangeTheRig) {
   EXPECT_NEAR(so3_log(turned.rotation).y(), 2e-3, 1e-12);
   EXPECT_NEAR(turned.translation.norm(), 0.1, 1e-12) << "the baseline keeps its length";
   EXPECT_EQ(changed->cameras[1].bearing_error.along_rad[2], 3e-3);
+  EXPECT_EQ(changed->cameras[0].readout_s, 0.02);
   change[0] = -500.0;
   EXPECT_FALSE(parameters.rig_at(change).has_value()) << "there is no such camera";
+}
+
+TEST(CalibrationParameters, ChangeTheOffsetOfDepths) {
+  const Rig rig =
+      with_depth_offset(rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0})), 0.01);
+  const CalibrationParameters parameters(rig);
+  Eigen::VectorXd change = Eigen::VectorXd::Zero(10);
+  change[9] = 0.02;
+  EXPECT_DOUBLE_EQ(parameters.rig_at(change)->inverse_depth_offset, 0.03);
+  EXPECT_EQ(parameters.list()[9].given, 0.01);
 }
 
 TEST(CalibrationParameters, GiveTheDerivativeOfThePixel) {
   const Rig rig = rig_of(
       described("pinhole", {400.0, 410.0, 320.0, 240.0}, "radtan", {-0.2, 0.05, 0.001, 0.002}));
   const CalibrationParameters parameters(rig);
-  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(8);
+  const Eigen::VectorXd zero = Eigen::VectorXd::Zero(10);
   const std::vector<Eigen::Vector3d> bearings = {Eigen::Vector3d(0.3, -0.2, 1.0).normalized(),
                                                  -Eigen::Vector3d::UnitZ()};
   const auto derivatives = parameters.pixel_by_intrinsics(0, zero, bearings);
   ASSERT_TRUE(derivatives.has_value());
-  ASSERT_EQ(derivatives->size(), std::size_t{2 * 2 * 8});
+  ASSERT_EQ(derivatives->size(), std::size_t{2 * 2 * 10});
   const double r2 = 0.13;
   const double radial = 1.0 - 0.2 * r2 + 0.05 * r2 * r2;
   const double x = 0.3 * radial + 2.0 * 0.001 * 0.3 * -0.2 + 0.002 * (r2 + 2.0 * 0.09);
@@ -95,7 +115,7 @@ TEST(CalibrationParameters, GiveTheDerivativeOfThePixel) {
   EXPECT_NEAR((*derivatives)[1], 0.0, 1e-8) << "v by fu";
   EXPECT_NEAR((*derivatives)[8], 400.0 * 0.3 * r2, 1e-6) << "u by k1";
   EXPECT_NEAR((*derivatives)[9], 410.0 * -0.2 * r2, 1e-6) << "v by k1";
-  for (std::size_t i = 16; i < 32; ++i) EXPECT_EQ((*derivatives)[i], 0.0) << "behind the camera";
+  for (std::size_t i = 20; i < 40; ++i) EXPECT_EQ((*derivatives)[i], 0.0) << "behind the camera";
 }
 
 TEST(CalibrationParameters, AreAsSureAsTheCalibrationSays) {
@@ -111,8 +131,8 @@ TEST(CalibrationParameters, AreAsSureAsTheCalibrationSays) {
   EXPECT_EQ(sigmas[0], 0.1);
   EXPECT_EQ(sigmas[2], 0.0);
   EXPECT_EQ(sigmas[4], 0.02) << "nothing is said of distortion";
-  EXPECT_EQ(sigmas[26], 1e-3) << "nor of the turn";
-  EXPECT_EQ(sigmas[30], 0.02);
+  EXPECT_EQ(sigmas[28], 1e-3) << "nor of the turn";
+  EXPECT_EQ(sigmas[32], 0.02);
   const std::vector<CalibrationSigmas> again = parameters.by_camera(sigmas);
   EXPECT_EQ(again[0].intrinsics, chain.cameras[0].sigmas.intrinsics);
   EXPECT_EQ(again[1].distortion_coeffs.size(), 4u);
@@ -128,7 +148,7 @@ TEST(CalibrationParameters, DifferentiateByErrorsOfBearings) {
   const std::vector<Eigen::Vector3d> bearings = {Eigen::Vector3d(0.3, -0.2, 1.0).normalized()};
   const auto derivatives = parameters.pixel_by_intrinsics(1, zero, bearings);
   ASSERT_TRUE(derivatives.has_value());
-  ASSERT_EQ(derivatives->size(), std::size_t{2 * 18});
+  ASSERT_EQ(derivatives->size(), std::size_t{2 * 19});
   // The epipolar line of a parallel pair is a row; near points are further to the left.
   const Eigen::Vector3d& bearing = bearings[0];
   const double x = bearing.x();
@@ -149,7 +169,7 @@ TEST(CalibrationParameters, DifferentiateByErrorsOfBearings) {
 TEST(CalibrationParameters, AreHeldByAStandardDeviationOfZero) {
   const CalibrationParameters parameters(
       rig_of(described("pinhole", {400.0, 400.0, 320.0, 240.0})));
-  std::vector<double> sigmas(8, 0.1);
+  std::vector<double> sigmas(10, 0.1);
   const double near = parameters.prior_information(sigmas)(4, 4);
   EXPECT_NEAR(near, 100.0, 1e-9);
   sigmas[4] = 0.0;

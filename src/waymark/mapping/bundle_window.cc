@@ -8,9 +8,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/mapping/depth_offset.h"
 #include "waymark/mapping/marker_bundle.h"
-#include "waymark/mapping/readout.h"
 #include "waymark/solver/residual.h"
 
 namespace waymark {
@@ -155,6 +153,18 @@ MapCorrection moves_of(const BundleWindow& window, const BundleProblem& problem)
   return correction;
 }
 
+/// A window that shows little tells the readout alone, as long as all else is as given.
+FreeParameters free_parameters(const KnownCalibration& known, bool shows_little) {
+  bool is_else_given = true;
+  for (std::size_t i = 0; i < known.parameters.size(); ++i) {
+    const CalibrationParameter& parameter = known.parameters[i];
+    const bool is_given = known.sigma[static_cast<Eigen::Index>(i)] == parameter.prior_sigma;
+    is_else_given &= is_given || parameter.group == CalibrationGroup::kReadout;
+  }
+  if (shows_little && is_else_given) return FreeParameters::kReadout;
+  return known.is_always_refined ? FreeParameters::kAll : FreeParameters::kLikely;
+}
+
 }  // namespace
 
 BundleWindow choose_window(const Map& map,
@@ -222,14 +232,12 @@ WindowAdjustment compute_adjustment(const Map& map,
   WindowProblem window_problem = make_problem(map, window, start);
   std::optional<KnownCalibration> calibration;
   if (known) {
-    calibration = find_readout(map, window_problem.observations, *known, window_problem.problem);
-    if (!calibration && map.keyframes().size() >= known->min_keyframes) {
-      calibration = recalibrate(map, window_problem.observations, *known, window_problem.problem);
-    }
-    if (!calibration) {
-      calibration =
-          find_depth_offset(map, window_problem.observations, *known, window_problem.problem);
-    }
+    const bool shows_little = map.keyframes().size() < known->min_keyframes;
+    calibration = recalibrate(map,
+                              window_problem.observations,
+                              *known,
+                              free_parameters(*known, shows_little),
+                              window_problem.problem);
   }
   if (!map.markers().empty() && !window_problem.problem.calibration) {
     const std::vector<KeyframeId> keyframes = keyframes_of(window);
@@ -246,9 +254,12 @@ WindowAdjustment compute_adjustment(const Map& map,
 std::optional<KnownCalibration> look_for_readout(const Map& map,
                                                  const BundleWindow& window,
                                                  const KnownCalibration& known) {
-  if (window.moving.empty() || window.landmarks.empty()) return std::nullopt;
+  const FreeParameters free = free_parameters(known, true);
+  if (free != FreeParameters::kReadout || window.moving.empty() || window.landmarks.empty()) {
+    return std::nullopt;
+  }
   WindowProblem window_problem = make_problem(map, window);
-  return find_readout(map, window_problem.observations, known, window_problem.problem);
+  return recalibrate(map, window_problem.observations, known, free, window_problem.problem);
 }
 
 std::vector<LandmarkId> drop_outliers(Map& map,

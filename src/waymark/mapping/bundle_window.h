@@ -6,10 +6,10 @@
 #include <span>
 #include <vector>
 
+#include "waymark/calibration/recalibrate.h"
 #include "waymark/map/correction.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
-#include "waymark/mapping/calibrate.h"
 #include "waymark/optimize/bundle.h"
 
 namespace waymark {
@@ -50,7 +50,8 @@ WindowAdjustment compute_adjustment(const Map& map,
                                     const KnownCalibration* known = nullptr,
                                     const MapCorrection* start = nullptr);
 
-/// Looks for the readout of a rolling shutter in what a window sees: see find_readout().
+/// Looks for the readout of a rolling shutter in what a window sees; nothing where the images do
+/// not contradict that in use, or more than that is known of the calibration: see recalibrate().
 std::optional<KnownCalibration> look_for_readout(const Map& map,
                                                  const BundleWindow& window,
                                                  const KnownCalibration& known);

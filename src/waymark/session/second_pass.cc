@@ -92,7 +92,7 @@ double image_shift(const Rig& before, const Rig& after) {
 std::optional<SecondPass> calibration_for_second_pass(const Session& session) {
   const InputInfo& info = session.input->info();
   if (info.is_live || session.estimated) return std::nullopt;
-  SecondPass pass{*info.calibration};
+  SecondPass pass{*info.calibration, session.system->rig()->inverse_depth_offset};
   if (const auto distorted = with_missing_distortion(session)) {
     pass.calibration.cameras[0] = *distorted;
     pass.mistake = kMissingDistortion;
@@ -114,13 +114,15 @@ std::optional<SecondPass> calibration_for_second_pass(const Session& session) {
 
 std::vector<CalibrationEstimate> join_passes(std::span<const CalibrationEstimate> first,
                                              std::vector<CalibrationEstimate> second) {
-  if (second.empty()) return {first.begin(), first.end()};
-  for (CalibrationEstimate& estimate : second) {
-    const auto before = std::ranges::find(first, estimate.name, &CalibrationEstimate::name);
-    if (before == first.end()) continue;
-    estimate.given = before->given;
-    estimate.given_sigma = before->given_sigma;
-    estimate.change += before->change;
+  for (const CalibrationEstimate& before : first) {
+    const auto after = std::ranges::find(second, before.name, &CalibrationEstimate::name);
+    if (after == second.end()) {
+      second.push_back(before);
+      continue;
+    }
+    after->given = before.given;
+    after->given_sigma = before.given_sigma;
+    after->change += before.change;
   }
   return second;
 }

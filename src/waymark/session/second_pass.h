@@ -20,6 +20,7 @@ double image_shift(const Rig& before, const Rig& after);
 /// What the input of a session is mapped once more with, from the start.
 struct SecondPass {
   CameraChain calibration;
+  double inverse_depth_offset = 0.0;  ///< Rig::inverse_depth_offset.
   std::string mistake = {};  ///< What was wrong with the stated one, for people; may be empty.
 };
 

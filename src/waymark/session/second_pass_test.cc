@@ -53,15 +53,17 @@ TEST(SecondPass, BeginsWithWhatWasFoundInsteadOfWhatWasStated) {
 }
 
 TEST(JoinPasses, AddsTheChanges) {
-  const std::vector<CalibrationEstimate> first{{"cam0.fu", 50.0, 3.0, 0.1, 0.02},
-                                               {"cam1.turn_y", 0.0, 2e-3, 5e-4, 1e-5}};
+  std::vector<CalibrationEstimate> first{{"cam0.fu", 50.0, 3.0, 0.1, 0.02},
+                                         {"cam1.turn_y", 0.0, 2e-3, 5e-4, 1e-5}};
   std::vector<CalibrationEstimate> second{{"cam0.fu", 53.0, 0.5, 0.1, 0.01},
                                           {"cam1.turn_y", 0.0, 1e-4, 5e-4, 2e-5}};
+  first.push_back({"readout_ms", 0.0, 20.0, 20.0, 1.0});
   const auto joined = join_passes(first, second);
   EXPECT_EQ(joined[0].given, 50.0);
   EXPECT_EQ(joined[0].change, 3.5);
   EXPECT_EQ(joined[0].sigma, 0.01);
   EXPECT_DOUBLE_EQ(joined[1].change, 2.1e-3);
+  EXPECT_EQ(joined[2].change, 20.0) << "of the first alone";
   EXPECT_EQ(join_passes(first, {})[0].change, 3.0);
   EXPECT_THAT(join_passes({}, {}), IsEmpty());
 }

@@ -15,7 +15,7 @@ namespace waymark {
 
 /// Derivative of the residual rows of an observation by the parameters of its camera, transposed: a
 /// column per residual row. Parameters lie side by side wherever there are some, for SIMD.
-using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 42, 3>;
+using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 43, 3>;
 
 /// The unknown calibration in the normal equations of bundle adjustment: few rows and columns in
 /// which every pose and point takes part, hence a dense border around the sparse reduced system

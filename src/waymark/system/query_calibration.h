@@ -7,7 +7,7 @@
 #include <span>
 #include <vector>
 
-#include "waymark/mapping/calibrate.h"
+#include "waymark/calibration/recalibrate.h"
 #include "waymark/mapping/settings.h"
 #include "waymark/track/frame.h"
 

@@ -10,8 +10,8 @@
 #include <string>
 
 #include "waymark/base/config.h"
+#include "waymark/calibration/testing/calibration.h"
 #include "waymark/loop/global_mapper.h"
-#include "waymark/mapping/testing/calibration.h"
 #include "waymark/system/testing/sequence.h"
 
 namespace waymark {

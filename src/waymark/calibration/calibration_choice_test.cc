@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapping/calibration_choice.h"
+#include "waymark/calibration/calibration_choice.h"
 
 #include <gtest/gtest.h>
 
-#include "waymark/mapping/testing/calibration.h"
+#include "waymark/calibration/testing/calibration.h"
 
 namespace waymark {
 namespace {
@@ -39,26 +39,30 @@ class CalibrationChoiceTest : public ::testing::Test {
 
 TEST_F(CalibrationChoiceTest, TakesTheExplanationThatNeedsTheSmallerError) {
   // 20 px are fifty of the usual standard deviations, .02 is one; then .4 px and .6.
-  const CalibrationPosterior distorted = choose_prior(parameters_, cost_of(20.0, 0.02), false);
+  const CalibrationPosterior distorted =
+      choose_prior(parameters_, cost_of(20.0, 0.02), FreeParameters::kLikely);
   EXPECT_NEAR(distorted.change[kDistortion], 0.02, 1e-3);
   EXPECT_LT(std::abs(distorted.change[kFocalLength]), 0.5);
-  const CalibrationPosterior longer = choose_prior(parameters_, cost_of(0.4, 0.6), false);
+  const CalibrationPosterior longer =
+      choose_prior(parameters_, cost_of(0.4, 0.6), FreeParameters::kLikely);
   EXPECT_NEAR(longer.change[kFocalLength], 0.4, 0.1);
   EXPECT_LT(std::abs(longer.change[kDistortion]), 0.02);
 }
 
 TEST_F(CalibrationChoiceTest, GoesFarWhereNothingElseExplains) {
-  const CalibrationPosterior found = choose_prior(parameters_, cost_of(1e9, 0.3), false);
+  const CalibrationPosterior found =
+      choose_prior(parameters_, cost_of(1e9, 0.3), FreeParameters::kLikely);
   EXPECT_NEAR(found.change[kDistortion], 0.3, 0.01);
   EXPECT_GT(found.prior_sigmas[kDistortion], 0.1);
   EXPECT_EQ(found.prior_sigmas[2], 0.0) << "centres are held";
-  EXPECT_GT(choose_prior(parameters_, cost_of(1e9, 0.3), true).prior_sigmas[2], 0.0);
+  EXPECT_GT(choose_prior(parameters_, cost_of(1e9, 0.3), FreeParameters::kAll).prior_sigmas[2],
+            0.0);
 }
 
 TEST_F(CalibrationChoiceTest, PredictsWhatOnlyAllPartsAgreeOn) {
   const auto gain_with = [&](double disagreement) {
     const CalibrationCost cost = cost_of(1e9, 0.02, disagreement);
-    const CalibrationPosterior found = choose_prior(parameters_, cost, false);
+    const CalibrationPosterior found = choose_prior(parameters_, cost, FreeParameters::kLikely);
     return predicted_gain(cost, found, cost.at);
   };
   EXPECT_GT(gain_with(0.0), 400.0);
@@ -69,7 +73,7 @@ TEST_F(CalibrationChoiceTest, PredictsWhatOnlyAllPartsAgreeOn) {
 TEST_F(CalibrationChoiceTest, MeasuresHowPartsContradictEachOther) {
   const auto variance_with = [&](double disagreement) {
     const CalibrationCost cost = cost_of(1e9, 0.02, disagreement);
-    return variance_between_parts(cost, choose_prior(parameters_, cost, false));
+    return variance_between_parts(cost, choose_prior(parameters_, cost, FreeParameters::kLikely));
   };
   EXPECT_NEAR(variance_with(0.0), 0.0, 1e-9);
   EXPECT_GT(variance_with(0.2), 1.0);

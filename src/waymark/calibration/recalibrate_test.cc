@@ -1,12 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapping/calibrate.h"
+#include "waymark/calibration/recalibrate.h"
 
 #include <gtest/gtest.h>
 
+#include "waymark/calibration/testing/calibration.h"
 #include "waymark/map/parts.h"
 #include "waymark/mapping/global_adjustment.h"
-#include "waymark/mapping/testing/calibration.h"
 
 namespace waymark {
 namespace {

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapping/calibration_choice.h"
+#include "waymark/calibration/calibration_choice.h"
 
 #include <Eigen/Cholesky>
 #include <algorithm>
@@ -23,20 +23,41 @@ constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-
 /// In place of no systematic error, so that all have one.
 constexpr double kNone = 1e-7;
 
-/// A pair whose bearings are off smoothly over the image is as likely.
-constexpr double kBearingErrorProbability = 1e-3;
+/// A pair whose bearings are off smoothly over the image is as likely, as is an offset of depths
+/// that nobody told of; most shutters roll, but not those of the cameras that people calibrate.
+constexpr double kRareErrorProbability = 1e-3;
+constexpr double kReadoutProbability = 0.1;
 
-/// Which spread each of the three groups has.
+/// No camera needs longer for its rows.
+constexpr double kMaxReadoutMs = 100.0;
+
+/// An explanation: which spread each of the three groups has, and which of the rare errors there
+/// are.
 struct Spreads {
   std::array<std::size_t, 3> groups = {};
   bool has_bearing_error = false;
+  bool has_readout = false;
+  bool has_depth_offset = false;
 };
 
-/// Whether images are asked for a number: centres and tangential distortion take up errors of other
-/// kinds, such as those of a rolling shutter, and calibrations hardly err in them.
-bool is_likely_wrong(const CalibrationParameter& parameter) {
-  return parameter.group != CalibrationGroup::kCentre &&
-         parameter.group != CalibrationGroup::kTangential;
+constexpr std::size_t kWidest = kSpreads.size() - 1;
+
+std::vector<Spreads> all_spreads(const CalibrationParameters& parameters, FreeParameters free) {
+  if (free == FreeParameters::kReadout) return {{}, {.has_readout = true}};
+  const bool is_pair = parameters.find(CalibrationGroup::kBearing).has_value();
+  std::vector<Spreads> all;
+  for (std::size_t focal = 0; focal < kSpreads.size(); ++focal) {
+    for (std::size_t radial = 0; radial < kSpreads.size(); ++radial) {
+      for (std::size_t turn = 0; turn < (is_pair ? kSpreads.size() : 1); ++turn) {
+        for (unsigned rare = 0; rare < 4; ++rare) {
+          const bool is_first = (rare & 1) != 0;  // Pairs have no depth image.
+          all.push_back(
+              {{focal, radial, turn}, is_pair && is_first, (rare & 2) != 0, !is_pair && is_first});
+        }
+      }
+    }
+  }
+  return all;
 }
 
 double factor_of(CalibrationGroup group, const Spreads& spreads) {
@@ -49,20 +70,58 @@ double factor_of(CalibrationGroup group, const Spreads& spreads) {
       return kSpreads[spreads.groups[2]].factor;
     case CalibrationGroup::kBearing:
       return spreads.has_bearing_error ? 1.0 : 0.0;
+    case CalibrationGroup::kReadout:
+      return spreads.has_readout ? 1.0 : 0.0;
+    case CalibrationGroup::kDepthOffset:
+      return spreads.has_depth_offset ? 1.0 : 0.0;
     default:
       return 1.0;
   }
 }
 
+/// Whether images are asked for a number.
+bool is_free(const CalibrationParameter& parameter, FreeParameters free) {
+  if (free == FreeParameters::kReadout) return parameter.group == CalibrationGroup::kReadout;
+  return free == FreeParameters::kAll || (parameter.group != CalibrationGroup::kCentre &&
+                                          parameter.group != CalibrationGroup::kTangential);
+}
+
+/// That a calibration errs so.
+double log_probability(const CalibrationParameters& parameters, const Spreads& spreads) {
+  const auto is_told = [&](CalibrationGroup group) {
+    const auto at = parameters.find(group);
+    return at && parameters.list()[*at].given != 0.0;
+  };
+  double sum = 0.0;
+  if (spreads.has_bearing_error) sum += std::log(kRareErrorProbability);
+  if (spreads.has_depth_offset && !is_told(CalibrationGroup::kDepthOffset)) {
+    sum += std::log(kRareErrorProbability);
+  }
+  if (spreads.has_readout && !is_told(CalibrationGroup::kReadout)) {
+    sum += std::log(kReadoutProbability);
+  }
+  for (const std::size_t spread : spreads.groups) sum += std::log(kSpreads[spread].probability);
+  return sum;
+}
+
 std::vector<double> sigmas_of(const CalibrationParameters& parameters,
                               const Spreads& spreads,
-                              bool is_all_free) {
+                              FreeParameters free) {
   std::vector<double> sigmas;
   for (const CalibrationParameter& parameter : parameters.list()) {
-    const bool is_free = is_all_free || is_likely_wrong(parameter);
-    sigmas.push_back(is_free ? factor_of(parameter.group, spreads) * parameter.prior_sigma : 0.0);
+    const double factor = is_free(parameter, free) ? factor_of(parameter.group, spreads) : 0.0;
+    sigmas.push_back(factor * parameter.prior_sigma);
   }
   return sigmas;
+}
+
+/// Rows are read from the top down, unless it is told otherwise.
+bool has_possible_readout(const CalibrationParameters& parameters, const Eigen::VectorXd& change) {
+  const auto at = parameters.find(CalibrationGroup::kReadout);
+  if (!at) return true;
+  const double given = parameters.list()[*at].given;
+  const double readout = given + change[static_cast<Eigen::Index>(*at)];
+  return std::abs(readout) < kMaxReadoutMs && (given < 0.0 ? readout <= 0.0 : readout >= 0.0);
 }
 
 double log_determinant(const Eigen::LLT<Eigen::MatrixXd>& factor) {
@@ -90,20 +149,25 @@ CalibrationTold with_systematic_errors(const CalibrationParameters& parameters,
           told.gradient - told.information * factor.solve(told.gradient)};
 }
 
-/// With what images tell, and the same with systematic errors, which says how sure that is.
+/// What images tell, and the same with systematic errors, which says how sure that is.
+struct ToldTwice {
+  CalibrationTold told;
+  CalibrationTold with_errors;
+};
+
+/// All but the standard deviations.
 CalibrationPosterior posterior(const CalibrationParameters& parameters,
-                               const CalibrationTold& told,
-                               const CalibrationTold& told_with_errors,
+                               const ToldTwice& images,
                                std::vector<double> prior_sigmas) {
   CalibrationPosterior result;
   result.prior_information = parameters.prior_information(prior_sigmas);
   result.prior_sigmas = std::move(prior_sigmas);
+  const CalibrationTold& told = images.told;
   result.change = -(told.information + result.prior_information).llt().solve(told.gradient);
-  const Eigen::LLT<Eigen::MatrixXd> factor(told_with_errors.information + result.prior_information);
+  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information +
+                                           result.prior_information);
   const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior_information);
-  const auto size = result.change.size();
-  result.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
-  const Eigen::VectorXd& gradient = told_with_errors.gradient;
+  const Eigen::VectorXd& gradient = images.with_errors.gradient;
   result.gain = 0.5 * gradient.dot(factor.solve(gradient));
   result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
   return result;
@@ -147,33 +211,28 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
   return expected > 0.0 ? seen / expected : 0.0;
 }
 
-Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, bool is_all_free) {
-  constexpr std::size_t kWidest = kSpreads.size() - 1;
+Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, FreeParameters free) {
   return parameters.prior_information(
-      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true}, is_all_free));
+      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true, true, true}, free));
 }
 
 CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
                                   const CalibrationCost& cost,
-                                  bool is_all_free) {
+                                  FreeParameters free) {
   const CalibrationTold told = at_given(cost, cost.evidence.whole);
-  const CalibrationTold with_errors = with_systematic_errors(parameters, told);
+  const ToldTwice images{told, with_systematic_errors(parameters, told)};
   CalibrationPosterior best;
   best.log_evidence = -HUGE_VAL;
-  constexpr std::size_t kNumSpreads = kSpreads.size();
-  for (std::size_t i = 0; i < 2 * kNumSpreads * kNumSpreads * kNumSpreads; ++i) {
-    const std::size_t j = i / 2;
-    const Spreads spreads{
-        {j % kNumSpreads, j / kNumSpreads % kNumSpreads, j / kNumSpreads / kNumSpreads},
-        i % 2 == 1};
-    CalibrationPosterior one =
-        posterior(parameters, told, with_errors, sigmas_of(parameters, spreads, is_all_free));
-    if (spreads.has_bearing_error) one.log_evidence += std::log(kBearingErrorProbability);
-    for (const std::size_t spread : spreads.groups) {
-      one.log_evidence += std::log(kSpreads[spread].probability);
-    }
-    if (one.log_evidence > best.log_evidence) best = std::move(one);
+  for (const Spreads& spreads : all_spreads(parameters, free)) {
+    CalibrationPosterior one = posterior(parameters, images, sigmas_of(parameters, spreads, free));
+    one.log_evidence += log_probability(parameters, spreads);
+    if (one.log_evidence <= best.log_evidence) continue;
+    if (spreads.has_readout && !has_possible_readout(parameters, one.change)) continue;
+    best = std::move(one);
   }
+  const auto size = best.change.size();
+  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information + best.prior_information);
+  best.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
   return best;
 }
 

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapping/camera_measurements.h"
+#include "waymark/calibration/camera_measurements.h"
 
 #include <Eigen/Cholesky>
 #include <cmath>
@@ -12,6 +12,7 @@
 #include "waymark/camera/tangent.h"
 #include "waymark/features/feature_geometry.h"
 #include "waymark/features/pyramid.h"
+#include "waymark/features/rolling_shutter.h"
 
 namespace waymark {
 namespace {
@@ -29,15 +30,21 @@ std::vector<CameraMeasurements> collect(const Map& map,
                                         const Rig& rig,
                                         const BundleProblem& problem) {
   std::vector<CameraMeasurements> cameras(rig.cameras.size());
+  for (std::size_t c = 0; c < cameras.size(); ++c) cameras[c].readout_s = rig.cameras[c].readout_s;
   for (std::size_t i = 0; i < observed.size(); ++i) {
     if (problem.rigs[problem.observations[i].pose] != &rig) continue;
     const Keyframe& keyframe = map.keyframes().at(observed[i].keyframe);
-    const Keypoint& keypoint = keyframe.features->keypoints[observed[i].feature];
+    const std::uint32_t feature = observed[i].feature;
+    const Keypoint& keypoint = keyframe.features->keypoints[feature];
     CameraMeasurements& camera = cameras[keypoint.camera];
     camera.indices.push_back(i);
     camera.pixels.emplace_back(keypoint.x_px, keypoint.y_px);
     camera.level_scales.push_back(static_cast<float>(Pyramid::scale(keypoint.level)));
-    camera.projectors.push_back(projector_of(*keyframe.features, observed[i].feature));
+    camera.projectors.push_back(projector_of(*keyframe.features, feature));
+    const RigCamera& calibrated = rig.cameras[keypoint.camera];
+    camera.bearing_by_readout_ms.push_back(
+        1e-3f * row_delay(*calibrated.camera, keypoint.y_px) *
+        bearing_rate(keyframe.motion, calibrated, *keyframe.features, feature));
   }
   return cameras;
 }
@@ -69,6 +76,10 @@ void linearize(const CameraMeasurements& measured,
   if (!error.along_rad.isZero(0.0) || !error.across_rad.isZero(0.0)) {
     const auto by_angles = pixel_by_epipolar_angles(calibrated, directions);
     for (std::size_t k = 0; k < count; ++k) pixels[k] += by_angles[k] * error.at(directions[k]);
+  }
+  const double readout_ms = 1e3 * (calibrated.readout_s - measured.readout_s);
+  for (std::size_t k = 0; k < count && readout_ms != 0.0; ++k) {
+    pixels[k] += jacobians[k] * (readout_ms * measured.bearing_by_readout_ms[k].cast<double>());
   }
   for (std::size_t k = 0; k < count; ++k) {
     BundleObservation& observation = problem.observations[measured.indices[k]];

@@ -10,6 +10,13 @@
 
 namespace waymark {
 
+/// Which numbers of a calibration images are asked for.
+enum class FreeParameters {
+  kReadout,  ///< That alone, which few images tell.
+  kLikely,   ///< All but centres and tangential distortion, which take up errors of other kinds.
+  kAll,
+};
+
 /// What images tell of a calibration at a change from what was given.
 struct CalibrationCost {
   Eigen::VectorXd at;            ///< The change.
@@ -45,14 +52,15 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
 
 /// Of the priors that say how calibrations err, the one that makes the images likeliest, and what
 /// follows from it. A calibration is as good as usual or, which is rarer, wrong by more, in its
-/// focal lengths, its distortion and its turns each for itself: among explanations that fit alike
-/// the one wins that needs the smaller and fewer errors (MacKay, 1992, "Bayesian interpolation").
-/// Centres and tangential distortion are held unless all is asked for.
+/// focal lengths, its distortion and its turns each for itself; rarely are bearings of a pair off
+/// smoothly over the image, or depths, or does a shutter roll that is not told of: among
+/// explanations that fit alike the one wins that needs the smaller and fewer errors (MacKay, 1992,
+/// "Bayesian interpolation").
 CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
                                   const CalibrationCost& cost,
-                                  bool is_all_free);
+                                  FreeParameters free);
 
 /// The widest of these priors, as information.
-Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, bool is_all_free);
+Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, FreeParameters free);
 
 }  // namespace waymark

@@ -22,6 +22,9 @@ struct CameraMeasurements {
   std::vector<float> level_scales;      ///< Size of a pixel of the feature's level.
   /// What of a residual counts: all of it, or of points on edges what is across.
   std::vector<Eigen::Matrix2d> projectors;
+  double readout_s = 0.0;  ///< That the pixels are corrected for.
+  /// By what bearings differ from those of the frame's time, per millisecond of readout.
+  std::vector<Eigen::Vector3f> bearing_by_readout_ms;
 };
 
 /// Per camera of the rig. observed: of each observation of the problem, in the map.

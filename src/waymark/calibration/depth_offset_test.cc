@@ -1,11 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/mapping/depth_offset.h"
-
 #include <gtest/gtest.h>
 
+#include "waymark/calibration/testing/calibration.h"
 #include "waymark/mapping/global_adjustment.h"
-#include "waymark/mapping/testing/calibration.h"
 
 namespace waymark {
 namespace {
