@@ -114,6 +114,7 @@ struct SimulateOptions {
   double depth_lag_ms = 0.0;
   double stitched_m = 0.0;
   double stabilised_share = 0.0;
+  double compressed_kbit_per_s = 0.0;
   std::vector<double> turn_deg;   ///< Of camera 1; empty: none.
   std::vector<double> warped_px;  ///< Along and across the epipolar lines; empty: none.
   std::vector<double> gain1;      ///< Of camera 1, in the first frame and the last; empty: 1.
@@ -154,6 +155,7 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   spec.depth_lag_s = 1e-3 * options.depth_lag_ms;
   spec.stitched_m = options.stitched_m;
   spec.stabilised_share = options.stabilised_share;
+  spec.compressed_kbit_per_s = options.compressed_kbit_per_s;
   if (!options.warped_px.empty()) spec.warped_px = Eigen::Vector2d(options.warped_px.data());
   if (!options.gain1.empty()) spec.gain1 = Eigen::Vector2d(options.gain1.data());
   turn_camera1(options.turn_deg, spec.chain);
@@ -271,6 +273,11 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
                   "Part of its width by which the picture is shifted at most, to hide how the "
                   "camera shakes; 0.05 is usual [0]")
       ->check(number_between(0.0, 0.2));
+  simulation
+      .add_option("--compressed",
+                  options.compressed_kbit_per_s,
+                  "Kilobits per second that each camera's images are compressed to, as H.264 [not]")
+      ->check(number_between(1.0, 1e6));
   add_pair_options(simulation, options);
   simulation
       .add_option("--told",

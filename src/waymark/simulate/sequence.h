@@ -78,6 +78,8 @@ struct SequenceSpec {
   /// By how many pixels images of camera 1 of a pair are bent along and across the epipolar lines,
   /// see RectificationError.
   Eigen::Vector2d warped_px = Eigen::Vector2d::Zero();
+  /// Bit rate of each camera's images in a data set, see VideoCompression. 0: as rendered.
+  double compressed_kbit_per_s = 0.0;
   CalibrationError told;  ///< Of the calibration that data sets come with.
 };
 
