@@ -114,7 +114,10 @@ struct SimulateOptions {
   double depth_lag_ms = 0.0;
   double stitched_m = 0.0;
   double stabilised_share = 0.0;
+  double compressed_kbit_per_s = 0.0;
   std::vector<double> turn_deg;   ///< Of camera 1; empty: none.
+  std::vector<double> warped_px;  ///< Along and across the epipolar lines; empty: none.
+  std::vector<double> gain1;      ///< Of camera 1, in the first frame and the last; empty: 1.
   std::vector<std::string> told;  ///< KEY=VALUE each.
   bool is_list = false;
   bool is_quiet = false;
@@ -152,6 +155,9 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   spec.depth_lag_s = 1e-3 * options.depth_lag_ms;
   spec.stitched_m = options.stitched_m;
   spec.stabilised_share = options.stabilised_share;
+  spec.compressed_kbit_per_s = options.compressed_kbit_per_s;
+  if (!options.warped_px.empty()) spec.warped_px = Eigen::Vector2d(options.warped_px.data());
+  if (!options.gain1.empty()) spec.gain1 = Eigen::Vector2d(options.gain1.data());
   turn_camera1(options.turn_deg, spec.chain);
   spec.told = parse_calibration_error(options.told);
   make_rig(
@@ -218,6 +224,33 @@ void add_population_options(CLI::App& simulation, SequenceSpec& spec) {
       ->capture_default_str();
 }
 
+/// Flaws of camera 1 of a pair.
+void add_pair_options(CLI::App& simulation, SimulateOptions& options) {
+  simulation
+      .add_option("--turn",
+                  options.turn_deg,
+                  "X,Y,Z: degrees that camera 1 of a pair is turned about its own axes [0,0,0]")
+      ->delimiter(',')
+      ->expected(3)
+      ->check(number_between(-180.0, 180.0));
+  simulation
+      .add_option("--warped",
+                  options.warped_px,
+                  "ALONG,ACROSS: pixels that images of camera 1 of a pair are bent by at most, "
+                  "along and across the epipolar lines, as rectification leaves them [0,0]")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(number_between(0.0, 100.0));
+  simulation
+      .add_option("--gain",
+                  options.gain1,
+                  "FIRST,LAST: factors by which camera 1 of a pair is brighter than camera 0, in "
+                  "the first frame and in the last [1,1]")
+      ->delimiter(',')
+      ->expected(2)
+      ->check(number_between(0.01, 100.0));
+}
+
 void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
   simulation
       .add_option("--readout",
@@ -241,12 +274,11 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
                   "camera shakes; 0.05 is usual [0]")
       ->check(number_between(0.0, 0.2));
   simulation
-      .add_option("--turn",
-                  options.turn_deg,
-                  "X,Y,Z: degrees that camera 1 of a pair is turned about its own axes [0,0,0]")
-      ->delimiter(',')
-      ->expected(3)
-      ->check(number_between(-180.0, 180.0));
+      .add_option("--compressed",
+                  options.compressed_kbit_per_s,
+                  "Kilobits per second that each camera's images are compressed to, as H.264 [not]")
+      ->check(number_between(1.0, 1e6));
+  add_pair_options(simulation, options);
   simulation
       .add_option("--told",
                   options.told,

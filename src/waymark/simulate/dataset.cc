@@ -15,6 +15,7 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/image/opencv_image.h"
 #include "waymark/results/trajectory.h"
+#include "waymark/simulate/video_compression.h"
 
 namespace waymark {
 namespace {
@@ -82,6 +83,10 @@ class Writer {
         layout_(layout_of(spec.chain)) {
     for (const fs::path& sub : image_folders()) make_output_folder(folder_ / sub);
     if (layout_ == Layout::kTumRgbd) make_output_folder(folder_ / "depth");
+    if (spec.compressed_kbit_per_s <= 0.0) return;
+    for (std::size_t i = 0; i < spec.chain.cameras.size(); ++i) {
+      compressions_.emplace_back(spec.compressed_kbit_per_s, spec.rate_hz);
+    }
   }
 
   void add(const SimulatedFrame& frame, const Rigid3& world_from_camera0) {
@@ -90,7 +95,9 @@ class Writer {
     const std::string name = (is_csv ? std::to_string(frame.timestamp_ns) : seconds) + ".png";
     const std::vector<fs::path> folders = image_folders();
     for (std::size_t i = 0; i < folders.size(); ++i) {
-      write_png(folder_ / folders[i] / name, frame.images[i]);
+      const Image& image = frame.images[i];
+      write_png(folder_ / folders[i] / name,
+                compressions_.empty() ? image : compressions_[i].compress(image));
     }
     if (layout_ == Layout::kTumRgbd) {
       const std::string depth_seconds = format_seconds(frame.depth_timestamp_ns);
@@ -151,6 +158,7 @@ class Writer {
   CameraChain told_;
   fs::path folder_;
   Layout layout_;
+  std::vector<VideoCompression> compressions_;  ///< Per camera, or none.
   std::string list_;
   std::string depth_list_;
   std::vector<StampedPose> truth_;

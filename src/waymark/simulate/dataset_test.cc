@@ -15,6 +15,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/testing/temporary_folder.h"
+#include "waymark/simulate/video_compression.h"
 
 namespace waymark {
 namespace {
@@ -153,6 +154,24 @@ TEST(Dataset, TellsAWrongCalibrationAndKeepsTheTrueOne) {
   const Eigen::Matrix3d turn = (body_from_sensor * kCam1FromCam0.matrix()).topLeftCorner<3, 3>();
   EXPECT_NEAR(std::acos(0.5 * (turn.trace() - 1.0)), 2e-3, 1e-6);
   expect_image(told / "mav0" / "cam1" / "data" / "1000000000.png", truth.frame(0).images[1]);
+}
+
+TEST(Dataset, CompressesEachCameraByItself) {
+  const testing::TemporaryFolder folder;
+  SequenceSpec spec = small_spec(stereo_chain(small_camera(0.0), small_camera(3.0), kCam1FromCam0));
+  spec.compressed_kbit_per_s = 200.0;
+  SimulatedSequence sequence(spec);
+  write_dataset(sequence, folder.path());
+  for (std::size_t camera = 0; camera < 2; ++camera) {
+    VideoCompression compression(spec.compressed_kbit_per_s, spec.rate_hz);
+    const fs::path data = folder / "mav0" / ("cam" + std::to_string(camera)) / "data";
+    for (int i = 0; i < 3; ++i) {
+      const Image rendered = sequence.frame(i).images[camera];
+      const Image read = compression.compress(rendered);
+      EXPECT_NE(read.values, rendered.values);
+      expect_image(data / (std::to_string(sequence.timestamp_ns(i)) + ".png"), read);
+    }
+  }
 }
 
 TEST(Dataset, DepthHasTimesOfItsOwn) {

@@ -40,7 +40,8 @@ static_assert((kTileWidth + 1) * (kTileHeight + 1) <= RayTile::kCapacity);
 constexpr int kSubRays = 3;
 
 /// Bearings of the pixels (x + offset, y + offset); 0 where there is none.
-std::vector<Vector3d> tabulate(const Camera& camera, int width, int height, double offset) {
+std::vector<Vector3d> tabulate(
+    const Camera& camera, const RectificationError& error, int width, int height, double offset) {
   std::vector<Vector2d> pixels;
   for (int y = 0; y < height; ++y) {
     for (int x = 0; x < width; ++x) pixels.emplace_back(x + offset, y + offset);
@@ -49,7 +50,7 @@ std::vector<Vector3d> tabulate(const Camera& camera, int width, int height, doub
   std::vector<std::uint8_t> is_valid(pixels.size());
   camera.unproject(pixels, bearings, is_valid);
   for (std::size_t i = 0; i < bearings.size(); ++i) {
-    if (!is_valid[i]) bearings[i].setZero();
+    bearings[i] = is_valid[i] ? error.true_bearing(bearings[i]) : Vector3d(Vector3d::Zero());
   }
   return bearings;
 }
@@ -211,14 +212,16 @@ struct Renderer::Tile {
   int x0, y0, x1, y1;
 };
 
-Renderer::Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Camera> camera)
+Renderer::Renderer(std::shared_ptr<const World> world,
+                   std::shared_ptr<const Camera> camera,
+                   const RectificationError& error)
     : world_(std::move(world)), camera_(std::move(camera)) {
   const int width = camera_->width_px();
   const int height = camera_->height_px();
-  for (const Vector3d& bearing : tabulate(*camera_, width + 1, height + 1, -0.5)) {
+  for (const Vector3d& bearing : tabulate(*camera_, error, width + 1, height + 1, -0.5)) {
     corner_bearings_.push_back(bearing.cast<float>());
   }
-  centre_bearings_ = tabulate(*camera_, width, height, 0.0);
+  centre_bearings_ = tabulate(*camera_, error, width, height, 0.0);
 }
 
 double Renderer::pixel_rad() const {

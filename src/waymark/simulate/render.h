@@ -13,6 +13,7 @@
 #include "waymark/camera/camera.h"
 #include "waymark/geometry/rigid3.h"
 #include "waymark/image/image.h"
+#include "waymark/simulate/rectification_error.h"
 #include "waymark/simulate/world.h"
 
 namespace waymark {
@@ -42,8 +43,10 @@ void apply_depth_noise(const ImageEffects& effects,
 /// result is the same for any number of threads. time_s: of the walks of the world.
 class Renderer {
  public:
-  /// Neither is null.
-  Renderer(std::shared_ptr<const World> world, std::shared_ptr<const Camera> camera);
+  /// Neither is null. The camera sees elsewhere than it says by the error.
+  Renderer(std::shared_ptr<const World> world,
+           std::shared_ptr<const Camera> camera,
+           const RectificationError& error = {});
 
   /// What the camera sees.
   Image image(const Rigid3& world_from_cam, ThreadPool& pool, double time_s = 0.0) const;

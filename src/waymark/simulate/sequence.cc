@@ -54,6 +54,12 @@ std::shared_ptr<const World> populated_world(const SequenceSpec& spec,
   return populated;
 }
 
+void expect_pair(const Rig& rig, const char* option) {
+  if (rig.cameras.size() < 2) {
+    throw InputError(option, "there is one camera, expected a pair (--setup stereo)");
+  }
+}
+
 }  // namespace
 
 CameraChain mono_chain(const CameraDescription& camera) {
@@ -109,8 +115,15 @@ void SimulatedSequence::prepare_flaws(const CameraRegistry& registry) {
   if (!stabilizers_.empty() && spec_.chain.depth_factor) {
     throw InputError("--stabilised", "the camera measures depth, expected one that does not");
   }
-  for (const RigCamera& sensor : make_rig(sensors, registry).cameras) {
-    renderers_.emplace_back(world_, sensor.camera);
+  std::vector<RectificationError> errors(rig_.cameras.size());
+  if (!spec_.gain1.isOnes(0.0)) expect_pair(rig_, "--gain");
+  if (!spec_.warped_px.isZero(0.0)) {
+    expect_pair(rig_, "--warped");
+    errors[1] = RectificationError(rig_.cameras[1], spec_.warped_px, spec_.seed);
+  }
+  const Rig rig_of_sensors = make_rig(sensors, registry);
+  for (std::size_t i = 0; i < errors.size(); ++i) {
+    renderers_.emplace_back(world_, rig_of_sensors.cameras[i].camera, errors[i]);
   }
 }
 
@@ -122,11 +135,16 @@ Rigid3 SimulatedSequence::world_from_rig(int index) const {
   return motion_.world_from_rig(seconds(index));
 }
 
-const ImageEffects& SimulatedSequence::effects_of(int index) const {
-  for (const EffectSpan& span : spec_.spans) {
-    if (index >= span.first_frame && index < span.end_frame) return span.effects;
+ImageEffects SimulatedSequence::effects_of(std::size_t camera, int index) const {
+  const auto span = std::ranges::find_if(spec_.spans, [&](const EffectSpan& each) {
+    return index >= each.first_frame && index < each.end_frame;
+  });
+  ImageEffects effects = span == spec_.spans.end() ? spec_.effects : span->effects;
+  if (camera == 1) {
+    const double share = static_cast<double>(index) / std::max(spec_.num_frames - 1, 1);
+    effects.gain *= std::lerp(spec_.gain1[0], spec_.gain1[1], share);
   }
-  return spec_.effects;
+  return effects;
 }
 
 Rigid3 SimulatedSequence::world_from_cam(std::size_t camera, double time_s) const {
@@ -176,11 +194,11 @@ Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffect
 
 SimulatedFrame SimulatedSequence::frame(int index) {
   WAYMARK_CHECK(index >= 0 && index < spec_.num_frames);
-  const ImageEffects& effects = effects_of(index);
   SimulatedFrame frame;
   frame.timestamp_ns = timestamp_ns(index);
   frame.world_from_rig = world_from_rig(index);
   for (std::size_t camera = 0; camera < rig_.cameras.size(); ++camera) {
+    const ImageEffects effects = effects_of(camera, index);
     Image image = expose(camera, index, effects);
     Rng rng(spec_.seed, stream_of(index, camera));
     apply_exposure(effects, rng, image);
@@ -193,7 +211,7 @@ SimulatedFrame SimulatedSequence::frame(int index) {
     frame.depth =
         renderers_[0].depth(world_from_cam(0, time_s), *spec_.chain.depth_factor, *pool_, time_s);
     Rng rng(spec_.seed, stream_of(index, kDepthStream));
-    apply_depth_noise(effects, *spec_.chain.depth_factor, rng, frame.depth);
+    apply_depth_noise(effects_of(0, index), *spec_.chain.depth_factor, rng, frame.depth);
   }
   return frame;
 }

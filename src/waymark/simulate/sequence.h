@@ -72,6 +72,14 @@ struct SequenceSpec {
   /// Electronic stabilisation: the largest shift of the picture relative to its width, see
   /// Stabilizer. The chain is that of the pictures, on the average. 0: none.
   double stabilised_share = 0.0;
+  /// Gains of the images of camera 1 of a pair beside those of camera 0, in the first frame and in
+  /// the last; linear in between.
+  Eigen::Vector2d gain1 = Eigen::Vector2d::Ones();
+  /// By how many pixels images of camera 1 of a pair are bent along and across the epipolar lines,
+  /// see RectificationError.
+  Eigen::Vector2d warped_px = Eigen::Vector2d::Zero();
+  /// Bit rate of each camera's images in a data set, see VideoCompression. 0: as rendered.
+  double compressed_kbit_per_s = 0.0;
   CalibrationError told;  ///< Of the calibration that data sets come with.
 };
 
@@ -97,8 +105,8 @@ struct SimulatedFrame {
 /// for any number of threads. Not for use by several threads at a time.
 class SimulatedSequence {
  public:
-  /// Throws InputError for an unknown world, motion or camera model, and for cameras that cannot be
-  /// stitched or stabilised where that is asked for.
+  /// Throws InputError for an unknown world, motion or camera model, for cameras that cannot be
+  /// stitched or stabilised where that is asked for, and for one camera where a pair is needed.
   explicit SimulatedSequence(
       SequenceSpec spec,
       unsigned num_threads = 1,
@@ -127,7 +135,7 @@ class SimulatedSequence {
   Image render(std::size_t camera, double time_s);
   Image render_from(std::size_t camera, double ahead_m, double time_s);
   void prepare_flaws(const CameraRegistry& registry);
-  const ImageEffects& effects_of(int index) const;
+  ImageEffects effects_of(std::size_t camera, int index) const;
   Image expose(std::size_t camera, int index, const ImageEffects& effects);
 
   SequenceSpec spec_;

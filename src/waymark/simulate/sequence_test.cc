@@ -7,6 +7,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "waymark/base/check.h"
+
 namespace waymark {
 namespace {
 
@@ -173,6 +175,36 @@ TEST(Sequence, DepthNoiseIsInInverseDepth) {
     squares += std::pow(5000.0 / b.values[i] - 5000.0 / a.values[i], 2);
   }
   EXPECT_NEAR(std::sqrt(squares / static_cast<double>(a.values.size())), 0.004, 1e-4);
+}
+
+double brightness_of(const Image& image) {
+  double sum = 0.0;
+  for (const std::uint8_t value : image.values) sum += value;
+  return sum / static_cast<double>(image.values.size());
+}
+
+TEST(Sequence, CamerasOfAPairAreExposedDifferently) {
+  SequenceSpec spec = small_spec();
+  spec.chain = stereo_chain(small_camera(), small_camera(), Rigid3());
+  spec.effects.gain = 0.5;
+  spec.gain1 = {1.4, 0.6};
+  SimulatedSequence sequence(spec);
+  const auto ratio = [&](int frame) {
+    const std::vector<Image> images = sequence.frame(frame).images;
+    return brightness_of(images[1]) / brightness_of(images[0]);
+  };
+  EXPECT_NEAR(ratio(0), 1.4, 0.02);
+  EXPECT_NEAR(ratio(spec.num_frames - 1), 0.6, 0.02);
+  EXPECT_NEAR(ratio(10), 1.4 - 0.8 * 10 / 19, 0.02);
+}
+
+TEST(Sequence, PairsAreAskedForWhereTheyAreNeeded) {
+  SequenceSpec spec = small_spec();
+  spec.gain1 = {1.0, 1.2};
+  EXPECT_THROW(SimulatedSequence{spec}, InputError);
+  spec = small_spec();
+  spec.warped_px = {0.0, 0.5};
+  EXPECT_THROW(SimulatedSequence{spec}, InputError);
 }
 
 }  // namespace
