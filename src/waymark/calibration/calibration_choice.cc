@@ -23,8 +23,9 @@ constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-
 /// In place of no systematic error, so that all have one.
 constexpr double kNone = 1e-7;
 
-/// A pair whose bearings are off smoothly over the image is as likely, as is an offset of depths
-/// that nobody told of; most shutters roll, but not those of the cameras that people calibrate.
+/// A pair whose bearings are off smoothly over the image, in one direction, is as likely, as is an
+/// offset of depths that nobody told of; most shutters roll, but not those of the cameras that
+/// people calibrate.
 constexpr double kRareErrorProbability = 1e-3;
 constexpr double kReadoutProbability = 0.1;
 
@@ -35,7 +36,8 @@ constexpr double kMaxReadoutMs = 100.0;
 /// are.
 struct Spreads {
   std::array<std::size_t, 3> groups = {};
-  bool has_bearing_error = false;
+  bool is_off_along = false;
+  bool is_off_across = false;
   bool has_readout = false;
   bool has_depth_offset = false;
 };
@@ -44,15 +46,17 @@ constexpr std::size_t kWidest = kSpreads.size() - 1;
 
 std::vector<Spreads> all_spreads(const CalibrationParameters& parameters, FreeParameters free) {
   if (free == FreeParameters::kReadout) return {{}, {.has_readout = true}};
-  const bool is_pair = parameters.find(CalibrationGroup::kBearing).has_value();
+  const bool is_pair = parameters.find(CalibrationGroup::kAlong).has_value();
   std::vector<Spreads> all;
   for (std::size_t focal = 0; focal < kSpreads.size(); ++focal) {
     for (std::size_t radial = 0; radial < kSpreads.size(); ++radial) {
       for (std::size_t turn = 0; turn < (is_pair ? kSpreads.size() : 1); ++turn) {
-        for (unsigned rare = 0; rare < 4; ++rare) {
-          const bool is_first = (rare & 1) != 0;  // Pairs have no depth image.
-          all.push_back(
-              {{focal, radial, turn}, is_pair && is_first, (rare & 2) != 0, !is_pair && is_first});
+        for (unsigned rare = 0; rare < (is_pair ? 8 : 4); ++rare) {
+          const bool has_first = (rare & 1) != 0, has_second = (rare & 2) != 0;
+          const std::array<std::size_t, 3> groups = {focal, radial, turn};
+          // Pairs have no depth image.
+          all.push_back(is_pair ? Spreads{groups, has_first, has_second, (rare & 4) != 0, false}
+                                : Spreads{groups, false, false, has_first, has_second});
         }
       }
     }
@@ -68,8 +72,10 @@ double factor_of(CalibrationGroup group, const Spreads& spreads) {
       return kSpreads[spreads.groups[1]].factor;
     case CalibrationGroup::kExtrinsics:
       return kSpreads[spreads.groups[2]].factor;
-    case CalibrationGroup::kBearing:
-      return spreads.has_bearing_error ? 1.0 : 0.0;
+    case CalibrationGroup::kAlong:
+      return spreads.is_off_along ? 1.0 : 0.0;
+    case CalibrationGroup::kAcross:
+      return spreads.is_off_across ? 1.0 : 0.0;
     case CalibrationGroup::kReadout:
       return spreads.has_readout ? 1.0 : 0.0;
     case CalibrationGroup::kDepthOffset:
@@ -93,7 +99,7 @@ double log_probability(const CalibrationParameters& parameters, const Spreads& s
     return at && parameters.list()[*at].given != 0.0;
   };
   double sum = 0.0;
-  if (spreads.has_bearing_error) sum += std::log(kRareErrorProbability);
+  sum += (int{spreads.is_off_along} + int{spreads.is_off_across}) * std::log(kRareErrorProbability);
   if (spreads.has_depth_offset && !is_told(CalibrationGroup::kDepthOffset)) {
     sum += std::log(kRareErrorProbability);
   }
@@ -213,7 +219,7 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
 
 Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, FreeParameters free) {
   return parameters.prior_information(
-      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true, true, true}, free));
+      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true, true, true, true}, free));
 }
 
 CalibrationPosterior choose_prior(const CalibrationParameters& parameters,

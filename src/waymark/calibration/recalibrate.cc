@@ -32,6 +32,9 @@ constexpr double kManyKeyframes = 30.0;
 /// Before parts can be compared, errors that last are taken to make the variance of residuals
 /// larger by this factor.
 constexpr double kLastingErrors = 5.0;
+/// The size of what is seen and what makes it so move slowly together: a step that is damped as
+/// elsewhere takes a part of the way only.
+constexpr double kLeastDamping = 1e-6;
 /// A step that gains fewer nats is none.
 constexpr double kStill = 0.5;
 /// More tell hardly more, and take longer.
@@ -174,9 +177,11 @@ std::optional<CalibrationCost> adjust(const Measured& measured,
   BundleProblem& problem = sample.problem;
   problem.calibration = unknowns(measured, prior_information, trial, sample);
   if (!problem.calibration) return std::nullopt;
-  const int num_steps = prior_information.size() == 0 ? 0 : 2;
-  const BundleResult result = adjust_bundle(
-      problem, {.num_rounds = num_steps == 0 ? 1 : 2, .max_iterations_per_round = num_steps});
+  const int num_steps = prior_information.size() == 0 ? 0 : 4;
+  const BundleResult result = adjust_bundle(problem,
+                                            {.num_rounds = num_steps == 0 ? 1 : 2,
+                                             .max_iterations_per_round = num_steps,
+                                             .initial_damping = kLeastDamping});
   BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
   if (found.evidence.is_empty()) return std::nullopt;
   if (num_steps > 0 && !move(found.change, problem, trial)) return std::nullopt;

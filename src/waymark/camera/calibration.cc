@@ -203,7 +203,8 @@ void CalibrationParameters::add_bearing_error(std::size_t camera) {
     const bool is_linear = i % BearingError::kNumTerms < 2;
     const double to_bearing = pixel_rad / (is_linear ? side : side * side);
     add({.name = fmt::format("cam{}.{}", camera, kErrorNames[static_cast<std::size_t>(i)]),
-         .group = CalibrationGroup::kBearing,
+         .group =
+             i < BearingError::kNumTerms ? CalibrationGroup::kAlong : CalibrationGroup::kAcross,
          .usual_sigma = to_bearing * (is_linear ? kLinearErrorSigma : kQuadraticErrorSigma),
          .systematic_sigma = to_bearing * kSystematicErrorPx},
         {},

@@ -32,7 +32,8 @@ enum class CalibrationGroup {
   kCentre,       ///< The principal point.
   kRadial,       ///< Distortion along the radius, and the shape of wide models.
   kTangential,   ///< Distortion across it.
-  kBearing,      ///< What the bearings of a pair are off by.
+  kAlong,        ///< What bearings of a pair are off by along epipolar lines.
+  kAcross,       ///< The same across them.
   kReadout,      ///< How long a rolling shutter takes for all rows.
   kDepthOffset,  ///< What inverse depths are too large by.
   kExtrinsics,   ///< Turns of a camera and of its baseline.
