@@ -110,15 +110,16 @@ double log_probability(const CalibrationParameters& parameters, const Spreads& s
   return sum;
 }
 
-std::vector<double> sigmas_of(const CalibrationParameters& parameters,
-                              const Spreads& spreads,
-                              FreeParameters free) {
-  std::vector<double> sigmas;
+CalibrationPrior prior_of(const CalibrationParameters& parameters,
+                          const Spreads& spreads,
+                          FreeParameters free) {
+  CalibrationPrior prior;
   for (const CalibrationParameter& parameter : parameters.list()) {
     const double factor = is_free(parameter, free) ? factor_of(parameter.group, spreads) : 0.0;
-    sigmas.push_back(factor * parameter.prior_sigma);
+    prior.sigmas.push_back(factor * parameter.prior_sigma);
   }
-  return sigmas;
+  prior.information = parameters.prior_information(prior.sigmas);
+  return prior;
 }
 
 /// Rows are read from the top down, unless it is told otherwise.
@@ -162,17 +163,14 @@ struct ToldTwice {
 };
 
 /// All but the standard deviations.
-CalibrationPosterior posterior(const CalibrationParameters& parameters,
-                               const ToldTwice& images,
-                               std::vector<double> prior_sigmas) {
+CalibrationPosterior posterior(const ToldTwice& images, CalibrationPrior prior) {
   CalibrationPosterior result;
-  result.prior_information = parameters.prior_information(prior_sigmas);
-  result.prior_sigmas = std::move(prior_sigmas);
+  result.prior = std::move(prior);
   const CalibrationTold& told = images.told;
-  result.change = -(told.information + result.prior_information).llt().solve(told.gradient);
+  result.change = -(told.information + result.prior.information).llt().solve(told.gradient);
   const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information +
-                                           result.prior_information);
-  const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior_information);
+                                           result.prior.information);
+  const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior.information);
   const Eigen::VectorXd& gradient = images.with_errors.gradient;
   result.gain = 0.5 * gradient.dot(factor.solve(gradient));
   result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
@@ -189,7 +187,7 @@ double predicted_gain(const CalibrationCost& cost,
   for (const CalibrationTold& told : cost.evidence.parts) {
     const CalibrationTold part = at_given(cost, told);
     const Eigen::MatrixXd information =
-        whole.information - part.information + posterior.prior_information;
+        whole.information - part.information + posterior.prior.information;
     const Eigen::VectorXd change = information.llt().solve(part.gradient - whole.gradient);
     const auto cost_of = [&](const Eigen::VectorXd& x) {
       return x.dot(part.gradient + 0.5 * (part.information * x));
@@ -204,22 +202,21 @@ double gain(const CalibrationCost& cost,
             const Eigen::VectorXd& other) {
   const Eigen::VectorXd off = other - posterior.change;
   const Eigen::MatrixXd information =
-      cost.evidence.whole.information / cost.variance + posterior.prior_information;
+      cost.evidence.whole.information / cost.variance + posterior.prior.information;
   return 0.5 * off.dot(information * off);
 }
 
 double variance_between_parts(const CalibrationCost& cost, const CalibrationPosterior& posterior) {
   const CalibrationEvidence& evidence = cost.evidence;
   const Eigen::LLT<Eigen::MatrixXd> information(evidence.whole.information +
-                                                cost.variance * posterior.prior_information);
+                                                cost.variance * posterior.prior.information);
   const double expected = information.solve(evidence.whole.information).trace();
   const double seen = information.solve(evidence.scatter_after(posterior.change - cost.at)).trace();
   return expected > 0.0 ? seen / expected : 0.0;
 }
 
-Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, FreeParameters free) {
-  return parameters.prior_information(
-      sigmas_of(parameters, {{kWidest, kWidest, kWidest}, true, true, true, true}, free));
+CalibrationPrior widest_prior(const CalibrationParameters& parameters, FreeParameters free) {
+  return prior_of(parameters, {{kWidest, kWidest, kWidest}, true, true, true, true}, free);
 }
 
 CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
@@ -230,14 +227,14 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
   CalibrationPosterior best;
   best.log_evidence = -HUGE_VAL;
   for (const Spreads& spreads : all_spreads(parameters, free)) {
-    CalibrationPosterior one = posterior(parameters, images, sigmas_of(parameters, spreads, free));
+    CalibrationPosterior one = posterior(images, prior_of(parameters, spreads, free));
     one.log_evidence += log_probability(parameters, spreads);
     if (one.log_evidence <= best.log_evidence) continue;
     if (spreads.has_readout && !has_possible_readout(parameters, one.change)) continue;
     best = std::move(one);
   }
   const auto size = best.change.size();
-  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information + best.prior_information);
+  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information + best.prior.information);
   best.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
   return best;
 }

@@ -24,10 +24,15 @@ struct CalibrationCost {
   double variance = 1.0;         ///< Of residuals, px^2, that its cost is to be divided by.
 };
 
+/// What is known of a calibration before images tell of it.
+struct CalibrationPrior {
+  std::vector<double> sigmas;   ///< Standard deviations of changes; 0 of what is held.
+  Eigen::MatrixXd information;  ///< What follows from them, and from what is alike.
+};
+
 /// What images and a prior tell together.
 struct CalibrationPosterior {
-  std::vector<double> prior_sigmas;  ///< 0 of what is held.
-  Eigen::MatrixXd prior_information;
+  CalibrationPrior prior;
   Eigen::VectorXd change;  ///< The most likely one, from what was given.
   // Where what images tell has systematic errors:
   Eigen::VectorXd sigma;      ///< Standard deviations of the change.
@@ -60,7 +65,7 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
                                   const CalibrationCost& cost,
                                   FreeParameters free);
 
-/// The widest of these priors, as information.
-Eigen::MatrixXd widest_prior(const CalibrationParameters& parameters, FreeParameters free);
+/// The widest of these priors.
+CalibrationPrior widest_prior(const CalibrationParameters& parameters, FreeParameters free);
 
 }  // namespace waymark

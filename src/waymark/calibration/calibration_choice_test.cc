@@ -53,9 +53,9 @@ TEST_F(CalibrationChoiceTest, GoesFarWhereNothingElseExplains) {
   const CalibrationPosterior found =
       choose_prior(parameters_, cost_of(1e9, 0.3), FreeParameters::kLikely);
   EXPECT_NEAR(found.change[kDistortion], 0.3, 0.01);
-  EXPECT_GT(found.prior_sigmas[kDistortion], 0.1);
-  EXPECT_EQ(found.prior_sigmas[2], 0.0) << "centres are held";
-  EXPECT_GT(choose_prior(parameters_, cost_of(1e9, 0.3), FreeParameters::kAll).prior_sigmas[2],
+  EXPECT_GT(found.prior.sigmas[kDistortion], 0.1);
+  EXPECT_EQ(found.prior.sigmas[2], 0.0) << "centres are held";
+  EXPECT_GT(choose_prior(parameters_, cost_of(1e9, 0.3), FreeParameters::kAll).prior.sigmas[2],
             0.0);
 }
 

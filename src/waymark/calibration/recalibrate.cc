@@ -119,10 +119,10 @@ struct Measured {
   std::vector<CameraMeasurements> cameras;
 };
 
-/// The calibration reached as unknowns; nothing where there is no such camera. prior_information:
-/// empty: they are measured, and do not move.
+/// The calibration reached as unknowns; nothing where there is no such camera. prior: none: they
+/// are measured, and do not move.
 std::optional<BundleCalibration> unknowns(const Measured& measured,
-                                          const Eigen::MatrixXd& prior_information,
+                                          const CalibrationPrior* prior,
                                           const Trial& trial,
                                           CalibrationSample& sample) {
   BundleCalibration calibration;
@@ -132,9 +132,9 @@ std::optional<BundleCalibration> unknowns(const Measured& measured,
   calibration.prior_change = -trial.change;
   calibration.change.setZero(trial.change.size());
   calibration.has_depths = true;
-  calibration.prior_information = trial.variance * prior_information;
-  if (prior_information.size() == 0) {
-    // Any that keeps the equations solvable.
+  if (prior) {
+    calibration.prior_information = trial.variance * prior->information;
+  } else {  // Any that keeps the equations solvable.
     std::vector<double> sigmas;
     for (const auto& one : trial.parameters.list()) sigmas.push_back(one.usual_sigma);
     calibration.prior_information = trial.parameters.prior_information(sigmas);
@@ -152,12 +152,14 @@ std::optional<BundleCalibration> unknowns(const Measured& measured,
   return calibration;
 }
 
-/// Moves a trial by what an adjustment found; whether there is such a camera.
-bool move(const Eigen::VectorXd& step, BundleProblem& problem, Trial& trial) {
+/// Moves a trial by what an adjustment found, but for what is held; whether there is such a camera.
+bool move(const Eigen::VectorXd& step,
+          const CalibrationPrior& prior,
+          BundleProblem& problem,
+          Trial& trial) {
   Eigen::VectorXd change = trial.change + step;
-  for (std::size_t i = 0; i < trial.parameters.size(); ++i) {
-    const bool is_exact = trial.parameters.list()[i].prior_sigma == 0.0;
-    if (is_exact) change[static_cast<Eigen::Index>(i)] = 0.0;
+  for (std::size_t i = 0; i < prior.sigmas.size(); ++i) {
+    if (prior.sigmas[i] == 0.0) change[static_cast<Eigen::Index>(i)] = 0.0;
   }
   const std::optional<Rig> rig = trial.parameters.rig_at(change);
   if (!rig) return false;
@@ -171,20 +173,20 @@ bool move(const Eigen::VectorXd& step, BundleProblem& problem, Trial& trial) {
 /// Adjusts from the calibration reached, with a prior; without one measures only. What the images
 /// tell then, if anything.
 std::optional<CalibrationCost> adjust(const Measured& measured,
-                                      const Eigen::MatrixXd& prior_information,
+                                      const CalibrationPrior* prior,
                                       CalibrationSample& sample,
                                       Trial& trial) {
   BundleProblem& problem = sample.problem;
-  problem.calibration = unknowns(measured, prior_information, trial, sample);
+  problem.calibration = unknowns(measured, prior, trial, sample);
   if (!problem.calibration) return std::nullopt;
-  const int num_steps = prior_information.size() == 0 ? 0 : 4;
+  const int num_steps = prior ? 4 : 0;
   const BundleResult result = adjust_bundle(problem,
-                                            {.num_rounds = num_steps == 0 ? 1 : 2,
+                                            {.num_rounds = prior ? 2 : 1,
                                              .max_iterations_per_round = num_steps,
                                              .initial_damping = kLeastDamping});
   BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
   if (found.evidence.is_empty()) return std::nullopt;
-  if (num_steps > 0 && !move(found.change, problem, trial)) return std::nullopt;
+  if (prior && !move(found.change, *prior, problem, trial)) return std::nullopt;
   trial.noise = result.noise_px * result.noise_px;
   return CalibrationCost{trial.change, std::move(found.evidence), trial.variance};
 }
@@ -267,7 +269,7 @@ KnownCalibration with_found(const KnownCalibration& known,
   for (std::size_t i = 0; i < known.parameters.size(); ++i) {
     const auto at = static_cast<Eigen::Index>(i);
     next.sigma[at] =
-        found.prior_sigmas[i] > 0.0 ? found.sigma[at] : known.parameters[i].prior_sigma;
+        found.prior.sigmas[i] > 0.0 ? found.sigma[at] : known.parameters[i].prior_sigma;
   }
   return next;
 }
@@ -280,17 +282,17 @@ std::optional<CalibrationPosterior> adjust_until_still(const Measured& measured,
                                                        Trial& trial) {
   const std::size_t num_keyframes = sample.problem.rig_from_world.size();
   const auto num_observations = static_cast<double>(sample.observed.size());
-  auto cost = adjust(measured, {}, sample, trial);
+  auto cost = adjust(measured, nullptr, sample, trial);
   if (!cost) return std::nullopt;
   CalibrationPosterior found =
       posterior_with(kLastingErrors * trial.noise, trial, num_keyframes, *cost);
   const bool is_asked_for = known.is_always_refined && !known.is_told();
   if (!is_asked_for && gain(*cost, found, known.change) < kLeastGain) return std::nullopt;
   // What is wrong by much is found from the widest prior, and judged then.
-  found.prior_information = widest_prior(trial.parameters, trial.free);
+  found.prior = widest_prior(trial.parameters, trial.free);
   trial.variance = cost->variance;
   for (int pass = 0; pass < kMaxPasses; ++pass) {
-    cost = adjust(measured, found.prior_information, sample, trial);
+    cost = adjust(measured, &found.prior, sample, trial);
     if (!cost) return std::nullopt;
     found = posterior_with(trial.variance, trial, num_keyframes, *cost);
     trial.variance = std::max(variance_between_parts(*cost, found), trial.noise);

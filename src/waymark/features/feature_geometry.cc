@@ -158,10 +158,11 @@ void derive_anew(const Rig& rig, const Features& before, bool is_moved, Features
 std::shared_ptr<const Features> recompute(const Features& features,
                                           std::shared_ptr<const Rig> rig,
                                           const RigMotion& motion) {
-  auto anew = std::make_shared<Features>(features);
-  if (rig->cameras.size() == 1) correct_depth(rig->inverse_depth_offset, *anew);
-  const bool is_moved = correct_rolling(*rig, motion, *anew);
-  derive_anew(*rig, features, is_moved, *anew);
+  Features still = features;
+  if (rig->cameras.size() == 1) correct_depth(rig->inverse_depth_offset, still);
+  derive_anew(*rig, features, false, still);
+  auto anew = std::make_shared<Features>(still);
+  if (correct_rolling(*rig, motion, *anew)) derive_anew(*rig, still, true, *anew);
   anew->rig = std::move(rig);
   return anew;
 }
