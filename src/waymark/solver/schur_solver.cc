@@ -14,7 +14,6 @@
 namespace waymark {
 namespace {
 
-constexpr double kInitialDamping = 1e-4;
 constexpr double kMaxDamping = 1e12;
 /// Bounds of the diagonal that the damping scales, so that directions nobody measures stay put.
 constexpr double kMinDiagonal = 1e-6;
@@ -203,7 +202,7 @@ double SchurSolver::substitute_back(double damping) {
 BundleRound SchurSolver::minimize() {
   BundleRound round;
   round.initial_cost = round.final_cost = cost(state_);
-  Damping damping(kInitialDamping);
+  Damping damping(options_.initial_damping);
   while (round.num_iterations < options_.max_iterations_per_round &&
          damping.value() < kMaxDamping) {
     linearize();
