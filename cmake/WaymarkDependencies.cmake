@@ -15,6 +15,7 @@ pkg_check_modules(hwy REQUIRED IMPORTED_TARGET libhwy)
 if(WAYMARK_VIDEO)
   pkg_check_modules(libav REQUIRED IMPORTED_TARGET libavformat libavcodec libavutil libswscale)
 endif()
+pkg_check_modules(libdeflate REQUIRED IMPORTED_TARGET libdeflate) # OpenCV comes with it.
 # Of bags of ROS.
 pkg_check_modules(lz4 REQUIRED IMPORTED_TARGET liblz4)
 pkg_check_modules(zstd REQUIRED IMPORTED_TARGET libzstd)

@@ -40,7 +40,7 @@ grow, saved, joined, extended, and exported to COLMAP, nerfstudio and PLY.")
 set(CPACK_DEBIAN_DEV_PACKAGE_NAME libwaymark-dev)
 set(CPACK_DEBIAN_DEV_PACKAGE_SECTION libdevel)
 set(CPACK_DEBIAN_DEV_PACKAGE_DEPENDS
-    "libeigen3-dev, libopencv-dev, libavformat-dev, libavcodec-dev, libswscale-dev, libyaml-cpp-dev, libfmt-dev, libhwy-dev, libbz2-dev, liblz4-dev, libzstd-dev, libsqlite3-dev, pkg-config")
+    "libeigen3-dev, libopencv-dev, libavformat-dev, libavcodec-dev, libswscale-dev, libyaml-cpp-dev, libfmt-dev, libhwy-dev, libdeflate-dev, libbz2-dev, liblz4-dev, libzstd-dev, libsqlite3-dev, pkg-config")
 set(CPACK_DEBIAN_DEV_PACKAGE_SUGGESTS "waymark (= ${PROJECT_VERSION}-${CPACK_DEBIAN_PACKAGE_RELEASE})")
 set(CPACK_COMPONENT_DEV_DESCRIPTION "visual SLAM for any camera, libraries to build with
 Waymark finds out from images where a camera was and what the place looks like.

@@ -18,12 +18,15 @@
 #include "waymark/base/check.h"
 #include "waymark/image/image_header.h"
 #include "waymark/image/opencv_image.h"
+#include "waymark/input/plain_png.h"
 #include "waymark/input/reading.h"
 
 namespace waymark {
 namespace {
 
 constexpr std::string_view kJpegStart = "\xFF\xD8\xFF";
+constexpr int kGreyOfAnyDepth =
+    cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
 constexpr std::uintmax_t kMaxFileBytes = std::uintmax_t{1} << 30;
 
 std::optional<std::string> read_bytes(const std::filesystem::path& path) {
@@ -61,6 +64,10 @@ std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
     std::optional<std::string> storage;
     const std::optional<std::string_view> vetted = vet(bytes, storage);
     if (!vetted) return std::nullopt;
+    // Of what is asked for unchanged only 16 bits of grey are taken: depth.
+    if (storage && (flags == kGreyOfAnyDepth || flags == cv::IMREAD_UNCHANGED)) {
+      if (std::optional<cv::Mat> decoded = decode_plain_png(*vetted)) return decoded;
+    }
     const cv::Mat encoded(1,
                           static_cast<int>(vetted->size()),
                           CV_8UC1,
@@ -74,9 +81,6 @@ std::optional<cv::Mat> decode_bytes(std::string_view bytes, int flags) {
     return std::nullopt;
   }
 }
-
-constexpr int kGreyOfAnyDepth =
-    cv::IMREAD_GRAYSCALE | cv::IMREAD_ANYDEPTH | cv::IMREAD_IGNORE_ORIENTATION;
 
 std::string encode(const cv::Mat& image, const char* extension) {
   if (std::max(image.cols, image.rows) > kMaxSidePx) {

@@ -161,6 +161,10 @@ TEST_P(BundleWindowTest, ErasesLandmarksThatLoseTheirSupport) {
       if (!keyframe.landmarks[i].is_valid()) continue;
       if (skip-- > 0) continue;
       scene_.map.forget(id, i);
+      // One range that fits would be support enough.
+      auto features = std::make_shared<Features>(*keyframe.features);
+      features->range_m[i] = 0.0f;
+      scene_.map.recompute_keyframe(id, features);
       return i;
     }
     return kNoFeature;

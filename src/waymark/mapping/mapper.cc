@@ -96,7 +96,8 @@ Mapper::Changes Mapper::add(const NewKeyframe& message) {
                 window,
                 {.num_rounds = options.window.num_rounds,
                  .max_iterations_per_round = options.window.max_iterations_per_round,
-                 .relative_cost_tolerance = options.window.cost_tolerance},
+                 .relative_cost_tolerance = options.window.cost_tolerance,
+                 .initial_damping = options.window.damping},
                 dirty_);
   std::vector<KeyframeId> erased = cull_redundant_keyframes(map_, id, dirty_, options.culling);
   refresh_appearances();

@@ -99,7 +99,10 @@ struct WindowOptions {
   int num_rounds = 2;  ///< Of adjustment, with outliers left out in between.
   int max_iterations_per_round = 8;  ///< Of Levenberg-Marquardt.
   /// A round ends when an iteration lowers the cost by less than this part of it.
-  double cost_tolerance = 1e-5;
+  double cost_tolerance = 1e-3;
+  /// Where each round begins: so little that what hardly any observation holds, as the scale along
+  /// the way, moves with the first step and not only when the damping has gone down.
+  double damping = 1e-6;
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -108,6 +111,7 @@ struct WindowOptions {
     field("num_rounds", self.num_rounds, within(1, 100));
     field("max_iterations_per_round", self.max_iterations_per_round, within(1, 1000));
     field("cost_tolerance", self.cost_tolerance, within(1e-12, 1));
+    field("damping", self.damping, within(1e-12, 1));
   }
 };
 

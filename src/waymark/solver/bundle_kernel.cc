@@ -3,6 +3,7 @@
 #include "waymark/solver/bundle_kernel.h"
 
 #include <algorithm>
+#include <cmath>
 
 // The sums are arrays of vectors, which vectors without a compile-time size cannot form.
 #define HWY_DISABLED_TARGETS (HWY_SVE | HWY_SVE2 | HWY_SVE_256 | HWY_SVE2_128 | HWY_RVV)
@@ -76,6 +77,41 @@ HWY_INLINE void store_row(const SeenPoint& seen,
   store_group(times(by_rig, seen.rig_from_world), zero, rows.point[row] + 4 * lane);
 }
 
+/// The root of the share that counts of the curvature along a residual: see kLinearCurvature.
+HWY_INLINE BundleVec bend_of(BundleVec squared, double scale) {
+  const BundleTag tag;
+  const BundleMask is_linear = hn::Gt(squared, hn::Set(tag, scale * scale));
+  const BundleVec root = hn::Set(tag, std::sqrt(kLinearCurvature));
+  return hn::IfThenElse(is_linear, root, hn::Set(tag, 1.0));
+}
+
+/// The two residuals of a bearing and what they are made with; where the loss is linear, turned to
+/// one along the residual, with less curvature and the same gradient, and one across.
+struct TurnedResidual {
+  BundleVec3 w0, w1;
+  BundleVec residual0, residual1;
+};
+
+HWY_INLINE BundleVec3 combine(BundleVec a, const BundleVec3& x, BundleVec b, const BundleVec3& y) {
+  return {hn::Add(hn::Mul(a, x.x), hn::Mul(b, y.x)),
+          hn::Add(hn::Mul(a, x.y), hn::Mul(b, y.y)),
+          hn::Add(hn::Mul(a, x.z), hn::Mul(b, y.z))};
+}
+
+HWY_INLINE TurnedResidual turn_linear(const SeenPoint& seen, const BundleLoss& loss) {
+  const BundleTag tag;
+  const BundleVec one = hn::Set(tag, 1.0);
+  const BundleMask is_linear = hn::Gt(seen.squared, hn::Set(tag, loss.huber_px * loss.huber_px));
+  const BundleVec length = hn::Sqrt(hn::IfThenElse(is_linear, seen.squared, one));
+  const BundleVec cosine = hn::IfThenElse(is_linear, hn::Div(seen.residual0, length), one);
+  const BundleVec sine = hn::IfThenElseZero(is_linear, hn::Div(seen.residual1, length));
+  const BundleVec bend = bend_of(seen.squared, loss.huber_px);
+  return {combine(hn::Mul(bend, cosine), seen.w0, hn::Mul(bend, sine), seen.w1),
+          combine(hn::Neg(sine), seen.w0, cosine, seen.w1),
+          hn::IfThenElse(is_linear, hn::Div(length, bend), seen.residual0),
+          hn::IfThenElseZero(hn::Not(is_linear), seen.residual1)};
+}
+
 HWY_INLINE void compute_rows(const BundleArrays& arrays,
                              const BundlePlaces& places,
                              const BundleLoss& loss,
@@ -91,8 +127,9 @@ HWY_INLINE void compute_rows(const BundleArrays& arrays,
     const auto by_cam = [&](const BundleVec3& w) {
       return scale(subtract(w, scale(seen.direction, dot(w, seen.direction))), weight);
     };
-    store_row(seen, by_cam(seen.w0), hn::Mul(root, seen.residual0), 0, lane, rows);
-    store_row(seen, by_cam(seen.w1), hn::Mul(root, seen.residual1), 1, lane, rows);
+    const TurnedResidual turned = turn_linear(seen, loss);
+    store_row(seen, by_cam(turned.w0), hn::Mul(root, turned.residual0), 0, lane, rows);
+    store_row(seen, by_cam(turned.w1), hn::Mul(root, turned.residual1), 1, lane, rows);
     if (!arrays.has_ranges) continue;
     const BundleVec off = range_off(arrays, seen, i);
     const BundleVec range_root =
@@ -100,8 +137,9 @@ HWY_INLINE void compute_rows(const BundleArrays& arrays,
     const BundleVec slope =
         hn::Mul(hn::Mul(hn::Mul(seen.inverse_range, seen.inverse_range), range_root),
                 hn::LoadU(tag, arrays.fields[kSeenInverseSigma].data() + i));
-    const BundleVec3 by_range = scale(seen.direction, hn::Neg(slope));
-    store_row(seen, by_range, hn::Mul(off, range_root), 2, lane, rows);
+    const BundleVec bend = bend_of(hn::Mul(off, off), loss.range_huber);
+    const BundleVec3 by_range = scale(seen.direction, hn::Neg(hn::Mul(slope, bend)));
+    store_row(seen, by_range, hn::Div(hn::Mul(off, range_root), bend), 2, lane, rows);
   }
 }
 

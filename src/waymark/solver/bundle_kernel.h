@@ -55,6 +55,12 @@ struct BundlePlaces {
 };
 
 /// Residual lengths where Huber's losses turn linear.
+/// Of the curvature that a weighted square has along its residual, the share that is counted where
+/// Huber's loss is linear. The loss has none there (Triggs et al. 2000, 4.3), but does again within
+/// its scale: with all of it steps fall short and each round converges linearly, with half of it
+/// they go too far (docs/decisions/optimize.md).
+inline constexpr double kLinearCurvature = 0.6;
+
 struct BundleLoss {
   double huber_px;
   double range_huber;

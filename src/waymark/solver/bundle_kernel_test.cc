@@ -135,7 +135,7 @@ void add_row(const Eigen::RowVector3d& by_cam,
   rows.push_back(root * row);
 }
 
-/// The scalar reference. Adds the loss.
+/// The scalar reference, with one residual along the other where the loss is linear. Adds the loss.
 std::vector<DenseRow> dense_rows_of(const BundleKernelInput& input,
                                     const BundleProblem& problem,
                                     const BundleObservation& seen,
@@ -151,16 +151,23 @@ std::vector<DenseRow> dense_rows_of(const BundleKernelInput& input,
   const RobustValue robust = huber(off.squaredNorm(), input.loss.huber_px);
   loss += robust.loss;
   const Matrix23d by_cam = bearing_residual_by_point(point, seen.level_pixel_from_bearing);
-  for (int i = 0; i < 2; ++i) {
-    add_row(by_cam.row(i), off[i], std::sqrt(robust.weight), input, seen, in_rig, rows);
-  }
+  const bool is_linear = robust.weight < 1.0;
+  const double root = std::sqrt(robust.weight);
+  const double bend = is_linear ? std::sqrt(kLinearCurvature) : 1.0;
+  Eigen::Matrix2d turn = Eigen::Matrix2d::Identity();
+  if (is_linear) turn << off[0], off[1], -off[1], off[0];
+  if (is_linear) turn /= off.norm();
+  const Matrix23d turned = turn * by_cam;
+  add_row(bend * turned.row(0), (turn * off)[0] / bend, root, input, seen, in_rig, rows);
+  add_row(turned.row(1), (turn * off)[1], root, input, seen, in_rig, rows);
   if (!(seen.inverse_range_sigma > 0.0f)) return rows;
   const double sigma = seen.inverse_range_sigma;
   const double range = range_residual(point, seen.inverse_range, sigma);
   const RobustValue of_range = huber(range * range, input.loss.range_huber);
   loss += of_range.loss;
-  add_row(range_residual_by_point(point, sigma),
-          range,
+  const double range_bend = of_range.weight < 1.0 ? std::sqrt(kLinearCurvature) : 1.0;
+  add_row(range_bend * range_residual_by_point(point, sigma),
+          range / range_bend,
           std::sqrt(of_range.weight),
           input,
           seen,

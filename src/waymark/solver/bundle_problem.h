@@ -104,9 +104,9 @@ struct BundleOptions {
   double gate_px = 2.45;     ///< Longest residual of an inlier: 95 % of those with 1 px of noise.
   /// A round ends early when an iteration lowers the cost by less than this part of it.
   double relative_cost_tolerance = 1e-5;
-  double initial_damping = 1e-4;  ///< Of Levenberg-Marquardt, relative to the diagonal.
-  bool with_evidence = true;  ///< Of the calibration, where that is unknown; of the last round.
-  unsigned num_threads = 1;   ///< That share the work. The result is the same to the bit.
+  double initial_damping = 1e-4;  ///< Of each round, by the diagonal of the equations.
+  bool with_evidence = true;      ///< Of the calibration, where that is unknown; of the last round.
+  unsigned num_threads = 1;       ///< That share the work. The result is the same to the bit.
 };
 
 }  // namespace waymark

@@ -258,7 +258,7 @@ TEST(SettingsEffect, KeyframesComeAtLastWhileTheCameraMoves) {
   std::vector<std::string> hurried = rare;
   hurried.push_back("tracking.max_keyframe_interval=5");
   EXPECT_GT(longest_pause(play(rare).keyframes()), 8);
-  EXPECT_LE(longest_pause(play(hurried).keyframes()), 6);
+  EXPECT_LE(longest_pause(play(hurried).keyframes()), 7);  // Until it has moved by 5 px, too.
 }
 
 /// The last frame at which a keyframe's pose in the map changed.

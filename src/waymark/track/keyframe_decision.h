@@ -2,7 +2,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Core>
 #include <cstddef>
+#include <span>
+#include <vector>
 
 #include "waymark/track/frame_locator.h"
 #include "waymark/track/settings.h"
@@ -21,14 +24,25 @@ struct KeyframeSituation {
   bool has_range = false;           ///< Stereo or depth.
 };
 
-/// What a frame says of itself beside the keyframe that shares most landmarks with it; num_pending
-/// and frames_since_keyframe are left to the caller. submap_age: keyframes that the sub-map has had
-/// so far.
+/// What a keyframe sees, and from where.
+struct KeyframeView {
+  std::vector<LandmarkId> landmarks;  ///< Of the primary camera; perhaps merged since.
+  Eigen::Vector3d centre;             ///< In the world.
+};
+
+KeyframeView view_of(const Keyframe& keyframe);
+/// Of a frame that becomes a keyframe.
+KeyframeView view_of(const Features& features,
+                     std::span<const LandmarkId> landmarks,
+                     const Rigid3& rig_from_world);
+
+/// What a frame says of itself beside a keyframe; num_pending and frames_since_keyframe are left to
+/// the caller. submap_age: keyframes that the sub-map has had so far.
 KeyframeSituation compare_with_reference(const Features& features,
                                          bool has_range,
                                          const LocatedFrame& located,
                                          const Map& map,
-                                         KeyframeId reference,
+                                         const KeyframeView& reference,
                                          std::size_t submap_age,
                                          const KeyframeOptions& options = {});
 

@@ -24,9 +24,18 @@ class KeyframeDecision : public ::testing::Test {
 TEST_F(KeyframeDecision, NoneWithoutAReason) { EXPECT_FALSE(is_made()); }
 
 TEST_F(KeyframeDecision, WhenLittleOfTheReferenceIsSeen) {
-  situation_.num_shared = 91;
+  situation_.num_reference = 100;
+  situation_.num_shared = 56;
   EXPECT_FALSE(is_made());
-  situation_.num_shared = 89;
+  situation_.num_shared = 54;
+  EXPECT_TRUE(is_made());
+}
+
+TEST_F(KeyframeDecision, WhenLessOfTheReferenceIsSeenWhereThatIsPlenty) {
+  situation_.num_reference = 300;
+  situation_.num_shared = 133;  // 0.8 * 0.55 of 300 are 132.
+  EXPECT_FALSE(is_made());
+  situation_.num_shared = 131;
   EXPECT_TRUE(is_made());
 }
 
@@ -51,6 +60,9 @@ TEST_F(KeyframeDecision, WhenMostOfWhatIsNearIsNewAndRangeIsMeasured) {
   EXPECT_FALSE(is_made());
   situation_.has_range = true;
   EXPECT_TRUE(is_made());
+  situation_.num_pending = 1;  // Is about to make it known.
+  EXPECT_FALSE(is_made());
+  situation_.num_pending = 0;
   situation_.num_near_tracked = 0;
   situation_.num_near_untracked = 0;
   EXPECT_FALSE(is_made());
@@ -84,8 +96,12 @@ class KeyframeAssessment : public ::testing::TestWithParam<int> {
     for (std::size_t i = 0; i < view.features->num_primary; ++i) {
       if (i % stride != 0) located.landmarks[i] = LandmarkId{};
     }
-    return compare_with_reference(
-        *view.features, GetParam() == 2, located, scene_.map, KeyframeId{1}, 2);
+    return compare_with_reference(*view.features,
+                                  GetParam() == 2,
+                                  located,
+                                  scene_.map,
+                                  view_of(scene_.map.keyframes().at(KeyframeId{1})),
+                                  2);
   }
 
   TestMap scene_;
@@ -99,6 +115,20 @@ TEST_P(KeyframeAssessment, CountsWhatIsSharedWithTheReference) {
   EXPECT_GT(all.num_shared, all.num_reference * 8 / 10);
   EXPECT_LE(all.num_shared, all.num_reference);
   EXPECT_NEAR(half.num_shared, all.num_shared / 2, all.num_shared / 10);
+}
+
+TEST_P(KeyframeAssessment, ComparesWithAKeyframeOnItsWay) {
+  const PointObservation sent = scene_.look(pose_at(0.6), 100);
+  const std::vector<LandmarkId> landmarks = scene_.true_associations(sent);
+  LocatedFrame located;
+  located.rig_from_world = pose_at(0.6).inverse();
+  located.landmarks = landmarks;
+  const KeyframeView view = view_of(*sent.features, landmarks, located.rig_from_world);
+  const KeyframeSituation again =
+      compare_with_reference(*sent.features, GetParam() == 2, located, scene_.map, view, 2);
+  EXPECT_GT(again.num_reference, 50);
+  EXPECT_EQ(again.num_shared, again.num_reference);
+  EXPECT_LT(again.median_parallax_px, 1e-6);
 }
 
 TEST_P(KeyframeAssessment, MeasuresParallaxInPixels) {

@@ -10,7 +10,7 @@ namespace waymark {
 /// Pose of each frame.
 struct TrackingSettings {
   int min_inliers = 20;                ///< Landmarks that a pose must rest on.
-  double keyframe_ratio = 0.45;        ///< Of the landmarks of the reference keyframe.
+  double keyframe_ratio = 0.55;        ///< Of the landmarks of the reference keyframe.
   double keyframe_parallax_px = 60.0;  ///< Median against the reference keyframe.
   int max_keyframe_interval = 30;      ///< In frames.
   TrackingOptions options = {};        ///< Constants, for experiments.
@@ -25,8 +25,10 @@ struct TrackingSettings {
           self.keyframe_ratio,
           SettingInfo{.low = 0.1,
                       .high = 1.0,
-                      .help = "A new keyframe is due when a frame sees less than this part of the "
-                              "established landmarks that its reference keyframe sees."});
+                      .help =
+                          "A new keyframe is due when a frame sees less than this part of the "
+                          "established landmarks that its reference keyframe sees, or than 0.8 of "
+                          "this part where that is plenty."});
     field("keyframe_parallax_px",
           self.keyframe_parallax_px,
           SettingInfo{.low = 1.0,

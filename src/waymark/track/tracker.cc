@@ -73,14 +73,19 @@ void Tracker::count_visibility(const Features& features, const LocatedFrame& loc
 bool Tracker::is_keyframe(const Frame& frame, const LocatedFrame& located) const {
   if (purpose_ == TrackingPurpose::kLocalizing) return false;
   const Map& map = *visible_.map;
+  const std::size_t num_pending = ids_.num_pending(map);
+  // What the newest keyframe is about to bring need not be brought again.
+  const KeyframeView reference = num_pending > 0 && newest_view_
+                                     ? *newest_view_
+                                     : view_of(map.keyframes().at(search_.local_map().reference));
   KeyframeSituation situation = compare_with_reference(*frame.features,
                                                        has_range_,
                                                        located,
                                                        map,
-                                                       search_.local_map().reference,
+                                                       reference,
                                                        ids_.submap_age(map),
                                                        settings_.options.keyframes);
-  situation.num_pending = ids_.num_pending(map);
+  situation.num_pending = num_pending;
   situation.frames_since_keyframe = static_cast<int>(frame.id.value - ids_.newest_frame().value);
   return should_make_keyframe(situation, settings_);
 }
@@ -112,6 +117,7 @@ std::optional<MapperMessage> Tracker::accept(const Frame& frame,
                           moved(frame.features, motion),
                           located.landmarks,
                           visibility_.take()};
+    newest_view_ = view_of(*frame.features, located.landmarks, located.rig_from_world);
     // A keyframe is its own reference, so that it moves as the map moves it.
     result.pose = {ids_.add_keyframe(frame.id), pose.reference_scale, Rigid3{}};
   }
@@ -165,6 +171,7 @@ std::optional<MapperMessage> Tracker::start_submap(const Frame& frame, TrackingR
   }
   result.state = FrameState::kTracked;
   result.num_matches = result.num_inliers = static_cast<int>(start->submap.landmarks.size());
+  newest_view_.reset();
   result.submap = ids_.add_submap(start->submap.keyframes.size(), frame.id);
   result.world_from_rig = start->rig_from_world.inverse();
   result.is_keyframe = true;

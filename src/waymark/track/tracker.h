@@ -9,6 +9,7 @@
 #include "waymark/place/map_snapshot.h"
 #include "waymark/track/frame.h"
 #include "waymark/track/initializer.h"
+#include "waymark/track/keyframe_decision.h"
 #include "waymark/track/landmark_visibility.h"
 #include "waymark/track/last_frame.h"
 #include "waymark/track/pose_search.h"
@@ -88,6 +89,7 @@ class Tracker {
   MapSnapshot visible_;
   LastFrame last_;
   PredictedIds ids_;
+  std::optional<KeyframeView> newest_view_;  ///< Of the frame that became a keyframe last.
   VisibilityCounter visibility_;
 };
 
