@@ -68,9 +68,7 @@ bool should_make_keyframe(const KeyframeSituation& situation, const TrackingSett
   if (situation.num_pending >= static_cast<std::size_t>(options.max_pending) ||
       situation.frames_since_keyframe < 1)
     return false;
-  const bool shares_plenty = situation.num_shared >= options.plenty * settings.min_inliers;
-  const double part = settings.keyframe_ratio * (shares_plenty ? options.plenty_part : 1.0);
-  const bool sees_little = situation.num_shared < part * situation.num_reference;
+  const bool sees_little = situation.num_shared < settings.keyframe_ratio * situation.num_reference;
   const bool has_parallax = situation.median_parallax_px > settings.keyframe_parallax_px;
   const bool is_overdue =
       situation.frames_since_keyframe >= settings.max_keyframe_interval &&

@@ -31,14 +31,6 @@ TEST_F(KeyframeDecision, WhenLittleOfTheReferenceIsSeen) {
   EXPECT_TRUE(is_made());
 }
 
-TEST_F(KeyframeDecision, WhenLessOfTheReferenceIsSeenWhereThatIsPlenty) {
-  situation_.num_reference = 300;
-  situation_.num_shared = 133;  // 0.8 * 0.55 of 300 are 132.
-  EXPECT_FALSE(is_made());
-  situation_.num_shared = 131;
-  EXPECT_TRUE(is_made());
-}
-
 TEST_F(KeyframeDecision, WhenThereIsParallax) {
   situation_.median_parallax_px = 59.0;
   EXPECT_FALSE(is_made());

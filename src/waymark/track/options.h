@@ -21,10 +21,6 @@ struct KeyframeOptions {
   int established_observers = 3;
   /// Of keyframe_parallax_px: a camera that moves less is at rest, and nothing is overdue.
   double overdue_parallax = 0.25;
-  /// Of min_inliers: a frame that shares so many landmarks with its reference is located well, and
-  /// the next one is even if it finds one in five of them again.
-  double plenty = 5.0;
-  double plenty_part = 0.8;  ///< Of keyframe_ratio, which then makes a keyframe due.
 
   /// Lists the fields, see SettingInfo.
   template <class Self, class Field>
@@ -33,8 +29,6 @@ struct KeyframeOptions {
     field("min_known_near", self.min_known_near, within(0, 1));
     field("established_observers", self.established_observers, within(1, 100));
     field("overdue_parallax", self.overdue_parallax, within(0, 1));
-    field("plenty", self.plenty, within(1, 1e6));
-    field("plenty_part", self.plenty_part, within(0, 1));
   }
 };
 

@@ -25,10 +25,8 @@ struct TrackingSettings {
           self.keyframe_ratio,
           SettingInfo{.low = 0.1,
                       .high = 1.0,
-                      .help =
-                          "A new keyframe is due when a frame sees less than this part of the "
-                          "established landmarks that its reference keyframe sees, or than 0.8 of "
-                          "this part where that is plenty."});
+                      .help = "A new keyframe is due when a frame sees less than this part of the "
+                              "established landmarks that its reference keyframe sees."});
     field("keyframe_parallax_px",
           self.keyframe_parallax_px,
           SettingInfo{.low = 1.0,
