@@ -3,6 +3,7 @@
 #include <Eigen/Geometry>
 #include <cstdint>
 
+#include "waymark/base/check.h"
 #include "waymark/camera/calibration.h"
 
 namespace waymark {
@@ -10,6 +11,8 @@ namespace {
 
 /// Differences are taken over this part of a usual standard deviation to either side.
 constexpr double kStep = 0.01;
+
+constexpr int kNumErrorTerms = 2 * BearingError::kNumTerms;
 
 }  // namespace
 
@@ -58,7 +61,7 @@ void CalibrationParameters::differentiate_by_bearing_error(
     const BearingError::Terms terms = BearingError::terms(bearings[i]);
     double* const first =
         derivatives.data() + 2 * (block.num_intrinsics * i + block.num_projection);
-    Eigen::Map<Eigen::Matrix<double, 2, kNumErrors>> by_errors(first);
+    Eigen::Map<Eigen::Matrix<double, 2, kNumErrorTerms>> by_errors(first);
     by_errors.leftCols<kNumTerms>() = by_angles[i].col(0) * terms.transpose();
     by_errors.rightCols<kNumTerms>() = by_angles[i].col(1) * terms.transpose();
   }
