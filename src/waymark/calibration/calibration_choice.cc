@@ -23,6 +23,9 @@ constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-
 /// In place of no systematic error, so that all have one.
 constexpr double kNone = 1e-7;
 
+/// A bound is wider by so much for the rounding of what it bounds.
+constexpr double kRounding = 1.0 + 1e-6;
+
 /// A pair whose bearings are off smoothly over the image, in one direction, is as likely, as is an
 /// offset of depths that nobody told of; most shutters roll, but not those of the cameras that
 /// people calibrate.
@@ -156,23 +159,24 @@ CalibrationTold with_systematic_errors(const CalibrationParameters& parameters,
           told.gradient - told.information * factor.solve(told.gradient)};
 }
 
-/// What images tell, and the same with systematic errors, which says how sure that is.
-struct ToldTwice {
-  CalibrationTold told;
-  CalibrationTold with_errors;
-};
+/// By how much images are likelier with the likeliest change than with none. factor: of what they
+/// tell and a prior.
+double gain_of(const CalibrationTold& told, const Eigen::LLT<Eigen::MatrixXd>& factor) {
+  return 0.5 * told.gradient.dot(factor.solve(told.gradient));
+}
 
-/// All but the standard deviations.
-CalibrationPosterior posterior(const ToldTwice& images, CalibrationPrior prior) {
+/// The most likely change.
+Eigen::VectorXd change_of(const CalibrationTold& told, const CalibrationPrior& prior) {
+  return -(told.information + prior.information).llt().solve(told.gradient);
+}
+
+/// All but the change and the standard deviations. told: with systematic errors.
+CalibrationPosterior posterior(const CalibrationTold& told, CalibrationPrior prior) {
   CalibrationPosterior result;
   result.prior = std::move(prior);
-  const CalibrationTold& told = images.told;
-  result.change = -(told.information + result.prior.information).llt().solve(told.gradient);
-  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information +
-                                           result.prior.information);
+  const Eigen::LLT<Eigen::MatrixXd> factor(told.information + result.prior.information);
   const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior.information);
-  const Eigen::VectorXd& gradient = images.with_errors.gradient;
-  result.gain = 0.5 * gradient.dot(factor.solve(gradient));
+  result.gain = gain_of(told, factor);
   result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
   return result;
 }
@@ -223,18 +227,26 @@ CalibrationPosterior choose_prior(const CalibrationParameters& parameters,
                                   const CalibrationCost& cost,
                                   FreeParameters free) {
   const CalibrationTold told = at_given(cost, cost.evidence.whole);
-  const ToldTwice images{told, with_systematic_errors(parameters, told)};
+  const CalibrationTold with_errors = with_systematic_errors(parameters, told);
+  // No prior gains more than one that is at least as wide in everything, and none is likelier than
+  // by what it gains: most need no equations to be ruled out.
+  const Eigen::LLT<Eigen::MatrixXd> of_widest(with_errors.information +
+                                              widest_prior(parameters, free).information);
+  const double most = kRounding * gain_of(with_errors, of_widest);
   CalibrationPosterior best;
   best.log_evidence = -HUGE_VAL;
   for (const Spreads& spreads : all_spreads(parameters, free)) {
-    CalibrationPosterior one = posterior(images, prior_of(parameters, spreads, free));
-    one.log_evidence += log_probability(parameters, spreads);
+    const double log_probable = log_probability(parameters, spreads);
+    if (most + log_probable <= best.log_evidence) continue;
+    CalibrationPosterior one = posterior(with_errors, prior_of(parameters, spreads, free));
+    one.log_evidence += log_probable;
     if (one.log_evidence <= best.log_evidence) continue;
+    one.change = change_of(told, one.prior);
     if (spreads.has_readout && !has_possible_readout(parameters, one.change)) continue;
     best = std::move(one);
   }
   const auto size = best.change.size();
-  const Eigen::LLT<Eigen::MatrixXd> factor(images.with_errors.information + best.prior.information);
+  const Eigen::LLT<Eigen::MatrixXd> factor(with_errors.information + best.prior.information);
   best.sigma = factor.solve(Eigen::MatrixXd::Identity(size, size)).diagonal().cwiseSqrt();
   return best;
 }

@@ -5,6 +5,15 @@
 #include <Eigen/Cholesky>
 
 namespace waymark {
+
+void CalibrationColumns::flush(Eigen::Ref<Eigen::MatrixXd> information,
+                               Eigen::Ref<Eigen::VectorXd> gradient) {
+  const auto columns = columns_.leftCols(used_);
+  information.selfadjointView<Eigen::Lower>().rankUpdate(columns);
+  gradient.noalias() += columns * residuals_.head(used_);
+  clear();
+}
+
 CalibrationBorder::CalibrationBorder(std::size_t num_parameters,
                                      std::size_t num_slots,
                                      std::size_t num_points) {
@@ -13,7 +22,8 @@ CalibrationBorder::CalibrationBorder(std::size_t num_parameters,
   gradient_.resize(count);
   poses_.resize(count, static_cast<Eigen::Index>(6 * num_slots));
   points_.resize(count, static_cast<Eigen::Index>(3 * num_points));
-  parts_.assign(kNumParts, {Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)});
+  const CalibrationTold nothing{Eigen::MatrixXd::Zero(count, count), Eigen::VectorXd::Zero(count)};
+  parts_.assign(kNumParts, {nothing, CalibrationColumns(count)});
 }
 
 void CalibrationBorder::begin(const BundleCalibration& calibration, const Eigen::VectorXd& change) {
@@ -21,9 +31,17 @@ void CalibrationBorder::begin(const BundleCalibration& calibration, const Eigen:
   gradient_ = calibration.prior_information * (change - calibration.prior_change);
   poses_.setZero();
   points_.setZero();
+  for (CameraColumns& camera : cameras_) camera.columns.clear();
+}
+
+void CalibrationBorder::flush(CameraColumns& camera) {
+  const Eigen::Index count = camera.columns.num_parameters();
+  camera.columns.flush(information_.block(camera.first, camera.first, count, count),
+                       gradient_.segment(camera.first, count));
 }
 
 void CalibrationBorder::begin_elimination(double damping) {
+  for (CameraColumns& camera : cameras_) flush(camera);
   reduced_information_ = information_;
   reduced_information_.diagonal() += damping * information_.diagonal();
   reduced_gradient_ = gradient_;
@@ -35,7 +53,6 @@ void CalibrationBorder::eliminate_point(std::size_t point,
                                         const Eigen::Vector3d& gradient) {
   auto eliminated = points_.middleCols<3>(3 * static_cast<Eigen::Index>(point));
   eliminated = eliminated.lazyProduct(half.transpose()).eval();
-  reduced_information_ -= eliminated.lazyProduct(eliminated.transpose());
   reduced_gradient_ -= eliminated.lazyProduct(gradient);
 }
 
@@ -50,7 +67,9 @@ bool CalibrationBorder::solve(const BlockCholesky& poses, Eigen::VectorXd& gradi
   Eigen::MatrixXd solved = reduced_poses_.transpose();
   poses.solve_in_place(solved);
   poses.solve_in_place(gradient);
-  reduced_information_.noalias() -= reduced_poses_ * solved;
+  // Of all points at once, which is several times as fast as one by one; the lower halves do.
+  reduced_information_.selfadjointView<Eigen::Lower>().rankUpdate(points_, -1.0);
+  reduced_information_.triangularView<Eigen::Lower>() -= reduced_poses_ * solved;
   reduced_gradient_.noalias() -= reduced_poses_ * gradient;
   const Eigen::LLT<Eigen::MatrixXd> factor(reduced_information_);
   if (factor.info() != Eigen::Success) return false;
@@ -64,11 +83,12 @@ Eigen::Vector3d CalibrationBorder::share_of_point(std::size_t point) const {
   return of_point(point).transpose() * solution_;
 }
 
-CalibrationEvidence CalibrationBorder::evidence() const {
+CalibrationEvidence CalibrationBorder::evidence() {
   CalibrationEvidence evidence;
   evidence.whole = {Eigen::MatrixXd::Zero(gradient_.size(), gradient_.size()),
                     Eigen::VectorXd::Zero(gradient_.size())};
-  for (const CalibrationTold& told : parts_) {
+  for (auto& [told, columns] : parts_) {
+    columns.flush(told.information, told.gradient);
     const Eigen::MatrixXd information = told.information.selfadjointView<Eigen::Lower>();
     evidence.parts.push_back({information, told.gradient});
     evidence.whole.information += information;

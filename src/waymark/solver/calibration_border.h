@@ -17,6 +17,35 @@ namespace waymark {
 /// column per residual row. Parameters lie side by side wherever there are some, for SIMD.
 using ByCalibration = Eigen::Matrix<double, Eigen::Dynamic, Eigen::Dynamic, 0, 43, 3>;
 
+/// Columns of derivatives with their residuals, kept until there are enough of them for a product
+/// that is worth its while: one of the two or three of an observation is slow in every form.
+class CalibrationColumns {
+ public:
+  explicit CalibrationColumns(Eigen::Index num_parameters)
+      : columns_(num_parameters, kCapacity), residuals_(kCapacity) {}
+
+  bool is_full() const { return used_ + kMostColumns > kCapacity; }
+  template <class Columns, class Residual>
+  void add(const Columns& columns, const Residual& residual) {
+    columns_.middleCols(used_, residual.size()) = columns;
+    residuals_.segment(used_, residual.size()) = residual;
+    used_ += residual.size();
+  }
+  Eigen::Index num_parameters() const { return columns_.rows(); }
+  /// Adds their products to the lower half of the second derivative and to the gradient, and
+  /// forgets them.
+  void flush(Eigen::Ref<Eigen::MatrixXd> information, Eigen::Ref<Eigen::VectorXd> gradient);
+  void clear() { used_ = 0; }
+
+ private:
+  static constexpr Eigen::Index kMostColumns = 3;  // Of an observation.
+  static constexpr Eigen::Index kCapacity = 96;
+
+  Eigen::MatrixXd columns_;
+  Eigen::VectorXd residuals_;
+  Eigen::Index used_ = 0;
+};
+
 /// The unknown calibration in the normal equations of bundle adjustment: few rows and columns in
 /// which every pose and point takes part, hence a dense border around the sparse reduced system
 /// (Triggs et al. 2000, 6.1 and 6.3).
@@ -37,10 +66,10 @@ class CalibrationBorder {
            const ByPoint& by_point) {
     const auto first = static_cast<Eigen::Index>(first_parameter);
     const Eigen::Index count = by_calibration.rows();
-    // Of two or three rows: what makes large products fast makes these slow.
-    information_.block(first, first, count, count) +=
-        by_calibration.lazyProduct(by_calibration.transpose());
-    gradient_.segment(first, count) += by_calibration.lazyProduct(residual);
+    CameraColumns& camera = columns_of(first, count);
+    camera.columns.add(by_calibration, residual);
+    if (camera.columns.is_full()) flush(camera);
+    // Of two or three rows: what makes large products fast makes this slow.
     points_.block(first, 3 * static_cast<Eigen::Index>(point), count, 3) +=
         by_calibration.lazyProduct(by_point);
   }
@@ -55,7 +84,7 @@ class CalibrationBorder {
                  6) += by_calibration.lazyProduct(by_pose);
   }
 
-  /// Copies the equations for elimination, damped.
+  /// Copies the equations for elimination, damped. Nothing is to be added after it.
   void begin_elimination(double damping);
   /// Eliminates a point, which until begin() is kept times M. half: M with M^T * M the inverse of
   /// its damped block; gradient: M * that of the point.
@@ -90,22 +119,41 @@ class CalibrationBorder {
   }
   /// Adds what an observation at a pose of so many, in the order of time, tells, all else
   /// following: the derivatives of its rows, a row per parameter, and its residual.
-  template <class Residual>
+  template <class ByParameters, class Residual>
   void add_told(std::size_t pose,
                 std::size_t num_poses,
-                const Eigen::MatrixXd& by_calibration,
+                const ByParameters& by_parameters,
                 const Residual& residual) {
-    CalibrationTold& part = parts_[pose * kNumParts / num_poses];
-    part.information.selfadjointView<Eigen::Lower>().rankUpdate(by_calibration);
-    part.gradient += by_calibration.lazyProduct(residual);
+    PartOfWay& part = parts_[pose * kNumParts / num_poses];
+    part.columns.add(by_parameters, residual);
+    if (part.columns.is_full()) part.columns.flush(part.told.information, part.told.gradient);
   }
-  CalibrationEvidence evidence() const;
+  CalibrationEvidence evidence();
 
  private:
   /// The way is divided into so many parts: enough to compare them, and long enough each for errors
   /// that last to stay within one.
   static constexpr std::size_t kNumParts = 10;
 
+  /// Of the observations of a camera.
+  struct CameraColumns {
+    Eigen::Index first;  // Of its parameters.
+    CalibrationColumns columns;
+  };
+  struct PartOfWay {
+    CalibrationTold told;  // The lower half of the information.
+    CalibrationColumns columns;
+  };
+
+  CameraColumns& columns_of(Eigen::Index first, Eigen::Index count) {
+    for (CameraColumns& camera : cameras_) {
+      if (camera.first == first && camera.columns.num_parameters() == count) return camera;
+    }
+    return cameras_.emplace_back(first, CalibrationColumns(count));
+  }
+  void flush(CameraColumns& camera);
+
+  std::vector<CameraColumns> cameras_;
   Eigen::MatrixXd information_;
   Eigen::VectorXd gradient_;
   Eigen::MatrixXd poses_;   // 6 columns per slot.
@@ -116,7 +164,7 @@ class CalibrationBorder {
   Eigen::MatrixXd reduced_poses_;
   Eigen::VectorXd solution_;
   Eigen::MatrixXd solved_;  // The reduced poses, times the inverse of their own equations.
-  std::vector<CalibrationTold> parts_;
+  std::vector<PartOfWay> parts_;
 };
 
 }  // namespace waymark

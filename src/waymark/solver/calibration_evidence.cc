@@ -1,6 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Core>
+#include <type_traits>
 
 #include "waymark/solver/schur_equations.h"
 
@@ -42,7 +43,7 @@ void SchurSolver::add_told(std::size_t entry) {
         border_->solved(plan_.slot_of_link[link]).lazyProduct(blocks_.links[link]);
   }
   calibration_by_point = -calibration_by_point.lazyProduct(half_inverses_[entry]).eval();
-  Eigen::MatrixXd total;
+  Eigen::MatrixX3d told(calibration_by_point.rows(), 3);  // Of the rows of an observation.
   for (std::size_t k = plan_.first_observation[entry]; k < plan_.first_observation[entry + 1];
        ++k) {
     const std::size_t i = plan_.observations[k];
@@ -50,6 +51,7 @@ void SchurSolver::add_told(std::size_t entry) {
     const std::uint32_t slot = plan_.slot_of_pose[observation.pose];
     visit_rows(i, [&](const auto& rows, const Eigen::Vector3d& point_in_rig) {
       const auto by = jacobians(rows, i, point_in_rig);
+      auto total = told.leftCols<std::decay_t<decltype(rows.residual)>::RowsAtCompileTime>();
       total = calibration_by_point.lazyProduct(by.by_point.transpose());
       if (slot != kNoSlot) total -= border_->solved(slot).lazyProduct(by.by_pose.transpose());
       if (const BundleCalibration* calibration = problem_.calibration_of(observation.pose)) {

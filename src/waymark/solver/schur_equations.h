@@ -140,9 +140,10 @@ class SchurSolver {
                   std::size_t k,
                   const Eigen::Vector3d& point_in_rig);
   template <int kRows>
-  ByCalibration by_calibration(const ResidualRows<kRows>& rows,
-                               std::size_t i,
-                               const Eigen::Vector3d& point_in_rig) const;
+  void set_by_calibration(const ResidualRows<kRows>& rows,
+                          std::size_t i,
+                          const Eigen::Vector3d& point_in_rig,
+                          ByCalibration& by) const;
   template <int kRows>
   struct Jacobians {
     Eigen::Matrix<double, kRows, 3> by_point;
@@ -201,7 +202,7 @@ SchurSolver::Jacobians<kRows> SchurSolver::jacobians(const ResidualRows<kRows>& 
     jacobians.by_pose.template block<1, 3>(row, 3) = point_in_rig.cross(gradient).transpose();
   }
   if (problem_.calibration_of(observation.pose)) {
-    jacobians.by_calibration = by_calibration(rows, i, point_in_rig);
+    set_by_calibration(rows, i, point_in_rig, jacobians.by_calibration);
   }
   return jacobians;
 }

@@ -96,16 +96,16 @@ double SchurSolver::cost(const BundleState& state) {
   return 0.5 * sum;
 }
 
-/// Of the rows of observation i.
+/// Of the rows of observation i; in place, since it is large to return.
 template <int kRows>
-ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
-                                          std::size_t i,
-                                          const Eigen::Vector3d& point_in_rig) const {
+void SchurSolver::set_by_calibration(const ResidualRows<kRows>& rows,
+                                     std::size_t i,
+                                     const Eigen::Vector3d& point_in_rig,
+                                     ByCalibration& by) const {
   const BundleObservation& observation = problem_.observations[i];
   const BundleCalibration& calibration = *problem_.calibration;
   const CalibrationParameters::Block& block = calibration.blocks[observation.camera];
-  ByCalibration by(static_cast<Eigen::Index>(block.size()), kRows);
-  by.setZero();
+  by.setZero(static_cast<Eigen::Index>(block.size()), kRows);
   const auto by_intrinsics = calibration.by_intrinsics(i, observation.camera);
   const Eigen::Index num_intrinsics = by_intrinsics.cols();
   by.topLeftCorner(num_intrinsics, 2) =
@@ -115,7 +115,7 @@ ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
     by.col(2).head(by_range.cols()) =
         rows.range_scale * by_range.transpose().template cast<double>();
   }
-  if (!block.has_extrinsics) return by;
+  if (!block.has_extrinsics) return;
   const Eigen::Vector3d& baseline =
       calibration.rig->cameras[observation.camera].cam_from_rig.translation;
   const Eigen::Vector3d point_in_cam = apply(camera_of(observation, state_), point_in_rig);
@@ -125,7 +125,6 @@ ByCalibration SchurSolver::by_calibration(const ResidualRows<kRows>& rows,
     by.block(num_intrinsics, row, 3, 1) = point_in_cam.cross(gradient);
     by.block(num_intrinsics + 3, row, 2, 1) = across.transpose() * gradient;
   }
-  return by;
 }
 
 template <int kRows>
