@@ -18,7 +18,7 @@ struct Spread {
   double factor;
   double probability;
 };
-constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-3}, {25.0, 1e-4}}};
+constexpr std::array<Spread, 3> kSpreads = {{{1.0, 1.0}, {5.0, 1e-5}, {25.0, 1e-6}}};
 
 /// In place of no systematic error, so that all have one.
 constexpr double kNone = 1e-7;
