@@ -209,7 +209,7 @@ bool is_better(const CalibrationCost& cost,
                const KnownCalibration& known,
                double squared_residuals) {
   const double predicted = predicted_gain(cost, found, known.change);
-  if (known.is_always_refined || known.is_changed()) return predicted > kMinGain;
+  if (known.is_always_refined || known.is_changed()) return predicted > kLeastGain;
   return found.gain > kMinSystematicGain && predicted > kMinGain &&
          predicted * cost.variance > kMinShare * squared_residuals;
 }

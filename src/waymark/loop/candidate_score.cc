@@ -146,11 +146,12 @@ VisibleShare CandidateScorer::look_for(const Map& map,
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   landmarks_.clear();
+  // Where there are fewer keyframes, those that all of them saw.
+  const auto enough = std::min(static_cast<std::size_t>(options_.min_observers), sources.size());
   for (LandmarkId id : ids) {
     if (!id.is_valid()) continue;
     const Landmark& landmark = map.landmarks().at(id);
-    if (landmark.appearance.size_m > 0.0 &&
-        num_observers(landmark) >= static_cast<std::size_t>(options_.min_observers)) {
+    if (landmark.appearance.size_m > 0.0 && num_observers(landmark) >= enough) {
       landmarks_.add(id, landmark);
     }
   }
