@@ -224,7 +224,7 @@ class Causes(ReportTest):
         self.assertIn("parts", self.advised_after(source))
 
     def test_late(self):
-        self.assertIn("late", self.advised_after(self.copied(), "--timing", "realtime", "--pace", 1000))
+        self.assertIn("late", self.advised_after(self.copied(), "--timing", "realtime", "--pace", 40))
 
     def test_jumps(self):
         source = self.copied("fast_turn")

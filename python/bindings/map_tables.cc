@@ -132,7 +132,7 @@ py::array covisibility(const PythonMap& self) {
 
 using Color = std::array<std::uint8_t, 3>;
 
-/// As the images of the keyframes show them; grey where none does.
+/// As the images of the keyframes show them; grey where fewer than two do.
 std::vector<std::uint8_t> find_colors(const StoredMap& stored) {
   std::unordered_map<std::uint32_t, Color> by_landmark;  // For looking up only.
   for (const SubmapId submap : submaps_by_size(*stored.map)) {
@@ -239,7 +239,7 @@ uint32 array (E, 3): pairs of keyframes, the smaller id first, and how many land
 --
 
 uint8 array (M, 3): red, green, blue of each landmark of landmarks(), as the images of the keyframes
-show it, grey (128) where none does; None for a map without images.)");
+show it, grey (128) where fewer than two do; None for a map without images.)");
 }
 
 }  // namespace waymark::python
