@@ -146,8 +146,9 @@ VisibleShare CandidateScorer::look_for(const Map& map,
   std::sort(ids.begin(), ids.end());
   ids.erase(std::unique(ids.begin(), ids.end()), ids.end());
   landmarks_.clear();
-  // Where there are fewer keyframes, those that all of them saw.
-  const auto enough = std::min(static_cast<std::size_t>(options_.min_observers), sources.size());
+  // Where lengths are metric and there are fewer keyframes, those that all of them saw.
+  auto enough = static_cast<std::size_t>(options_.min_observers);
+  if (has_metric_submap(map, target)) enough = std::min(enough, sources.size());
   for (LandmarkId id : ids) {
     if (!id.is_valid()) continue;
     const Landmark& landmark = map.landmarks().at(id);
