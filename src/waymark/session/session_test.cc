@@ -294,7 +294,7 @@ TEST(Assess, SaysHowWellAMapAgreesWithItself) {
   std::vector<LandmarkId> ids;
   bent.landmarks().for_each([&](LandmarkId id, const Landmark&) { ids.push_back(id); });
   for (const LandmarkId id : ids) {
-    bent.move_landmark(id, 1.05 * bent.landmarks().at(id).position_in_world);
+    bent.move_landmark(id, 1.025 * bent.landmarks().at(id).position_in_world);
   }
   const RunQuality worse = assess(bent, results.table.frames, results.trajectories);
   EXPECT_GT(worse.reprojection_px, 1.5 * quality.reprojection_px);

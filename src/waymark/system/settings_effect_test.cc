@@ -253,12 +253,12 @@ TEST(SettingsEffect, KeyframesComeAtLastWhileTheCameraMoves) {
     }
     return longest;
   };
-  const std::vector<std::string> rare = {"tracking.keyframe_parallax_px=20",
+  const std::vector<std::string> rare = {"tracking.keyframe_parallax_px=16",
                                          "tracking.keyframe_ratio=0.1"};
   std::vector<std::string> hurried = rare;
   hurried.push_back("tracking.max_keyframe_interval=5");
   EXPECT_GT(longest_pause(play(rare).keyframes()), 8);
-  EXPECT_LE(longest_pause(play(hurried).keyframes()), 7);  // Until it has moved by 5 px, too.
+  EXPECT_LE(longest_pause(play(hurried).keyframes()), 6);
 }
 
 /// The last frame at which a keyframe's pose in the map changed.
