@@ -24,7 +24,8 @@ constexpr double kMinShare = 0.01;
 /// By so many nats where systematic errors of what images tell are taken for known: three standard
 /// deviations.
 constexpr double kMinSystematicGain = 4.5;
-/// What was found before, by what is likelier by two standard deviations.
+/// What was found before is replaced by what predicts so much better; below it there is nothing to
+/// look for: two standard deviations.
 constexpr double kLeastGain = 2.0;
 /// Parts of a way with fewer keyframes share most of what they see, err alike, and scatter by less
 /// than they err, in the ratio of the numbers.
@@ -34,7 +35,7 @@ constexpr double kManyKeyframes = 30.0;
 constexpr double kLastingErrors = 5.0;
 /// The size of what is seen and what makes it so move slowly together: a step that is damped as
 /// elsewhere takes a part of the way only.
-constexpr double kLeastDamping = 1e-6;
+constexpr double kInitialDamping = 1e-6;
 /// A step that gains fewer nats is none.
 constexpr double kStill = 0.5;
 /// More tell hardly more, and take longer.
@@ -183,7 +184,7 @@ std::optional<CalibrationCost> adjust(const Measured& measured,
   const BundleResult result = adjust_bundle(problem,
                                             {.num_rounds = prior ? 2 : 1,
                                              .max_iterations_per_round = num_steps,
-                                             .initial_damping = kLeastDamping});
+                                             .initial_damping = kInitialDamping});
   BundleCalibration found = *std::exchange(problem.calibration, std::nullopt);
   if (found.evidence.is_empty()) return std::nullopt;
   if (prior && !move(found.change, *prior, problem, trial)) return std::nullopt;
