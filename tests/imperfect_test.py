@@ -20,9 +20,9 @@ NUM_MISSING, NUM_DOUBLE = 20, 10
 
 @unittest.skipUnless(os.environ.get("WAYMARK_DATA") and SEQUENCE.is_dir(), "needs kitti_00_stereo in WAYMARK_DATA")
 class Imperfect(CliTest):
-    def mapped(self, source):
+    def mapped(self, source, *options):
         """The error of the path, and what summary.json says."""
-        done = self.run_on(source)
+        done = self.run_on(source, *options)
         self.assertEqual(done.returncode, 0, done.stderr)
         judged = waymark("eval", self.out / "trajectory.txt", SEQUENCE / "groundtruth.txt", "--json")
         self.assertEqual(judged.returncode, 0, judged.stderr)
@@ -47,13 +47,16 @@ class Imperfect(CliTest):
         return copy, right[missing[0]], len(times), times, missing
 
     def test_kitti(self):
-        error, summary, _ = self.mapped(SEQUENCE)
-        self.assertEqual(summary["coverage"], 1.0)
-        errors = []
-        for seed in (1, 2, 3):
+        """Pairs of runs with as many features: the scale of a road scatters by half a percent from number to number."""
+        whole_errors, errors = [], []
+        for seed, num_features in ((1, 960), (2, 1000), (3, 1040)):
             with self.subTest(seed=seed):
+                options = ("--set", f"features.count={num_features}")
+                error, summary, _ = self.mapped(SEQUENCE, *options)
+                self.assertEqual(summary["coverage"], 1.0)
+                whole_errors.append(error)
                 source, bad, count, times, missing = self.damaged(random.Random(seed))
-                damaged_error, summary, messages = self.mapped(source)
+                damaged_error, summary, messages = self.mapped(source, *options)
                 shutil.rmtree(source)
                 errors.append(damaged_error)
                 self.assertEqual(summary["out_of_order"], NUM_DOUBLE)
@@ -65,7 +68,7 @@ class Imperfect(CliTest):
                 self.assertEqual(summary["coverage"], 1.0)
                 if missing[0] in used:
                     self.assertIn(f"{bad} (camera 1): unreadable", messages)
-        self.assertLessEqual(sum(errors) / len(errors), 1.2 * error, errors)
+        self.assertLessEqual(sum(errors), 1.2 * sum(whole_errors), (errors, whole_errors))
 
     def test_kitti_without_an_image_of_camera_0(self):
         source = self.folder / "damaged"
