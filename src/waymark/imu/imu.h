@@ -1,0 +1,38 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <cstdint>
+#include <optional>
+
+#include "waymark/geometry/rigid3.h"
+
+namespace waymark {
+
+/// What an inertial measurement unit measured at one moment, in its own frame.
+struct ImuSample {
+  std::int64_t timestamp_ns = 0;     ///< By the IMU's clock.
+  Eigen::Vector3d angular_velocity;  ///< rad/s, with its bias.
+  /// Specific force, m/s^2, with its bias: at rest g upwards (about 9.81), in free fall 0.
+  Eigen::Vector3d acceleration;
+};
+
+/// White noise of both sensors and random walks of their biases, as Kalibr states them.
+struct ImuNoise {
+  double gyroscope = 0.0;           ///< rad/s/sqrt(Hz).
+  double accelerometer = 0.0;       ///< m/s^2/sqrt(Hz).
+  double gyroscope_walk = 0.0;      ///< rad/s^2/sqrt(Hz).
+  double accelerometer_walk = 0.0;  ///< m/s^3/sqrt(Hz).
+};
+
+/// What is known of an IMU and of how it is mounted. What is not told is found.
+struct ImuCalibration {
+  std::optional<Rigid3> imu_from_rig;  ///< The rig's frame is that of camera 0.
+  /// What is added to the time of an image to have it by the IMU's clock (Kalibr's
+  /// timeshift_cam_imu).
+  std::optional<double> time_shift_s;
+  std::optional<ImuNoise> noise;
+};
+
+}  // namespace waymark
