@@ -26,6 +26,12 @@ struct ImuNoise {
   double accelerometer_walk = 0.0;  ///< m/s^3/sqrt(Hz).
 };
 
+/// What the sensors show too much, in the frame of the IMU: measured = true + bias + noise.
+struct ImuBiases {
+  Eigen::Vector3d gyroscope = Eigen::Vector3d::Zero();      ///< rad/s.
+  Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2.
+};
+
 /// What is known of an IMU and of how it is mounted. What is not told is found.
 struct ImuCalibration {
   std::optional<Rigid3> imu_from_rig;  ///< The rig's frame is that of camera 0.
