@@ -42,13 +42,15 @@ TEST(ImuPrediction, FollowsTheMotion) {
   const Bridge bridge(rng);
   const ImuSamples samples = testing::simulated_samples(
       bridge.motion, 0.0, 3.0, 1000.0, {}, bridge.biases, bridge.setup.gravity, rng);
-  const auto found = predict({bridge.state(0.5), {}}, samples, nanoseconds(0.5),
+  InertialEstimate first;
+  first.state = bridge.state(0.5);
+  const auto found = predict(first, samples, nanoseconds(0.5),
                              nanoseconds(2.5007), kPredictionNoise, bridge.setup);
   ASSERT_TRUE(found);
   const InertialState truth = bridge.state(2.5007);
   EXPECT_LT((found->state.rig_from_world * truth.rig_from_world.inverse()).log().norm(), 1e-3);
   EXPECT_LT((found->state.velocity - truth.velocity).norm(), 1e-3);
-  EXPECT_FALSE(predict({bridge.state(0.5), {}}, samples, nanoseconds(0.5), nanoseconds(3.1),
+  EXPECT_FALSE(predict(first, samples, nanoseconds(0.5), nanoseconds(3.1),
                        kPredictionNoise, bridge.setup));
 }
 
@@ -67,7 +69,8 @@ TEST(ImuPrediction, CovarianceIsHonest) {
           0.05, 0.05, 0.05;
       Vector15d error;
       for (int i = 0; i < 15; ++i) error[i] = sigmas[i] * rng.normal();
-      InertialEstimate first{bridge.state(0.0).moved(error), {}};
+      InertialEstimate first;
+      first.state = bridge.state(0.0).moved(error);
       first.covariance.diagonal() = sigmas.cwiseAbs2();
       const auto found = predict(first, samples, 0, nanoseconds(seconds), kPredictionNoise, bridge.setup);
       ASSERT_TRUE(found);

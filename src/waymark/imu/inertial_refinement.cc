@@ -1,0 +1,165 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/imu/inertial_refinement.h"
+
+#include <Eigen/Cholesky>
+#include <cmath>
+#include <utility>
+
+#include "waymark/base/check.h"
+#include "waymark/geometry/rigid3.h"
+#include "waymark/solver/levenberg_marquardt.h"
+
+namespace waymark {
+namespace {
+
+constexpr int kMaxRefinements = 50;
+/// Of the squared error, which is in standard deviations.
+constexpr double kNegligibleError = 1e-3;
+
+/// What a velocity is below in m/s, where nothing tells it.
+constexpr double kAnySpeed = 1000.0;
+
+/// A step of all unknowns: setup, then the states.
+struct UnknownsStep {
+  Eigen::VectorXd tangent;
+};
+
+/// As minimize_over_pose wants them.
+struct SteppedUnknowns : InertialUnknowns {
+  static UnknownsStep exp(const Eigen::VectorXd& tangent) { return {tangent}; }
+};
+
+SteppedUnknowns operator*(const UnknownsStep& step, SteppedUnknowns unknowns) {
+  unknowns.setup = unknowns.setup.moved(step.tangent.head<10>());
+  Eigen::Index at = 10;
+  for (InertialState& state : unknowns.states) {
+    state = state.moved(step.tangent.segment<15>(at));
+    at += 15;
+  }
+  return unknowns;
+}
+
+/// NormalEquations of a size that is known only when it runs.
+struct UnknownsEquations {
+  Eigen::MatrixXd hessian;
+  Eigen::VectorXd gradient;
+  double cost = 0.0;
+
+  explicit UnknownsEquations(Eigen::Index size)
+      : hessian(Eigen::MatrixXd::Zero(size, size)), gradient(Eigen::VectorXd::Zero(size)) {}
+  /// Components from there on that are off by so much, with one standard deviation.
+  void add_prior(Eigen::Index at, const Eigen::VectorXd& error, double sigma) {
+    const double information = 1.0 / (sigma * sigma);
+    hessian.diagonal().segment(at, error.size()).array() += information;
+    gradient.segment(at, error.size()) += information * error;
+    cost += information * error.squaredNorm();
+  }
+};
+
+struct RefinementProblem {
+  std::span<const VisionPose> poses;
+  const PreintegrationChain& chain;
+  const InertialBelief& belief;
+  const InertialStartOptions& options;
+};
+
+void add_setup_priors(const RefinementProblem& problem,
+                      const InertialUnknowns& unknowns,
+                      UnknownsEquations& equations) {
+  const InertialSetup& setup = unknowns.setup;
+  const InertialBelief& belief = problem.belief;
+  const InertialStartOptions& options = problem.options;
+  equations.add_prior(2, Eigen::VectorXd::Constant(1, setup.log_scale - options.log_scale),
+                      options.log_scale_sigma);
+  // Steps move the lever arm by -R^T; its standard deviation is the same for all axes.
+  const Eigen::Vector3d lever_arm =
+      setup.imu_from_rig.origin_in_source() - belief.imu_from_rig.origin_in_source();
+  equations.add_prior(3, -(setup.imu_from_rig.rotation * lever_arm), belief.lever_arm_sigma);
+  equations.add_prior(
+      6, so3_log(setup.imu_from_rig.rotation * belief.imu_from_rig.rotation.conjugate()),
+      belief.rotation_sigma);
+  equations.add_prior(
+      9,
+      Eigen::VectorXd::Constant(1, setup.time_shift_change_s - belief.time_shift_change_s),
+      belief.time_shift_sigma_s);
+}
+
+/// Poses by vision. Their errors are small, so that those of tangent vectors are those of steps.
+/// Biases are new where samples are missing before a pose.
+void add_state_priors(const RefinementProblem& problem,
+                     const InertialUnknowns& unknowns,
+                     UnknownsEquations& equations) {
+  for (std::size_t i = 0; i < problem.poses.size(); ++i) {
+    const Vector6d error = (unknowns.states[i].rig_from_world *
+                            problem.poses[i].rig_from_world.inverse()).log();
+    const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
+    equations.add_prior(at, error.head<3>(), problem.options.pose_position_sigma);
+    equations.add_prior(at + 3, error.tail<3>(), problem.options.pose_rotation_sigma);
+    equations.add_prior(at + 6, unknowns.states[i].velocity, kAnySpeed);
+    if (i > 0 && problem.chain[i - 1]) continue;
+    const ImuBiases& biases = unknowns.states[i].biases;
+    equations.add_prior(at + 9, biases.gyroscope, problem.options.gyroscope_bias_sigma);
+    equations.add_prior(at + 12, biases.accelerometer, problem.options.accelerometer_bias_sigma);
+  }
+}
+
+UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
+                                     const InertialUnknowns& unknowns) {
+  UnknownsEquations equations(10 + 15 * static_cast<Eigen::Index>(unknowns.states.size()));
+  add_setup_priors(problem, unknowns, equations);
+  add_state_priors(problem, unknowns, equations);
+  Eigen::Matrix<double, 15, 30> by_states;
+  for (std::size_t i = 0; i < problem.chain.size(); ++i) {
+    if (!problem.chain[i]) continue;
+    const InertialResidual residual = inertial_residual(
+        *problem.chain[i], unknowns.states[i], unknowns.states[i + 1], unknowns.setup);
+    const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
+    by_states << residual.by_first, residual.by_second;
+    equations.hessian.block<30, 30>(at, at) += by_states.transpose() * by_states;
+    equations.hessian.block<30, 10>(at, 0) += by_states.transpose() * residual.by_setup;
+    equations.hessian.block<10, 10>(0, 0) += residual.by_setup.transpose() * residual.by_setup;
+    equations.gradient.segment<30>(at) += by_states.transpose() * residual.value;
+    equations.gradient.head<10>() += residual.by_setup.transpose() * residual.value;
+    equations.cost += residual.value.squaredNorm();
+  }
+  equations.hessian.topRows<10>() = equations.hessian.leftCols<10>().transpose();
+  return equations;
+}
+
+/// The part of the inverse for the setup and the last state.
+Matrix25d covariance_of_ends(const Eigen::MatrixXd& hessian) {
+  const Eigen::Index size = hessian.rows();
+  Eigen::MatrixXd units = Eigen::MatrixXd::Zero(size, 25);
+  units.topLeftCorner<10, 10>().setIdentity();
+  units.bottomRightCorner<15, 15>().setIdentity();
+  // Jacobi scaling: unknowns differ by orders of magnitude in how sure they are.
+  const Eigen::VectorXd sizes = hessian.diagonal().cwiseSqrt().cwiseInverse();
+  const Eigen::MatrixXd scaled = sizes.asDiagonal() * hessian * sizes.asDiagonal();
+  const Eigen::MatrixXd columns =
+      sizes.asDiagonal() * scaled.ldlt().solve(sizes.asDiagonal() * units);
+  const Matrix25d covariance = units.transpose() * columns;
+  return 0.5 * (covariance + covariance.transpose());
+}
+
+}  // namespace
+
+InertialRefinement refine_inertial_start(std::span<const VisionPose> poses,
+                                         const PreintegrationChain& chain,
+                                         InertialUnknowns unknowns,
+                                         const InertialBelief& belief,
+                                         const InertialStartOptions& options) {
+  WAYMARK_CHECK(unknowns.states.size() == poses.size() && chain.size() + 1 == poses.size());
+  const RefinementProblem problem{poses, chain, belief, options};
+  SteppedUnknowns stepped{{std::move(unknowns)}};
+  int num_iterations = 0;
+  const UnknownsEquations last = minimize_over_pose(
+      stepped,
+      [&](const SteppedUnknowns& at) { return linearize_unknowns(problem, at); },
+      kMaxRefinements,
+      kNegligibleError,
+      num_iterations);
+  return {std::move(stepped), covariance_of_ends(last.hessian), last.cost};
+}
+
+}  // namespace waymark
