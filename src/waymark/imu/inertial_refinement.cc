@@ -20,7 +20,9 @@ constexpr double kNegligibleError = 1e-3;
 /// What a velocity is below in m/s, where nothing tells it.
 constexpr double kAnySpeed = 1000.0;
 
-/// A step of all unknowns: setup, then the states.
+/// A step of all unknowns: setup, then the states. Velocities grow with the scale, and their own
+/// part is added to that: otherwise all would have to follow each step of the scale to within the
+/// errors of vision, along a bent valley in which only tiny steps lower the cost.
 struct UnknownsStep {
   Eigen::VectorXd tangent;
 };
@@ -32,8 +34,10 @@ struct SteppedUnknowns : InertialUnknowns {
 
 SteppedUnknowns operator*(const UnknownsStep& step, SteppedUnknowns unknowns) {
   unknowns.setup = unknowns.setup.moved(step.tangent.head<10>());
+  const double growth = std::exp(step.tangent[2]);
   Eigen::Index at = 10;
   for (InertialState& state : unknowns.states) {
+    state.velocity *= growth;
     state = state.moved(step.tangent.segment<15>(at));
     at += 15;
   }
@@ -112,8 +116,12 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
   Eigen::Matrix<double, 15, 30> by_states;
   for (std::size_t i = 0; i < problem.chain.size(); ++i) {
     if (!problem.chain[i]) continue;
-    const InertialResidual residual = inertial_residual(
-        *problem.chain[i], unknowns.states[i], unknowns.states[i + 1], unknowns.setup);
+    const InertialState& first = unknowns.states[i];
+    const InertialState& second = unknowns.states[i + 1];
+    InertialResidual residual =
+        inertial_residual(*problem.chain[i], first, second, unknowns.setup);
+    residual.by_setup.col(2) += residual.by_first.middleCols<3>(6) * first.velocity +
+                                residual.by_second.middleCols<3>(6) * second.velocity;
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
     by_states << residual.by_first, residual.by_second;
     equations.hessian.block<30, 30>(at, at) += by_states.transpose() * by_states;
@@ -127,8 +135,8 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
   return equations;
 }
 
-/// The part of the inverse for the setup and the last state.
-Matrix25d covariance_of_ends(const Eigen::MatrixXd& hessian) {
+/// The part of the inverse for the setup and the last state, of their own tangent vectors.
+Matrix25d covariance_of_ends(const Eigen::MatrixXd& hessian, const Eigen::Vector3d& velocity) {
   const Eigen::Index size = hessian.rows();
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(size, 25);
   units.topLeftCorner<10, 10>().setIdentity();
@@ -138,7 +146,9 @@ Matrix25d covariance_of_ends(const Eigen::MatrixXd& hessian) {
   const Eigen::MatrixXd scaled = sizes.asDiagonal() * hessian * sizes.asDiagonal();
   const Eigen::MatrixXd columns =
       sizes.asDiagonal() * scaled.ldlt().solve(sizes.asDiagonal() * units);
-  const Matrix25d covariance = units.transpose() * columns;
+  Matrix25d by_step = Matrix25d::Identity();
+  by_step.block<3, 1>(16, 2) = velocity;
+  const Matrix25d covariance = by_step * (units.transpose() * columns) * by_step.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 
@@ -159,7 +169,9 @@ InertialRefinement refine_inertial_start(std::span<const VisionPose> poses,
       kMaxRefinements,
       kNegligibleError,
       num_iterations);
-  return {std::move(stepped), covariance_of_ends(last.hessian), last.cost};
+  const Matrix25d covariance =
+      covariance_of_ends(last.hessian, stepped.states.back().velocity);
+  return {std::move(stepped), covariance, last.cost};
 }
 
 }  // namespace waymark
