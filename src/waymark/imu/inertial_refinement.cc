@@ -73,9 +73,8 @@ void add_setup_priors(const RefinementProblem& problem,
                       UnknownsEquations& equations) {
   const InertialSetup& setup = unknowns.setup;
   const InertialBelief& belief = problem.belief;
-  const InertialStartOptions& options = problem.options;
-  equations.add_prior(2, Eigen::VectorXd::Constant(1, setup.log_scale - options.log_scale),
-                      options.log_scale_sigma);
+  equations.add_prior(2, Eigen::VectorXd::Constant(1, setup.log_scale - belief.log_scale),
+                      belief.log_scale_sigma);
   // Steps move the lever arm by -R^T; its standard deviation is the same for all axes.
   const Eigen::Vector3d lever_arm =
       setup.imu_from_rig.origin_in_source() - belief.imu_from_rig.origin_in_source();
@@ -135,21 +134,24 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
   return equations;
 }
 
-/// The part of the inverse for the setup and the last state, of their own tangent vectors.
-Matrix25d covariance_of_ends(const Eigen::MatrixXd& hessian, const Eigen::Vector3d& velocity) {
+/// Covariance and determinant of the last equations.
+void judge(const Eigen::MatrixXd& hessian, InertialRefinement& refined) {
   const Eigen::Index size = hessian.rows();
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(size, 25);
   units.topLeftCorner<10, 10>().setIdentity();
   units.bottomRightCorner<15, 15>().setIdentity();
   // Jacobi scaling: unknowns differ by orders of magnitude in how sure they are.
   const Eigen::VectorXd sizes = hessian.diagonal().cwiseSqrt().cwiseInverse();
-  const Eigen::MatrixXd scaled = sizes.asDiagonal() * hessian * sizes.asDiagonal();
+  const Eigen::LDLT<Eigen::MatrixXd> factor(sizes.asDiagonal() * hessian * sizes.asDiagonal());
   const Eigen::MatrixXd columns =
-      sizes.asDiagonal() * scaled.ldlt().solve(sizes.asDiagonal() * units);
+      sizes.asDiagonal() * factor.solve(sizes.asDiagonal() * units);
+  // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
-  by_step.block<3, 1>(16, 2) = velocity;
+  by_step.block<3, 1>(16, 2) = refined.unknowns.states.back().velocity;
   const Matrix25d covariance = by_step * (units.transpose() * columns) * by_step.transpose();
-  return 0.5 * (covariance + covariance.transpose());
+  refined.covariance = 0.5 * (covariance + covariance.transpose());
+  refined.log_determinant =
+      factor.vectorD().array().log().sum() - 2.0 * sizes.array().log().sum();
 }
 
 }  // namespace
@@ -169,9 +171,11 @@ InertialRefinement refine_inertial_start(std::span<const VisionPose> poses,
       kMaxRefinements,
       kNegligibleError,
       num_iterations);
-  const Matrix25d covariance =
-      covariance_of_ends(last.hessian, stepped.states.back().velocity);
-  return {std::move(stepped), covariance, last.cost};
+  InertialRefinement refined;
+  refined.unknowns = std::move(stepped);
+  refined.squared_error = last.cost;
+  judge(last.hessian, refined);
+  return refined;
 }
 
 }  // namespace waymark

@@ -12,6 +12,8 @@ namespace waymark {
 
 /// What is believed of all unknowns before samples are read: normal around these values.
 struct InertialBelief {
+  double log_scale = 0.0;  ///< Of metres per map unit.
+  double log_scale_sigma = 0.0;
   Rigid3 imu_from_rig;
   double rotation_sigma = 0.0;         ///< Of imu_from_rig, rad.
   double lever_arm_sigma = 0.0;        ///< Of its origin in the rig, m.
@@ -24,6 +26,7 @@ struct InertialRefinement {
   InertialUnknowns unknowns;
   Matrix25d covariance;  ///< Of (setup, last state).
   double squared_error = 0.0;
+  double log_determinant = 0.0;  ///< Of the information of all unknowns.
 };
 
 /// Refines to the maximum of the posterior (Campos, Montiel and Tardos 2020, eq. 8), with the poses

@@ -192,6 +192,10 @@ TEST(InertialStart, Hovering) {
   StartStatistics statistics(testing::hovering_motion, {true, false}, "hover");
 }
 TEST(InertialStart, Car) { StartStatistics statistics(testing::car_motion, {}, "car"); }
+TEST(InertialStart, SmoothCar) { StartStatistics statistics([](Rng& rng) { auto m = testing::car_motion(rng); for (auto& a : m.position.amplitudes) a *= 0.1; return m; }, {}, "smooth car"); }
+TEST(InertialStart, RestUnknown) { StartStatistics statistics(motion_at_rest, {false, false}, "rest unknown"); }
+TEST(InertialStart, HoverUnknown) { StartStatistics statistics(testing::hovering_motion, {false, false}, "hover unknown"); }
+TEST(InertialStart, CarUnknown) { StartStatistics statistics(testing::car_motion, {false, false}, "car unknown"); }
 TEST(InertialStart, Rest) { StartStatistics statistics(motion_at_rest, {}, "rest"); }
 
 }  // namespace
