@@ -16,9 +16,14 @@ namespace {
 
 std::vector<ImuSample> moving_samples() {
   Rng rng(1, 0);
-  const ImuSamples samples = testing::simulated_samples(testing::hand_held_motion(rng), 0.0, 10.0,
-                                                        200.0, {1e-4, 2e-3, 1e-5, 1e-4}, {},
-                                                        {0.0, 0.0, -kStandardGravity}, rng);
+  const ImuSamples samples = testing::simulated_samples(testing::hand_held_motion(rng),
+                                                        0.0,
+                                                        10.0,
+                                                        200.0,
+                                                        {1e-4, 2e-3, 1e-5, 1e-4},
+                                                        {},
+                                                        {0.0, 0.0, -kStandardGravity},
+                                                        rng);
   return {samples.all().begin(), samples.all().end()};
 }
 

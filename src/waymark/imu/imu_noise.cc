@@ -20,10 +20,10 @@ using Vector6Samples = Eigen::Matrix<double, 6, Eigen::Dynamic>;
 /// turn by more than a bias, and weigh about what they should, and no more than so much less still
 /// than the stillest of them.
 constexpr double kStretchSeconds = 1.0;
-constexpr double kStillTurn = 0.02;    ///< rad/s.
-constexpr double kStillForce = 0.15;   ///< m/s^2.
-constexpr double kBiasTurn = 0.1;      ///< rad/s.
-constexpr double kBiasForce = 0.5;     ///< m/s^2.
+constexpr double kStillTurn = 0.02;   ///< rad/s.
+constexpr double kStillForce = 0.15;  ///< m/s^2.
+constexpr double kBiasTurn = 0.1;     ///< rad/s.
+constexpr double kBiasForce = 0.5;    ///< m/s^2.
 constexpr double kStillest = 1.5;
 constexpr std::size_t kMinStretches = 3;
 constexpr double kMaxLag = 0.1;  ///< s.
@@ -31,7 +31,7 @@ constexpr double kMaxLag = 0.1;  ///< s.
 constexpr double kLeastShare = 0.1;  ///< Of the default.
 
 struct RestStretch {
-  Vector6Samples values;   ///< Angular velocities and accelerations.
+  Vector6Samples values;    ///< Angular velocities and accelerations.
   double turn_sigma = 0.0;  ///< rad/s.
   double force_sigma = 0.0;
   bool is_still = false;
@@ -63,8 +63,7 @@ std::vector<RestStretch> rest_stretches(const ImuSamples& samples) {
   double turn = kStillTurn, force = kStillForce;
   for (std::size_t first = 0; first + size <= all.size(); first += size) {
     const std::span<const ImuSample> part = all.subspan(first, size);
-    const auto coverage =
-        samples.coverage(part.front().timestamp_ns, part.back().timestamp_ns);
+    const auto coverage = samples.coverage(part.front().timestamp_ns, part.back().timestamp_ns);
     if (coverage != ImuCoverage::kWhole) continue;
     RestStretch stretch = rest_stretch(part);
     if (!stretch.is_still) continue;
@@ -111,8 +110,7 @@ std::optional<ImuNoise> estimate_imu_noise(const ImuSamples& samples) {
   }
   ImuNoise noise = default_imu_noise();
   noise.gyroscope = std::max(std::sqrt(squared_density[0]), kLeastShare * noise.gyroscope);
-  noise.accelerometer =
-      std::max(std::sqrt(squared_density[1]), kLeastShare * noise.accelerometer);
+  noise.accelerometer = std::max(std::sqrt(squared_density[1]), kLeastShare * noise.accelerometer);
   return noise;
 }
 

@@ -17,8 +17,8 @@ TEST(ImuNoise, OfARestIsThatOfTheSensor) {
   for (const double rate : {100.0, 200.0, 800.0}) {
     const ImuNoise truth{1.5e-4, 2e-3, 2e-5, 1e-4};
     Rng rng(1, 0);
-    const ImuSamples samples = testing::simulated_samples(
-        {}, 0.0, 8.0, rate, truth, kRestBiases, kRestGravity, rng);
+    const ImuSamples samples =
+        testing::simulated_samples({}, 0.0, 8.0, rate, truth, kRestBiases, kRestGravity, rng);
     const auto found = estimate_imu_noise(samples);
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->gyroscope / truth.gyroscope, 1.05, 0.12) << rate;
@@ -30,8 +30,8 @@ TEST(ImuNoise, OfARestIsThatOfTheSensor) {
 TEST(ImuNoise, IsNotHiddenByAFilter) {
   const ImuNoise truth{3e-4, 4e-3, 2e-5, 1e-4};
   Rng rng(2, 0);
-  const ImuSamples sharp = testing::simulated_samples(
-      {}, 0.0, 10.0, 400.0, truth, kRestBiases, kRestGravity, rng);
+  const ImuSamples sharp =
+      testing::simulated_samples({}, 0.0, 10.0, 400.0, truth, kRestBiases, kRestGravity, rng);
   ImuSamples smooth;
   ImuSample last = sharp.all().front();
   for (ImuSample sample : sharp.all()) {  // A low-pass filter of 5 ms or so.
@@ -49,11 +49,11 @@ TEST(ImuNoise, ComesFromTheRestAloneAndNotFromMotion) {
   const ImuNoise truth{1.5e-4, 2e-3, 2e-5, 1e-4};
   Rng rng(3, 0);
   const testing::ImuMotion motion = testing::hand_held_motion(rng);
-  ImuSamples moving = testing::simulated_samples(
-      motion, 0.0, 10.0, 200.0, truth, kRestBiases, kRestGravity, rng);
+  ImuSamples moving =
+      testing::simulated_samples(motion, 0.0, 10.0, 200.0, truth, kRestBiases, kRestGravity, rng);
   EXPECT_FALSE(estimate_imu_noise(moving));
-  const ImuSamples rest = testing::simulated_samples(
-      {}, 10.5, 18.0, 200.0, truth, kRestBiases, kRestGravity, rng);
+  const ImuSamples rest =
+      testing::simulated_samples({}, 10.5, 18.0, 200.0, truth, kRestBiases, kRestGravity, rng);
   for (const ImuSample& sample : rest.all()) moving.add(sample);
   const auto found = estimate_imu_noise(moving);
   ASSERT_TRUE(found);
@@ -63,8 +63,8 @@ TEST(ImuNoise, ComesFromTheRestAloneAndNotFromMotion) {
 
 TEST(ImuNoise, OfAConstantOutputIsNotZero) {
   Rng rng(4, 0);
-  const ImuSamples samples = testing::simulated_samples(
-      {}, 0.0, 8.0, 200.0, {}, kRestBiases, kRestGravity, rng);
+  const ImuSamples samples =
+      testing::simulated_samples({}, 0.0, 8.0, 200.0, {}, kRestBiases, kRestGravity, rng);
   const auto found = estimate_imu_noise(samples);
   ASSERT_TRUE(found);
   EXPECT_GT(found->gyroscope, 0.0);

@@ -20,7 +20,8 @@ struct InertialEstimate {
 
 /// Where the rig is at the end of a preintegration by what it was at its beginning. The covariance
 /// is propagated to first order, with that of the noise and the walk of the biases; that of the
-/// setup is not in it. The time shift of the setup must not have changed since the samples were cut.
+/// setup is not in it. The time shift of the setup must not have changed since the samples were
+/// cut.
 InertialEstimate predict(const InertialEstimate& first,
                          const Preintegration& preintegration,
                          const InertialSetup& setup);

@@ -44,14 +44,14 @@ TEST(ImuPrediction, FollowsTheMotion) {
       bridge.motion, 0.0, 3.0, 1000.0, {}, bridge.biases, bridge.setup.gravity, rng);
   InertialEstimate first;
   first.state = bridge.state(0.5);
-  const auto found = predict(first, samples, nanoseconds(0.5),
-                             nanoseconds(2.5007), kPredictionNoise, bridge.setup);
+  const auto found = predict(
+      first, samples, nanoseconds(0.5), nanoseconds(2.5007), kPredictionNoise, bridge.setup);
   ASSERT_TRUE(found);
   const InertialState truth = bridge.state(2.5007);
   EXPECT_LT((found->state.rig_from_world * truth.rig_from_world.inverse()).log().norm(), 1e-3);
   EXPECT_LT((found->state.velocity - truth.velocity).norm(), 1e-3);
-  EXPECT_FALSE(predict(first, samples, nanoseconds(0.5), nanoseconds(3.1),
-                       kPredictionNoise, bridge.setup));
+  EXPECT_FALSE(
+      predict(first, samples, nanoseconds(0.5), nanoseconds(3.1), kPredictionNoise, bridge.setup));
 }
 
 /// The squared error of the pose in standard deviations is six in the mean.
@@ -62,8 +62,14 @@ TEST(ImuPrediction, CovarianceIsHonest) {
     for (int trial = 0; trial < kTrials; ++trial) {
       Rng rng(2, static_cast<std::uint64_t>(trial));
       Bridge bridge(rng);
-      const ImuSamples samples = testing::simulated_samples(
-          bridge.motion, 0.0, 5.0, 200.0, kPredictionNoise, bridge.biases, bridge.setup.gravity, rng);
+      const ImuSamples samples = testing::simulated_samples(bridge.motion,
+                                                            0.0,
+                                                            5.0,
+                                                            200.0,
+                                                            kPredictionNoise,
+                                                            bridge.biases,
+                                                            bridge.setup.gravity,
+                                                            rng);
       Vector15d sigmas;
       sigmas << 0.003, 0.003, 0.003, 0.002, 0.002, 0.002, 0.03, 0.03, 0.03, 0.002, 0.002, 0.002,
           0.05, 0.05, 0.05;
@@ -72,11 +78,11 @@ TEST(ImuPrediction, CovarianceIsHonest) {
       InertialEstimate first;
       first.state = bridge.state(0.0).moved(error);
       first.covariance.diagonal() = sigmas.cwiseAbs2();
-      const auto found = predict(first, samples, 0, nanoseconds(seconds), kPredictionNoise, bridge.setup);
+      const auto found =
+          predict(first, samples, 0, nanoseconds(seconds), kPredictionNoise, bridge.setup);
       ASSERT_TRUE(found);
       const InertialState truth = bridge.state(seconds);
-      const Vector6d off =
-          (found->state.rig_from_world * truth.rig_from_world.inverse()).log();
+      const Vector6d off = (found->state.rig_from_world * truth.rig_from_world.inverse()).log();
       sum += off.dot(found->covariance.topLeftCorner<6, 6>().ldlt().solve(off));
       Eigen::Matrix<double, 9, 1> all;
       all << off, found->state.velocity - truth.velocity;

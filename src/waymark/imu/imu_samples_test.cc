@@ -59,8 +59,7 @@ TEST(ImuSamples, SpansEndWhereTheyShould) {
       EXPECT_GT(span.samples[i].timestamp_ns, span.samples[i - 1].timestamp_ns);
       EXPECT_LE(span.samples[i].timestamp_ns, span.samples[i - 1].timestamp_ns + 10);
     }
-    EXPECT_LT(
-        (span.samples.front().acceleration - sample_at(begin).acceleration).norm(), 1e-9);
+    EXPECT_LT((span.samples.front().acceleration - sample_at(begin).acceleration).norm(), 1e-9);
   }
 }
 

@@ -80,14 +80,15 @@ void add_setup_priors(const RefinementProblem& problem,
                       UnknownsEquations& equations) {
   const InertialSetup& setup = unknowns.setup;
   const InertialBelief& belief = problem.belief;
-  equations.add_prior(2, Eigen::VectorXd::Constant(1, setup.log_scale - belief.log_scale),
-                      belief.log_scale_sigma);
+  equations.add_prior(
+      2, Eigen::VectorXd::Constant(1, setup.log_scale - belief.log_scale), belief.log_scale_sigma);
   // Steps move the lever arm by -R^T; its standard deviation is the same for all axes.
   const Eigen::Vector3d lever_arm =
       setup.imu_from_rig.origin_in_source() - belief.imu_from_rig.origin_in_source();
   equations.add_prior(3, -(setup.imu_from_rig.rotation * lever_arm), belief.lever_arm_sigma);
   equations.add_prior(
-      6, so3_log(setup.imu_from_rig.rotation * belief.imu_from_rig.rotation.conjugate()),
+      6,
+      so3_log(setup.imu_from_rig.rotation * belief.imu_from_rig.rotation.conjugate()),
       belief.rotation_sigma);
   equations.add_prior(
       9,
@@ -98,11 +99,11 @@ void add_setup_priors(const RefinementProblem& problem,
 /// Poses by vision. Their errors are small, so that those of tangent vectors are those of steps.
 /// Biases are new where samples are missing before a pose.
 void add_state_priors(const RefinementProblem& problem,
-                     const InertialUnknowns& unknowns,
-                     UnknownsEquations& equations) {
+                      const InertialUnknowns& unknowns,
+                      UnknownsEquations& equations) {
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
-    const Vector6d error = (unknowns.states[i].rig_from_world *
-                            problem.poses[i].rig_from_world.inverse()).log();
+    const Vector6d error =
+        (unknowns.states[i].rig_from_world * problem.poses[i].rig_from_world.inverse()).log();
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
     equations.add_prior(at, error.head<3>(), problem.options.pose_position_sigma);
     equations.add_prior(at + 3, error.tail<3>(), problem.options.pose_rotation_sigma);
@@ -124,8 +125,7 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
     if (!problem.chain[i]) continue;
     const InertialState& first = unknowns.states[i];
     const InertialState& second = unknowns.states[i + 1];
-    InertialResidual residual =
-        inertial_residual(*problem.chain[i], first, second, unknowns.setup);
+    InertialResidual residual = inertial_residual(*problem.chain[i], first, second, unknowns.setup);
     residual.by_setup.col(2) += residual.by_first.middleCols<3>(6) * first.velocity +
                                 residual.by_second.middleCols<3>(6) * second.velocity;
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
@@ -152,7 +152,8 @@ void judge(const Eigen::MatrixXd& hessian, InertialRefinement& refined) {
   // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
   by_step.block<3, 1>(16, 2) = refined.unknowns.states.back().velocity;
-  const Matrix25d covariance = by_step * (units.transpose() * factor.solve(units)) * by_step.transpose();
+  const Matrix25d covariance =
+      by_step * (units.transpose() * factor.solve(units)) * by_step.transpose();
   refined.covariance = 0.5 * (covariance + covariance.transpose());
   refined.log_determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
 }

@@ -15,9 +15,9 @@ struct InertialBelief {
   double log_scale = 0.0;  ///< Of metres per map unit.
   double log_scale_sigma = 0.0;
   Rigid3 imu_from_rig;
-  double rotation_sigma = 0.0;         ///< Of imu_from_rig, rad.
-  double lever_arm_sigma = 0.0;        ///< Of its origin in the rig, m.
-  double time_shift_change_s = 0.0;    ///< In relation to the one that the samples were cut at.
+  double rotation_sigma = 0.0;       ///< Of imu_from_rig, rad.
+  double lever_arm_sigma = 0.0;      ///< Of its origin in the rig, m.
+  double time_shift_change_s = 0.0;  ///< In relation to the one that the samples were cut at.
   double time_shift_sigma_s = 0.0;
 };
 

@@ -88,8 +88,8 @@ void add_translation(const Preintegration& preintegration,
   const Eigen::Vector3d velocity =
       imu_from_world * (second.velocity - first.velocity - t * setup.gravity);
   const Eigen::Vector3d position =
-      imu_from_world * (end.position - begin.position - t * first.velocity -
-                        0.5 * t * t * setup.gravity);
+      imu_from_world *
+      (end.position - begin.position - t * first.velocity - 0.5 * t * t * setup.gravity);
   const Eigen::Matrix<double, 3, 2> by_gravity =
       -imu_from_world * skew(setup.gravity) * tangent_basis(setup.gravity.normalized());
 

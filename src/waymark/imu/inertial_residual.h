@@ -57,10 +57,10 @@ struct InertialResidual {
   Matrix15x10d by_setup;
 };
 
-/// The residual. A changed time shift d moves the IMU back along its motion from where the image was
-/// taken to where the samples end, as if angular velocity (of the outermost samples) and velocity
-/// (of the states) were constant in between: wrong by d^2 / 2 times the accelerations, 5e-6 m for
-/// 1 ms and 10 m/s^2. Cut the samples anew where d gets larger.
+/// The residual. A changed time shift d moves the IMU back along its motion from where the image
+/// was taken to where the samples end, as if angular velocity (of the outermost samples) and
+/// velocity (of the states) were constant in between: wrong by d^2 / 2 times the accelerations,
+/// 5e-6 m for 1 ms and 10 m/s^2. Cut the samples anew where d gets larger.
 InertialResidual inertial_residual(const Preintegration& preintegration,
                                    const InertialState& first,
                                    const InertialState& second,

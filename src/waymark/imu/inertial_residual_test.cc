@@ -38,7 +38,8 @@ struct Scene {
     Rng rng(0, 0);
     const ImuSamples samples = testing::simulated_samples(
         motion, begin_s - 0.1, end_s + 0.1, rate_hz, {}, biases, setup.gravity, rng);
-    return {samples.between(nanoseconds(begin_s), nanoseconds(end_s)).samples, kResidualNoise, biases};
+    return {
+        samples.between(nanoseconds(begin_s), nanoseconds(end_s)).samples, kResidualNoise, biases};
   }
 };
 
@@ -47,7 +48,8 @@ TEST(InertialResidual, VanishesForTheTrueMotion) {
   for (int trial = 0; trial < 5; ++trial) {
     const Scene scene(rng);
     const auto residual = inertial_residual(scene.preintegration(0.2, 0.6, 2000.0),
-                                            scene.state(0.2, 0.2), scene.state(0.6, 0.6),
+                                            scene.state(0.2, 0.2),
+                                            scene.state(0.6, 0.6),
                                             scene.setup);
     EXPECT_LT(residual.value.norm(), 1e-2);
   }
@@ -59,8 +61,11 @@ TEST(InertialResidual, AShiftOfTimeIsMadeUpForToFirstOrder) {
   const auto preintegration = scene.preintegration(0.2, 0.6, 2000.0);
   const auto residual_at = [&](double shift, double told) {
     scene.setup.time_shift_change_s = told;
-    return inertial_residual(preintegration, scene.state(0.2 + shift, 0.2),
-                             scene.state(0.6 + shift, 0.6), scene.setup).value.norm();
+    return inertial_residual(preintegration,
+                             scene.state(0.2 + shift, 0.2),
+                             scene.state(0.6 + shift, 0.6),
+                             scene.setup)
+        .value.norm();
   };
   // Images are 2 ms later by the clock of the IMU than the samples end.
   EXPECT_GT(residual_at(0.002, 0.0), 20.0 * residual_at(0.002, 0.002));
@@ -83,8 +88,7 @@ TEST(InertialResidual, DerivativesMatchNumericOnes) {
     const double step = 1e-6;
     const auto check = [&](const auto& analytic, const auto& residual_of) {
       for (Eigen::Index i = 0; i < analytic.cols(); ++i) {
-        const Vector15d numeric =
-            (residual_of(i, step) - residual_of(i, -step)) / (2.0 * step);
+        const Vector15d numeric = (residual_of(i, step) - residual_of(i, -step)) / (2.0 * step);
         EXPECT_LT((analytic.col(i) - numeric).norm(), 1e-6 * (10.0 + analytic.norm())) << i;
         EXPECT_LT((analytic.col(i) - numeric).norm(), 1e-4 * (1.0 + numeric.norm())) << i;
       }
@@ -109,7 +113,8 @@ TEST(InertialResidual, PerturbationsKeepTheSizeOfGravity) {
   const InertialSetup moved = setup.moved(0.3 * Vector10d::Ones());
   EXPECT_NEAR(moved.gravity.norm(), kStandardGravity, 1e-12);
   EXPECT_NEAR(moved.gravity.normalized().dot(setup.gravity.normalized()),
-              std::cos(0.3 * std::sqrt(2.0)), 1e-12);
+              std::cos(0.3 * std::sqrt(2.0)),
+              1e-12);
 }
 
 }  // namespace

@@ -74,8 +74,8 @@ double degrees_of_freedom(const PreintegrationChain& chain) {
   return freedom;
 }
 
-/// Refines, and cuts and integrates anew until time shift and biases stay. The chain is left as it was
-/// refined with, and the time shift as it was cut at.
+/// Refines, and cuts and integrates anew until time shift and biases stay. The chain is left as it
+/// was refined with, and the time shift as it was cut at.
 void refine_with_cuts(const StartProblem& problem,
                       double& time_shift_s,
                       PreintegrationChain& chain,

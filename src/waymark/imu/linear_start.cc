@@ -75,7 +75,8 @@ void add_interval(const LinearProblem& problem,
   rows.middleCols<3>(kBias) = -world_from_imu * measured.by_biases().block<3, 3>(3, 3);
   rows.middleCols<3>(velocity_at) = -one;
   rows.middleCols<3>(velocity_at + 3) = one;
-  equations.add(rows, world_from_imu * measured.delta().velocity,
+  equations.add(rows,
+                world_from_imu * measured.delta().velocity,
                 covariance.diagonal().segment<3>(3).mean() + tilt * tilt);
 
   rows.setZero();
@@ -84,9 +85,10 @@ void add_interval(const LinearProblem& problem,
   rows.middleCols<3>(kLeverArm) = second.rotation_matrix().transpose() - world_from_rig;
   rows.middleCols<3>(kBias) = -world_from_imu * measured.by_biases().block<3, 3>(6, 3);
   rows.middleCols<3>(velocity_at) = -t * one;
-  equations.add(rows, world_from_imu * measured.delta().position,
-                covariance.diagonal().tail<3>().mean() + 0.25 * t * t * tilt * tilt +
-                    2.0 * place * place);
+  equations.add(
+      rows,
+      world_from_imu * measured.delta().position,
+      covariance.diagonal().tail<3>().mean() + 0.25 * t * t * tilt * tilt + 2.0 * place * place);
 }
 
 /// down: the direction of gravity as far as it is known, or 0.

@@ -14,8 +14,8 @@ namespace {
 /// The turn in rad, by a changed gyroscope bias, from which on its second order counts: half the
 /// square of it tilts gravity by 0.1 mm/s^2, a tenth of what the noise does in a second.
 constexpr double kFarTurn = 0.005;
-/// The velocity in m/s, by a changed accelerometer bias, that is far. The delta is linear in it, but
-/// for the product with kFarTurn.
+/// The velocity in m/s, by a changed accelerometer bias, that is far. The delta is linear in it,
+/// but for the product with kFarTurn.
 constexpr double kFarVelocity = 0.1;
 
 double seconds(std::int64_t nanoseconds) { return 1e-9 * static_cast<double>(nanoseconds); }
@@ -93,9 +93,9 @@ void Preintegration::advance(const ImuSample& begin, const ImuSample& end) {
   advance_covariance(step);
 }
 
-/// Noise of continuous time has the variance density^2 / dt in a step (Forster et al. 2017, eq. 62),
-/// and moves the position within the step by dt^3 / 12 more than the mean of it. The walk of the
-/// biases enters all that follows.
+/// Noise of continuous time has the variance density^2 / dt in a step (Forster et al. 2017, eq.
+/// 62), and moves the position within the step by dt^3 / 12 more than the mean of it. The walk of
+/// the biases enters all that follows.
 void Preintegration::advance_covariance(const Step& step) {
   const Eigen::Matrix<double, 6, 6> walked = covariance_.bottomRightCorner<6, 6>();
   const Eigen::Matrix<double, 9, 6> across = covariance_.topRightCorner<9, 6>();

@@ -12,7 +12,8 @@ namespace waymark {
 
 /// Linear map, or covariance, of (rotation, velocity, position).
 using Matrix9d = Eigen::Matrix<double, 9, 9>;
-/// Linear map, or covariance, of (rotation, velocity, position, gyroscope bias, accelerometer bias).
+/// Linear map, or covariance, of (rotation, velocity, position, gyroscope bias, accelerometer
+/// bias).
 using Matrix15d = Eigen::Matrix<double, 15, 15>;
 
 /// How the IMU moved from a first to a second moment, seen from the IMU at the first one that falls

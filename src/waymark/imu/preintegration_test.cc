@@ -33,10 +33,10 @@ InertialDelta true_delta(const ImuMotion& motion, double begin, double end) {
   const Rigid3 a = motion.world_from_imu(begin), b = motion.world_from_imu(end);
   const Eigen::Quaterniond back = a.rotation.conjugate();
   const double t = end - begin;
-  return {back * b.rotation,
-          back * (motion.velocity(end) - motion.velocity(begin) - t * kGravity),
-          back * (b.translation - a.translation - t * motion.velocity(begin) -
-                  0.5 * t * t * kGravity)};
+  return {
+      back * b.rotation,
+      back * (motion.velocity(end) - motion.velocity(begin) - t * kGravity),
+      back * (b.translation - a.translation - t * motion.velocity(begin) - 0.5 * t * t * kGravity)};
 }
 
 using Vector9d = Eigen::Matrix<double, 9, 1>;
@@ -95,8 +95,9 @@ TEST(Preintegration, ChangedBiasesAreExactToFirstOrderAndExactlyIntegratedWhenFa
   std::vector<double> errors;
   for (const double size : {0.004, 0.008}) {
     const ImuBiases near{size * direction, size * direction};
-    errors.push_back(difference(integrated.delta_with(near),
-                                Preintegration(samples, kNoise, near).delta()).norm());
+    errors.push_back(
+        difference(integrated.delta_with(near), Preintegration(samples, kNoise, near).delta())
+            .norm());
     EXPECT_FALSE(integrated.reintegrate_if_far(near));
   }
   EXPECT_NEAR(errors[1] / errors[0], 4.0, 0.2);
@@ -145,8 +146,7 @@ TEST(Preintegration, RootOfInformationIsThatOfTheCovariance) {
   Rng rng(5, 0);
   const ImuMotion motion = testing::hand_held_motion(rng);
   for (const int count : {1, 2, 50}) {  // Even a single step has a covariance of full rank.
-    const Preintegration integrated(
-        true_samples(motion, 0.0, 0.005 * count, count), kNoise, {});
+    const Preintegration integrated(true_samples(motion, 0.0, 0.005 * count, count), kNoise, {});
     const Matrix15d& root = integrated.square_root_information();
     const Matrix15d whitened = root * integrated.covariance_with_walk() * root.transpose();
     EXPECT_LT((whitened - Matrix15d::Identity()).norm(), 1e-6);
@@ -154,7 +154,8 @@ TEST(Preintegration, RootOfInformationIsThatOfTheCovariance) {
               Matrix9d(integrated.covariance_with_walk().topLeftCorner<9, 9>()));
     const double seconds = integrated.duration_s();
     EXPECT_NEAR(integrated.covariance_with_walk()(9, 9), 1e-6 * seconds, 1e-15);
-    EXPECT_NEAR(integrated.covariance()(0, 0), 1e-6 * seconds, 4e-7 * seconds * seconds * seconds + 1e-15);
+    EXPECT_NEAR(
+        integrated.covariance()(0, 0), 1e-6 * seconds, 4e-7 * seconds * seconds * seconds + 1e-15);
   }
 }
 

@@ -85,8 +85,7 @@ TurnRates turn_rates(const RotationProblem& problem, const OrientationTrack& tra
     if (problem.samples.coverage(begin, end) != ImuCoverage::kWhole) continue;
     const double dt = 1e-9 * static_cast<double>(end - begin);
     const auto imu = track.at(problem.samples, begin).conjugate() * track.at(problem.samples, end);
-    const auto rig =
-        first.rig_from_world.rotation * second.rig_from_world.rotation.conjugate();
+    const auto rig = first.rig_from_world.rotation * second.rig_from_world.rotation.conjugate();
     rates.of_imu.push_back(so3_log(imu) / dt);
     rates.of_rig.push_back(so3_log(rig) / dt);
     const double gyroscope = problem.noise.gyroscope;
@@ -122,8 +121,8 @@ Eigen::Matrix3d align_rates(const TurnRates& rates, std::span<const double> weig
 
 /// known_bias is in the rates already; the fit's is what is left of it.
 RotationFit fit_rotation_start(const RotationProblem& problem,
-                          const TurnRates& rates,
-                          const Eigen::Vector3d& known_bias) {
+                               const TurnRates& rates,
+                               const Eigen::Vector3d& known_bias) {
   RotationFit fit;
   if (rates.of_rig.empty()) return fit;
   const auto& told = problem.calibration.imu_from_rig;
@@ -140,8 +139,7 @@ RotationFit fit_rotation_start(const RotationProblem& problem,
     fit.bias /= sum;
     fit.cost = 0.0;
     for (std::size_t i = 0; i < weights.size(); ++i) {
-      const Eigen::Vector3d error =
-          rates.of_imu[i] - fit.imu_from_rig * rates.of_rig[i] - fit.bias;
+      const Eigen::Vector3d error = rates.of_imu[i] - fit.imu_from_rig * rates.of_rig[i] - fit.bias;
       const RobustValue robust = huber(rates.information[i] * error.squaredNorm(), kHuberTurn);
       fit.cost += robust.loss;
       weights[i] = robust.weight * rates.information[i];

@@ -85,8 +85,7 @@ InertialRefinement refine_weak_scale(std::span<const VisionPose> poses,
     if (posterior.sigma > kFewSteps * step) break;
     posterior.sigma = std::max(posterior.sigma, 0.5 * step);
   }
-  InertialRefinement refined =
-      refine_at(poses, chain, posterior.mean, unknowns, belief, options);
+  InertialRefinement refined = refine_at(poses, chain, posterior.mean, unknowns, belief, options);
   const double held = refined.covariance(2, 2);
   const Eigen::Matrix<double, 25, 1> by_scale = refined.covariance.col(2) / held;
   refined.covariance +=

@@ -11,11 +11,12 @@
 namespace waymark {
 
 /// Refines where motion hardly tells the scale. The joint maximum is no estimate there: the smaller
-/// the scale, the less vision says in metres, and the better any noise fits (Neyman and Scott 1948).
-/// So the posterior of the scale is integrated on a grid, with all else integrated out as if normal
-/// at each scale (Tierney and Kadane 1986). Its mean and standard deviation are those of the result.
-/// The motion in metres is believed to be as likely at any scale, but for first place, velocity and
-/// mean acceleration, which are so in map units: that a camera stays where it is tells no scale.
+/// the scale, the less vision says in metres, and the better any noise fits (Neyman and Scott
+/// 1948). So the posterior of the scale is integrated on a grid, with all else integrated out as if
+/// normal at each scale (Tierney and Kadane 1986). Its mean and standard deviation are those of the
+/// result. The motion in metres is believed to be as likely at any scale, but for first place,
+/// velocity and mean acceleration, which are so in map units: that a camera stays where it is tells
+/// no scale.
 InertialRefinement refine_weak_scale(std::span<const VisionPose> poses,
                                      const PreintegrationChain& chain,
                                      InertialUnknowns unknowns,

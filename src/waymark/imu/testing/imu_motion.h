@@ -15,7 +15,9 @@
 
 namespace waymark::testing {
 
-inline Eigen::Vector3d normal_vector(Rng& rng) { return {rng.normal(), rng.normal(), rng.normal()}; }
+inline Eigen::Vector3d normal_vector(Rng& rng) {
+  return {rng.normal(), rng.normal(), rng.normal()};
+}
 
 inline std::int64_t nanoseconds(double seconds) { return std::llround(1e9 * seconds); }
 
