@@ -77,7 +77,7 @@ std::vector<RestStretch> rest_stretches(const ImuSamples& samples) {
   return stretches;
 }
 
-/// Allan variances (IEEE Std 952-1997, eq. C.4) of means of so many samples, for both sensors.
+/// Allan variances (IEEE Std 952-1997, annex C) of means of so many samples, for both sensors.
 Eigen::Vector2d allan_variances(std::span<const RestStretch> stretches, Eigen::Index count) {
   Eigen::Vector2d sum = Eigen::Vector2d::Zero();
   double number = 0.0;

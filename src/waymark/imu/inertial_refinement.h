@@ -29,9 +29,9 @@ struct InertialRefinement {
   double log_determinant = 0.0;  ///< Of the information of all unknowns.
 };
 
-/// Refines to the maximum of the posterior (Campos, Montiel and Tardos 2020, eq. 8), with the poses
-/// as unknowns that vision measured with noise: since neighbouring intervals share them, standard
-/// deviations are honest only so. Biases walk from pose to pose.
+/// Refines to the maximum of the posterior (Campos, Montiel and Tardos 2020, section III), with the
+/// poses as unknowns that vision measured with noise: since neighbouring intervals share them,
+/// standard deviations are honest only so. Biases walk from pose to pose.
 InertialRefinement refine_inertial_start(std::span<const VisionPose> poses,
                                          const PreintegrationChain& chain,
                                          InertialUnknowns unknowns,

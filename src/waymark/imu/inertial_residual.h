@@ -49,7 +49,7 @@ Rigid3 world_from_imu(const InertialState& state, const InertialSetup& setup);
 
 /// What a preintegration contradicts two states by, whitened: in standard deviations. In the order
 /// (rotation, velocity, position, walk of the gyroscope bias, walk of the accelerometer bias)
-/// (Forster et al. 2017, eq. 45 and 48). With its derivatives by the tangent vectors.
+/// (Forster et al. 2017, section VI, eq. 45). With its derivatives by the tangent vectors.
 struct InertialResidual {
   Vector15d value;
   Matrix15d by_first;

@@ -24,7 +24,7 @@ struct InertialUnknowns {
 
 /// Scale, gravity, velocities, lever arm and accelerometer bias, where the rotation imu_from_rig
 /// and the gyroscope bias (of the preintegrations) are known: all linear in how the IMU moved
-/// between poses (Martinelli 2014, eq. 8; Mur-Artal and Tardos 2017, eq. 12 and 18), by least
+/// between poses (Martinelli 2014; Mur-Artal and Tardos 2017, section IV), by least
 /// squares with priors. The size of gravity is a condition linearized at the direction found before
 /// it. A scale that is not told is near the one of the options. imu_from_rig: its origin is what
 /// the lever arm is believed to be, with this standard deviation.

@@ -60,7 +60,7 @@ struct TurnRates {
   std::vector<double> information;  ///< Of the difference, s^2/rad^2.
 };
 
-struct RotationFit {
+struct TurnFit {
   Eigen::Matrix3d imu_from_rig;
   Eigen::Vector3d bias;
   double cost = std::numeric_limits<double>::infinity();
@@ -120,10 +120,10 @@ Eigen::Matrix3d align_rates(const TurnRates& rates, std::span<const double> weig
 }
 
 /// known_bias is in the rates already; the fit's is what is left of it.
-RotationFit fit_rotation_start(const RotationProblem& problem,
-                               const TurnRates& rates,
-                               const Eigen::Vector3d& known_bias) {
-  RotationFit fit;
+TurnFit fit_turns(const RotationProblem& problem,
+                  const TurnRates& rates,
+                  const Eigen::Vector3d& known_bias) {
+  TurnFit fit;
   if (rates.of_rig.empty()) return fit;
   const auto& told = problem.calibration.imu_from_rig;
   const double prior = std::pow(problem.options.gyroscope_bias_sigma, -2.0);
@@ -157,7 +157,7 @@ double best_time_shift(const RotationProblem& problem,
   const double sigma = problem.options.time_shift_sigma_s;
   const auto cost = [&](int i) {
     const double shift = i * kShiftStep;
-    return fit_rotation_start(problem, turn_rates(problem, track, shift), bias).cost +
+    return fit_turns(problem, turn_rates(problem, track, shift), bias).cost +
            shift * shift / (sigma * sigma);
   };
   const int most = static_cast<int>(std::ceil(kMaxShiftSigmas * sigma / kShiftStep));
@@ -188,8 +188,8 @@ std::optional<RotationStart> rotation_start(const ImuSamples& samples,
     start.time_shift_s = calibration.time_shift_s
                              ? *calibration.time_shift_s
                              : best_time_shift(problem, track, start.gyroscope_bias);
-    const RotationFit fit = fit_rotation_start(
-        problem, turn_rates(problem, track, start.time_shift_s), start.gyroscope_bias);
+    const TurnFit fit =
+        fit_turns(problem, turn_rates(problem, track, start.time_shift_s), start.gyroscope_bias);
     if (!std::isfinite(fit.cost)) return std::nullopt;
     start.imu_from_rig = Eigen::Quaterniond(fit.imu_from_rig).normalized();
     start.gyroscope_bias += fit.bias;
