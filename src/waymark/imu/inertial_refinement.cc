@@ -4,6 +4,7 @@
 
 #include <Eigen/Cholesky>
 #include <cmath>
+#include <limits>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -141,14 +142,18 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
   return equations;
 }
 
-/// Covariance and determinant of the last equations.
+/// Covariance and determinant of the last equations; none where rounding has left them singular.
 void judge(const Eigen::MatrixXd& hessian, InertialRefinement& refined) {
   const Eigen::Index size = hessian.rows();
   Eigen::MatrixXd units = Eigen::MatrixXd::Zero(size, 25);
   units.topLeftCorner<10, 10>().setIdentity();
   units.bottomRightCorner<15, 15>().setIdentity();
   const Eigen::LLT<Eigen::MatrixXd> factor(hessian);
-  WAYMARK_CHECK(factor.info() == Eigen::Success);
+  if (factor.info() != Eigen::Success) {
+    refined.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
+    refined.log_determinant = std::numeric_limits<double>::infinity();
+    return;
+  }
   // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
   by_step.block<3, 1>(16, 2) = refined.unknowns.states.back().velocity;

@@ -24,7 +24,7 @@ struct InertialBelief {
 /// The most likely unknowns, how sure they are and how well they fit.
 struct InertialRefinement {
   InertialUnknowns unknowns;
-  Matrix25d covariance;  ///< Of (setup, last state).
+  Matrix25d covariance;  ///< Of (setup, last state); not finite where the equations are singular.
   double squared_error = 0.0;
   double log_determinant = 0.0;  ///< Of the information of all unknowns.
 };

@@ -135,6 +135,7 @@ std::optional<InertialStart> start_inertial(const ImuSamples& samples,
   if (std::sqrt(refined.covariance(2, 2)) > kWeakScale) {
     refined = refine_weak_scale(poses, chain, std::move(refined.unknowns), belief, options);
   }
+  if (!refined.covariance.allFinite()) return std::nullopt;
   start.time_shift_s += std::exchange(refined.unknowns.setup.time_shift_change_s, 0.0);
   start.setup = refined.unknowns.setup;
   start.states = std::move(refined.unknowns.states);

@@ -6,6 +6,7 @@
 
 #include <cmath>
 #include <cstdio>
+#include <limits>
 #include <tuple>
 #include <vector>
 
@@ -276,6 +277,18 @@ TEST(InertialStart, OutliersAmongTurnsDoNotSpoilTheMounting) {
       rotation_start(scene.samples, scene.poses, scene.calibration, kStartNoise, scene.options);
   ASSERT_TRUE(robust);
   EXPECT_LT(robust->imu_from_rig.angularDistance(scene.setup.imu_from_rig.rotation), 0.03);
+}
+
+TEST(InertialStart, HoldsForTwoPosesAndForPosesThatAreNotFinite) {
+  Rng rng(12, 0);
+  StartScene scene(testing::hand_held_motion, {false, false}, rng);
+  StartScene few = scene;
+  few.poses.resize(2);
+  const auto found = few.start();
+  ASSERT_TRUE(found);
+  EXPECT_GT(found->sigma(2), 0.1);
+  scene.poses[3].rig_from_world.translation.x() = std::numeric_limits<double>::quiet_NaN();
+  EXPECT_FALSE(scene.start());
 }
 
 TEST(InertialStart, WithoutSamplesThereIsNone) {

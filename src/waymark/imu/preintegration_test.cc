@@ -159,6 +159,17 @@ TEST(Preintegration, RootOfInformationIsThatOfTheCovariance) {
   }
 }
 
+TEST(Preintegration, HoldsForANanosecondAndForAMinute) {
+  Rng rng(6, 0);
+  const ImuMotion motion = testing::hand_held_motion(rng);
+  for (const double seconds : {1e-9, 1e-6, 60.0}) {
+    const int count = seconds < 1.0 ? 1 : 60000;
+    const Preintegration integrated(true_samples(motion, 0.0, seconds, count), kNoise, {});
+    EXPECT_TRUE(integrated.square_root_information().allFinite()) << seconds;
+    EXPECT_NEAR(integrated.delta().rotation.norm(), 1.0, 1e-12);
+  }
+}
+
 TEST(Preintegration, BrokenPromisesFail) {
   const auto samples = true_samples({}, 0.0, 0.1, 20);
   EXPECT_THROW(Preintegration({samples[0]}, kNoise, {}), CheckError);
