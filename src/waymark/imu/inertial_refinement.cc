@@ -138,7 +138,9 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
     equations.gradient.head<10>() += residual.by_setup.transpose() * residual.value;
     equations.cost += residual.value.squaredNorm();
   }
-  equations.hessian.topRows<10>() = equations.hessian.leftCols<10>().transpose();
+  const Eigen::Index num_of_states = equations.hessian.rows() - 10;
+  equations.hessian.topRightCorner(10, num_of_states) =
+      equations.hessian.bottomLeftCorner(num_of_states, 10).transpose();
   return equations;
 }
 

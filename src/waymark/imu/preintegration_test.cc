@@ -18,12 +18,12 @@ namespace {
 using testing::ImuMotion;
 
 constexpr ImuNoise kNoise{1e-3, 1e-2, 1e-3, 1e-2};
-const Eigen::Vector3d kGravity(0.3, 0.2, -9.8);
+const Eigen::Vector3d kMotionGravity(0.3, 0.2, -9.8);
 
 std::vector<ImuSample> true_samples(const ImuMotion& motion, double begin, double end, int count) {
   std::vector<ImuSample> samples;
   for (int i = 0; i <= count; ++i) {
-    samples.push_back(motion.true_sample(begin + (end - begin) * i / count, kGravity));
+    samples.push_back(motion.true_sample(begin + (end - begin) * i / count, kMotionGravity));
   }
   return samples;
 }
@@ -33,10 +33,10 @@ InertialDelta true_delta(const ImuMotion& motion, double begin, double end) {
   const Rigid3 a = motion.world_from_imu(begin), b = motion.world_from_imu(end);
   const Eigen::Quaterniond back = a.rotation.conjugate();
   const double t = end - begin;
-  return {
-      back * b.rotation,
-      back * (motion.velocity(end) - motion.velocity(begin) - t * kGravity),
-      back * (b.translation - a.translation - t * motion.velocity(begin) - 0.5 * t * t * kGravity)};
+  return {back * b.rotation,
+          back * (motion.velocity(end) - motion.velocity(begin) - t * kMotionGravity),
+          back * (b.translation - a.translation - t * motion.velocity(begin) -
+                  0.5 * t * t * kMotionGravity)};
 }
 
 using Vector9d = Eigen::Matrix<double, 9, 1>;
