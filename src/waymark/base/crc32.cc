@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/base/crc32.h"
 
+#include <libdeflate.h>
+
 #include <array>
 #include <cstddef>
 
@@ -29,10 +31,11 @@ constexpr CrcTables make_tables(std::uint32_t reversed_polynomial) {
   return tables;
 }
 
-constexpr CrcTables kCrc32cTables = make_tables(0x82F63B78);
-constexpr CrcTables kCrc32Tables = make_tables(0xEDB88320);
+constexpr CrcTables kTables = make_tables(0x82F63B78);
 
-std::uint32_t checksum_of(std::string_view bytes, std::uint32_t before, const CrcTables& tables) {
+}  // namespace
+
+std::uint32_t crc32c(std::string_view bytes, std::uint32_t before) {
   const auto* at = reinterpret_cast<const unsigned char*>(bytes.data());
   std::size_t left = bytes.size();
   std::uint32_t remainder = ~before;
@@ -41,24 +44,18 @@ std::uint32_t checksum_of(std::string_view bytes, std::uint32_t before, const Cr
         remainder ^
         (static_cast<std::uint32_t>(at[0]) | static_cast<std::uint32_t>(at[1]) << 8 |
          static_cast<std::uint32_t>(at[2]) << 16 | static_cast<std::uint32_t>(at[3]) << 24);
-    remainder = tables[7][low & 0xFF] ^ tables[6][(low >> 8) & 0xFF] ^
-                tables[5][(low >> 16) & 0xFF] ^ tables[4][low >> 24] ^ tables[3][at[4]] ^
-                tables[2][at[5]] ^ tables[1][at[6]] ^ tables[0][at[7]];
+    remainder = kTables[7][low & 0xFF] ^ kTables[6][(low >> 8) & 0xFF] ^
+                kTables[5][(low >> 16) & 0xFF] ^ kTables[4][low >> 24] ^ kTables[3][at[4]] ^
+                kTables[2][at[5]] ^ kTables[1][at[6]] ^ kTables[0][at[7]];
   }
   for (; left > 0; --left, ++at) {
-    remainder = (remainder >> 8) ^ tables[0][(remainder ^ *at) & 0xFF];
+    remainder = (remainder >> 8) ^ kTables[0][(remainder ^ *at) & 0xFF];
   }
   return ~remainder;
 }
 
-}  // namespace
-
-std::uint32_t crc32c(std::string_view bytes, std::uint32_t before) {
-  return checksum_of(bytes, before, kCrc32cTables);
-}
-
 std::uint32_t crc32(std::string_view bytes, std::uint32_t before) {
-  return checksum_of(bytes, before, kCrc32Tables);
+  return libdeflate_crc32(before, bytes.data(), bytes.size());
 }
 
 }  // namespace waymark

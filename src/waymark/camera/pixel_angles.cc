@@ -3,6 +3,8 @@
 #include "waymark/camera/pixel_angles.h"
 
 #include <algorithm>
+#include <array>
+#include <span>
 
 #include "waymark/camera/tangent.h"
 
@@ -50,7 +52,11 @@ PixelAngles::PixelAngles(const Camera& camera)
 }
 
 double central_pixel_angle(const Camera& camera) {
-  return PixelAngles(camera).at({0.5 * camera.width_px(), 0.5 * camera.height_px()});
+  const Eigen::Vector2d centre(0.5 * camera.width_px(), 0.5 * camera.height_px());
+  constexpr std::array<float, 1> kLevelScale = {1.0f};
+  TangentComputer tangent;
+  const TangentArrays& arrays = tangent.compute(camera, std::span(&centre, 1), kLevelScale);
+  return arrays.is_valid[0] ? arrays.size_rad[0] : PixelAngles(camera).at(centre);
 }
 
 double part_without_bearing(const Camera& camera) {

@@ -202,10 +202,11 @@ void StereoSearch::sample_curve(std::uint32_t feature, int level1, ImageView ima
     for (int step = 0; step < num_steps + is_last; ++step) {
       const double share = static_cast<double>(step) / num_steps;
       const Eigen::Vector2d corner = from + share * way - Eigen::Vector2d::Constant(kReach);
-      const PatchCorner rounded{static_cast<int>(std::lround(corner.x())),
-                                static_cast<int>(std::lround(corner.y()))};
-      if (rounded.x < 0 || rounded.y < 0 || rounded.x + kSearchSize > image1.width_px ||
-          rounded.y + kSearchSize > image1.height_px) {
+      if (!(corner.minCoeff() > -0.5)) continue;
+      // Not negative, so that truncation is floor.
+      const PatchCorner rounded{static_cast<int>(corner.x() + 0.5),
+                                static_cast<int>(corner.y() + 0.5)};
+      if (rounded.x + kSearchSize > image1.width_px || rounded.y + kSearchSize > image1.height_px) {
         continue;
       }
       corners_.push_back(rounded);

@@ -56,25 +56,47 @@ bool sample(ImageView image, const PatchFrame& frame, Samples<kSize>& samples) {
   return true;
 }
 
-float mean(const std::array<float, kAlignArea>& values) {
-  float sum = 0.0f;
+/// Takes the mean from the values; the sum of their squares then.
+float centre(std::array<float, kAlignArea>& values) {
+  float sum = 0.0f, square = 0.0f;
   for (const float value : values) sum += value;
-  return sum / kAlignArea;
+  for (float& value : values) {
+    value -= sum / kAlignArea;
+    square += value * value;
+  }
+  return square;
 }
 
-float dot(const std::array<float, kAlignArea>& a, const std::array<float, kAlignArea>& b) {
-  float sum = 0.0f;
-  for (std::size_t i = 0; i < a.size(); ++i) sum += a[i] * b[i];
-  return sum;
+/// Makes the derivatives blind to gain and bias; values have mean 0. A sum waits for itself: four
+/// at a time take as long as one.
+void project_out(float value_square, AlignPatch& patch) {
+  float along = 0.0f, across = 0.0f, value_along = 0.0f, value_across = 0.0f;
+  for (std::size_t i = 0; i < patch.value.size(); ++i) {
+    along += patch.along[i];
+    across += patch.across[i];
+    value_along += patch.value[i] * patch.along[i];
+    value_across += patch.value[i] * patch.across[i];
+  }
+  const float along_bias = along / kAlignArea, along_gain = value_along / value_square;
+  const float across_bias = across / kAlignArea, across_gain = value_across / value_square;
+  for (std::size_t i = 0; i < patch.value.size(); ++i) {
+    patch.along[i] -= along_bias + along_gain * patch.value[i];
+    patch.across[i] -= across_bias + across_gain * patch.value[i];
+  }
 }
 
-/// Makes the derivative blind to gain and bias; value has mean 0.
-void project_out(const std::array<float, kAlignArea>& value,
-                 float value_square,
-                 std::array<float, kAlignArea>& derivative) {
-  const float bias = mean(derivative);
-  const float gain = dot(value, derivative) / value_square;
-  for (std::size_t i = 0; i < derivative.size(); ++i) derivative[i] -= bias + gain * value[i];
+/// Sums of the squared derivatives and of their products.
+void sum_squares(AlignTemplate& result) {
+  const AlignPatch& patch = result.patch;
+  float along = 0.0f, across = 0.0f, both = 0.0f;
+  for (std::size_t i = 0; i < patch.value.size(); ++i) {
+    along += patch.along[i] * patch.along[i];
+    across += patch.across[i] * patch.across[i];
+    both += patch.along[i] * patch.across[i];
+  }
+  result.along_square = along;
+  result.across_square = across;
+  result.along_across = both;
 }
 
 }  // namespace
@@ -110,16 +132,11 @@ std::optional<AlignTemplate> cut_align_template(ImageView image,
       patch.across[i] = dx * gradient_y - dy * gradient_x;
     }
   }
-  const float bias = mean(patch.value);
-  for (float& value : patch.value) value -= bias;
-  result->value_square = dot(patch.value, patch.value);
+  result->value_square = centre(patch.value);
   if (result->value_square < kAlignArea * kMinContrast * kMinContrast) return std::nullopt;
-  project_out(patch.value, result->value_square, patch.along);
-  project_out(patch.value, result->value_square, patch.across);
+  project_out(result->value_square, patch);
+  sum_squares(*result);
   result->direction = direction;
-  result->along_square = dot(patch.along, patch.along);
-  result->across_square = dot(patch.across, patch.across);
-  result->along_across = dot(patch.along, patch.across);
   if (result->along_square < kAlignArea) return std::nullopt;
   return result;
 }

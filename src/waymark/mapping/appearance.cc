@@ -17,14 +17,16 @@ namespace {
 constexpr std::size_t kMaxDescriptors = 10;
 
 Descriptor middle_descriptor(const std::vector<const Descriptor*>& descriptors) {
+  std::array<std::array<int, kMaxDescriptors>, kMaxDescriptors> distances{};
+  for (std::size_t i = 0; i < descriptors.size(); ++i) {
+    for (std::size_t k = 0; k < i; ++k) {
+      distances[i][k] = distances[k][i] = hamming_distance(*descriptors[i], *descriptors[k]);
+    }
+  }
   std::size_t best = 0;
   int best_median = INT32_MAX;
   for (std::size_t i = 0; i < descriptors.size(); ++i) {
-    std::array<int, kMaxDescriptors> distances{};
-    for (std::size_t k = 0; k < descriptors.size(); ++k) {
-      distances[k] = hamming_distance(*descriptors[i], *descriptors[k]);
-    }
-    const int middle = median(std::span(distances).first(descriptors.size()));
+    const int middle = median(std::span(distances[i]).first(descriptors.size()));
     if (middle < best_median) {
       best_median = middle;
       best = i;

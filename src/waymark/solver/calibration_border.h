@@ -149,7 +149,8 @@ class CalibrationBorder {
     for (CameraColumns& camera : cameras_) {
       if (camera.first == first && camera.columns.num_parameters() == count) return camera;
     }
-    return cameras_.emplace_back(first, CalibrationColumns(count));
+    cameras_.push_back({first, CalibrationColumns(count)});
+    return cameras_.back();
   }
   void flush(CameraColumns& camera);
 
