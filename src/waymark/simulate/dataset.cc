@@ -154,8 +154,9 @@ class Writer {
     }
     const std::string noise = format_imu_noise(*told_imu_.noise, rate_hz);
     write_file_atomically(folder_ / "imu.yaml", noise);
-    if (layout_ == Layout::kTumVi)
-      write_file_atomically(folder_ / "dso" / "imu_config.yaml", noise);
+    if (layout_ != Layout::kTumVi) return;
+    make_output_folder(folder_ / "dso");
+    write_file_atomically(folder_ / "dso" / "imu_config.yaml", noise);
   }
 
  private:

@@ -25,7 +25,7 @@ namespace fs = std::filesystem;
 
 const Rigid3 kSideBySide(so3_exp({0.0, 0.05, 0.0}), {-0.11, 0.003, 0.001});
 
-SequenceSpec small_spec(CameraChain chain) {
+SequenceSpec inertial_spec(CameraChain chain) {
   SequenceSpec spec;
   spec.seed = 3;
   spec.num_frames = 3;
@@ -34,7 +34,7 @@ SequenceSpec small_spec(CameraChain chain) {
   return spec;
 }
 
-std::string text_of(const fs::path& path) {
+std::string file_text(const fs::path& path) {
   std::ifstream file(path);
   EXPECT_TRUE(file.good()) << path;
   std::ostringstream text;
@@ -42,8 +42,8 @@ std::string text_of(const fs::path& path) {
   return text.str();
 }
 
-std::vector<std::vector<double>> rows_of(const fs::path& path) {
-  std::istringstream text(text_of(path));
+std::vector<std::vector<double>> number_rows(const fs::path& path) {
+  std::istringstream text(file_text(path));
   std::vector<std::vector<double>> rows;
   for (std::string line; std::getline(text, line);) {
     if (line[0] == '#') continue;
@@ -55,13 +55,13 @@ std::vector<std::vector<double>> rows_of(const fs::path& path) {
   return rows;
 }
 
-Rigid3 transform_of(const YAML::Node& rows) {
+Rigid3 kalibr_transform(const YAML::Node& rows) {
   Eigen::Matrix4d matrix;
   for (int i = 0; i < 16; ++i) matrix(i / 4, i % 4) = rows[i / 4][i % 4].as<double>();
   return rigid_from_matrix(matrix, "test", "transform");
 }
 
-double distance(const Rigid3& a, const Rigid3& b) { return (a * b.inverse()).log().norm(); }
+double motion_between(const Rigid3& a, const Rigid3& b) { return (a * b.inverse()).log().norm(); }
 
 /// imu.yaml and the mounting in camchain.yaml are those of the spec.
 void expect_kalibr(const fs::path& folder, const SequenceSpec& spec) {
@@ -73,8 +73,8 @@ void expect_kalibr(const fs::path& folder, const SequenceSpec& spec) {
   for (std::size_t i = 0; i < spec.chain.cameras.size(); ++i) {
     const YAML::Node camera = chain["cam" + std::to_string(i)];
     const Rigid3 imu_from_rig =
-        transform_of(camera["T_cam_imu"]).inverse() * spec.chain.cameras[i].cam_from_rig;
-    EXPECT_LT(distance(imu_from_rig, *spec.imu->calibration().imu_from_rig), 1e-9);
+        kalibr_transform(camera["T_cam_imu"]).inverse() * spec.chain.cameras[i].cam_from_rig;
+    EXPECT_LT(motion_between(imu_from_rig, *spec.imu->calibration().imu_from_rig), 1e-9);
     EXPECT_EQ(camera["timeshift_cam_imu"].as<double>(), 0.015);
   }
   const ConfigSource source = ConfigSource::from_file(folder / "camchain.yaml");
@@ -82,7 +82,7 @@ void expect_kalibr(const fs::path& folder, const SequenceSpec& spec) {
 }
 
 void expect_samples(const fs::path& file, const SimulatedSequence& sequence) {
-  const auto rows = rows_of(file);
+  const auto rows = number_rows(file);
   const std::vector<RecordedImuSample> samples = sequence.imu_samples();
   ASSERT_EQ(rows.size(), samples.size());
   EXPECT_EQ(samples[0].sample.timestamp_ns, sequence.timestamp_ns(0) + 15'000'000);
@@ -101,7 +101,7 @@ void expect_samples(const fs::path& file, const SimulatedSequence& sequence) {
 TEST(ImuDataset, EurocHasItsFolder) {
   const testing::TemporaryFolder folder;
   const CameraDescription camera = named_camera("perspective", 48);
-  const SequenceSpec spec = small_spec(stereo_chain(camera, camera, kSideBySide));
+  const SequenceSpec spec = inertial_spec(stereo_chain(camera, camera, kSideBySide));
   SimulatedSequence sequence(spec);
   write_dataset(sequence, folder.path());
   expect_samples(folder / "mav0" / "imu0" / "data.csv", sequence);
@@ -114,7 +114,7 @@ TEST(ImuDataset, EurocHasItsFolder) {
   Eigen::Matrix4d body_from_imu;
   for (int i = 0; i < 16; ++i) body_from_imu(i / 4, i % 4) = sensor["T_BS"]["data"][i].as<double>();
   const Rigid3 rig_from_imu = rigid_from_matrix(body_from_imu, "test", "T_BS");
-  EXPECT_LT(distance(rig_from_imu, spec.imu->calibration().imu_from_rig->inverse()), 1e-9);
+  EXPECT_LT(motion_between(rig_from_imu, spec.imu->calibration().imu_from_rig->inverse()), 1e-9);
   EXPECT_FALSE(fs::exists(folder / "calibration_true.yaml"));
 }
 
@@ -123,7 +123,7 @@ TEST(ImuDataset, OthersHaveFilesBesideTheChain) {
   for (const CameraChain& chain :
        {rgbd_chain(named_camera("perspective", 48), 5000.0), mono_chain(fisheye)}) {
     const testing::TemporaryFolder folder;
-    const SequenceSpec spec = small_spec(chain);
+    const SequenceSpec spec = inertial_spec(chain);
     SimulatedSequence sequence(spec);
     write_dataset(sequence, folder.path());
     expect_samples(folder / "imu0.csv", sequence);
@@ -131,29 +131,30 @@ TEST(ImuDataset, OthersHaveFilesBesideTheChain) {
     EXPECT_FALSE(fs::exists(folder / "mav0"));
   }
   const testing::TemporaryFolder folder;
-  const SequenceSpec spec = small_spec(stereo_chain(fisheye, fisheye, kSideBySide));
+  const SequenceSpec spec = inertial_spec(stereo_chain(fisheye, fisheye, kSideBySide));
   SimulatedSequence sequence(spec);
   write_dataset(sequence, folder.path());
   expect_samples(folder / "mav0" / "imu0" / "data.csv", sequence);
   expect_kalibr(folder.path(), spec);
-  EXPECT_EQ(text_of(folder / "dso" / "imu_config.yaml"), text_of(folder / "imu.yaml"));
-  EXPECT_EQ(text_of(folder / "dso" / "camchain.yaml"), text_of(folder / "camchain.yaml"));
+  EXPECT_EQ(file_text(folder / "dso" / "imu_config.yaml"), file_text(folder / "imu.yaml"));
+  EXPECT_EQ(file_text(folder / "dso" / "camchain.yaml"), file_text(folder / "camchain.yaml"));
 }
 
 TEST(ImuDataset, TheTruthIsThatOfTheImu) {
   const testing::TemporaryFolder folder;
-  const SequenceSpec spec = small_spec(mono_chain(named_camera("perspective", 48)));
+  SequenceSpec spec = inertial_spec(mono_chain(named_camera("perspective", 24)));
+  spec.num_frames = 100;
   SimulatedSequence sequence(spec);
   write_dataset(sequence, folder.path());
-  const auto rows = rows_of(folder / "imu0_truth.csv");
+  const auto rows = number_rows(folder / "imu0_truth.csv");
   ASSERT_EQ(rows.size(), sequence.imu_samples().size());
   const std::vector<double>& row = rows[10];  // Frame 1.
   ASSERT_EQ(row.size(), 17u);
   const Rigid3 world_from_imu(Eigen::Quaterniond(row[4], row[5], row[6], row[7]),
                               {row[1], row[2], row[3]});
-  EXPECT_LT(
-      distance(world_from_imu * *spec.imu->calibration().imu_from_rig, sequence.world_from_rig(1)),
-      1e-9);
+  EXPECT_LT(motion_between(world_from_imu * *spec.imu->calibration().imu_from_rig,
+                           sequence.world_from_rig(1)),
+            1e-9);
   const Eigen::Vector3d moved = Eigen::Map<const Eigen::Vector3d>(rows[11].data() + 1) -
                                 Eigen::Map<const Eigen::Vector3d>(rows[9].data() + 1);
   EXPECT_LT((Eigen::Map<const Eigen::Vector3d>(row.data() + 8) - moved / 0.01).norm(), 0.01);
@@ -163,14 +164,14 @@ TEST(ImuDataset, TheTruthIsThatOfTheImu) {
 
 TEST(ImuDataset, TellsAWrongCalibrationByTheAmountsAsked) {
   const testing::TemporaryFolder folder;
-  SequenceSpec spec = small_spec(mono_chain(named_camera("perspective", 48)));
+  SequenceSpec spec = inertial_spec(mono_chain(named_camera("perspective", 48)));
   spec.told = parse_calibration_error({"imu_turn=5", "imu_lever=3", "imu_shift=-4", "imu_noise=2"});
   SimulatedSequence sequence(spec);
   write_dataset(sequence, folder.path());
   const YAML::Node told = YAML::LoadFile((folder / "camchain.yaml").string())["cam0"];
   const YAML::Node truth = YAML::LoadFile((folder / "calibration_true.yaml").string())["cam0"];
-  const Rigid3 told_mounting = transform_of(told["T_cam_imu"]);
-  const Rigid3 true_mounting = transform_of(truth["T_cam_imu"]);
+  const Rigid3 told_mounting = kalibr_transform(told["T_cam_imu"]);
+  const Rigid3 true_mounting = kalibr_transform(truth["T_cam_imu"]);
   EXPECT_NEAR(told_mounting.rotation.angularDistance(true_mounting.rotation),
               5.0 * std::numbers::pi / 180.0,
               1e-9);
@@ -183,7 +184,7 @@ TEST(ImuDataset, TellsAWrongCalibrationByTheAmountsAsked) {
 
 TEST(ImuDataset, TellsNothingOrOfNothing) {
   const testing::TemporaryFolder folder;
-  SequenceSpec spec = small_spec(mono_chain(named_camera("perspective", 48)));
+  SequenceSpec spec = inertial_spec(mono_chain(named_camera("perspective", 48)));
   spec.told = parse_calibration_error({"imu=none"});
   SimulatedSequence sequence(spec);
   write_dataset(sequence, folder.path());
@@ -191,8 +192,8 @@ TEST(ImuDataset, TellsNothingOrOfNothing) {
   for (const char* name : {"imu.yaml", "mav0/imu0/sensor.yaml"}) {
     EXPECT_FALSE(fs::exists(folder / name)) << name;
   }
-  EXPECT_EQ(text_of(folder / "camchain.yaml"), format_camchain(spec.chain));
-  EXPECT_NE(text_of(folder / "calibration_true.yaml").find("T_cam_imu"), std::string::npos);
+  EXPECT_EQ(file_text(folder / "camchain.yaml"), format_camchain(spec.chain));
+  EXPECT_NE(file_text(folder / "calibration_true.yaml").find("T_cam_imu"), std::string::npos);
   EXPECT_THROW(told_imu({}, parse_calibration_error({"imu_turn=5"})), InputError);
   EXPECT_THROW(told_imu({}, parse_calibration_error({"imu=none"})), InputError);
   EXPECT_FALSE(told_imu({}, {}).noise);

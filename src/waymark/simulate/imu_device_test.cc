@@ -17,7 +17,7 @@ namespace {
 
 using ::testing::HasSubstr;
 
-std::string error_of(const std::vector<std::string>& words) {
+std::string parse_failure(const std::vector<std::string>& words) {
   try {
     parse_imu(words);
   } catch (const InputError& error) {
@@ -77,18 +77,19 @@ TEST(ImuDevice, ReadsWhatKalibrReadsAndWrites) {
   EXPECT_EQ(parse_imu({file}).rate_hz, 250.0);
   EXPECT_DOUBLE_EQ(parse_imu({file}).turn_rad.x(), std::numbers::pi);
   std::ofstream(file) << "gyroscope_noise: 0.002\n";
-  EXPECT_THAT(error_of({file}), HasSubstr("imu.yaml:1"));
+  EXPECT_THAT(parse_failure({file}), HasSubstr("imu.yaml:1"));
 }
 
 TEST(ImuDevice, NamesWhatCannotBe) {
-  EXPECT_THAT(error_of({}), HasSubstr("expected a file or one of perfect, mems, phone, consumer"));
-  EXPECT_THAT(error_of({"shift=1"}), HasSubstr("begins with no name"));
-  EXPECT_THAT(error_of({"fone"}), HasSubstr("fone"));
-  EXPECT_THAT(error_of({"phone", "shft=1"}),
+  EXPECT_THAT(parse_failure({}),
+              HasSubstr("expected a file or one of perfect, mems, phone, consumer"));
+  EXPECT_THAT(parse_failure({"shift=1"}), HasSubstr("begins with no name"));
+  EXPECT_THAT(parse_failure({"fone"}), HasSubstr("fone"));
+  EXPECT_THAT(parse_failure({"phone", "shft=1"}),
               HasSubstr("expected KEY=VALUE with one of update_rate"));
-  EXPECT_THAT(error_of({"phone", "shift"}), HasSubstr("--imu: shift is"));
-  EXPECT_THAT(error_of({"phone", "update_rate=0"}), HasSubstr("expected a number from 1 to"));
-  EXPECT_THAT(error_of({"phone", "gyroscope_bias=nan"}), HasSubstr("expected a number"));
+  EXPECT_THAT(parse_failure({"phone", "shift"}), HasSubstr("--imu: shift is"));
+  EXPECT_THAT(parse_failure({"phone", "update_rate=0"}), HasSubstr("expected a number from 1 to"));
+  EXPECT_THAT(parse_failure({"phone", "gyroscope_bias=nan"}), HasSubstr("expected a number"));
 }
 
 }  // namespace

@@ -15,22 +15,22 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr std::int64_t kStartNs = 1'000'000'000;
-using Samples = std::vector<RecordedImuSample>;
+constexpr std::int64_t kRecordingStartNs = 1'000'000'000;
+using Recorded = std::vector<RecordedImuSample>;
 
-Samples record(const ImuDevice& imu, const Motion& motion, std::uint64_t seed = 1) {
-  return record_imu(imu, motion, kStartNs, seed);
+Recorded record_from_start(const ImuDevice& imu, const Motion& motion, std::uint64_t seed = 1) {
+  return record_imu(imu, motion, kRecordingStartNs, seed);
 }
 
 /// The pose and the velocity of an IMU.
-struct Flight {
+struct InertialState {
   Rigid3 world_from_imu;
   Vector3d velocity;
 };
 
 /// From samples alone and where it started. Turns by the fourth-order Magnus expansion over two
 /// samples, velocity and position by Simpson's rule over them (Iserles et al. 2000).
-void integrate(const Samples& samples, std::size_t first, double step_s, Flight& flight) {
+void integrate(const Recorded& samples, std::size_t first, double step_s, InertialState& flight) {
   const Vector3d& w0 = samples[first].sample.angular_velocity;
   const Vector3d& w1 = samples[first + 1].sample.angular_velocity;
   const Vector3d& w2 = samples[first + 2].sample.angular_velocity;
@@ -58,9 +58,9 @@ TEST(ImuRecording, PerfectSamplesIntegrateToTheRenderedPath) {
     SCOPED_TRACE(name);
     const double duration_s = name == "rounds" ? 60.0 : name == "thirty_rounds" ? 600.0 : 20.0;
     const Motion motion = make_motion("apartment", name, duration_s);
-    const Samples samples = record(imu, motion);
+    const Recorded samples = record_from_start(imu, motion);
     const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
-    Flight flight{samples[0].world_from_imu, samples[0].velocity};
+    InertialState flight{samples[0].world_from_imu, samples[0].velocity};
     double worst_m = 0.0;
     double worst_rad = 0.0;
     for (std::size_t i = 0; i + 2 < samples.size() && i < 20000; i += 2) {
@@ -74,10 +74,8 @@ TEST(ImuRecording, PerfectSamplesIntegrateToTheRenderedPath) {
       EXPECT_LT((told.world_from_imu * imu_from_rig * truth.inverse()).log().norm(), 1e-9);
       EXPECT_LT((told.velocity - flight.velocity).norm(), 2e-3);
     }
-    EXPECT_LT(worst_m, 2e-3);
-    EXPECT_LT(worst_rad, 1e-4 * std::numbers::pi / 180.0 * 100.0);
-    RecordProperty(name + "_um", static_cast<int>(1e6 * worst_m));
-    std::printf("%s: %.3g mm, %.3g deg\n", name.c_str(), 1e3 * worst_m, worst_rad * 57.29578);
+    EXPECT_LT(worst_m, 1e-3);
+    EXPECT_LT(worst_rad, 0.01 * std::numbers::pi / 180.0);
   }
 }
 
@@ -85,7 +83,7 @@ TEST(ImuRecording, AtRestItFeelsGravityUpwards) {
   ImuDevice imu;
   imu.turn_rad = {0.1, 0.7, -0.3};
   imu.lever_m = {0.2, 0.0, 0.0};
-  for (const RecordedImuSample& now : record(imu, make_motion("room", "still", 1.0))) {
+  for (const RecordedImuSample& now : record_from_start(imu, make_motion("room", "still", 1.0))) {
     EXPECT_NEAR(now.sample.acceleration.norm(), kStandardGravity, 1e-9);
     const Vector3d upwards = now.world_from_imu.rotation * now.sample.acceleration;
     EXPECT_LT((upwards - kStandardGravity * Vector3d::UnitZ()).norm(), 1e-9);
@@ -94,7 +92,7 @@ TEST(ImuRecording, AtRestItFeelsGravityUpwards) {
 }
 
 /// Allan deviation of an axis at rest, for an averaging time of so many samples (IEEE Std 952).
-double allan_deviation(const Samples& samples,
+double allan_deviation(const Recorded& samples,
                        std::size_t count,
                        const std::function<double(const RecordedImuSample&)>& axis) {
   std::vector<double> means;
@@ -116,7 +114,7 @@ TEST(ImuRecording, NoiseHasTheDensitiesItSays) {
     ImuDevice white;
     white.rate_hz = rate_hz;
     white.noise = {1.7e-4, 2.0e-3, 0.0, 0.0};
-    const Samples samples = record(white, still);
+    const Recorded samples = record_from_start(white, still);
     const auto per_s = static_cast<std::size_t>(rate_hz);
     // The deviation at 1 s is the density, and falls by the root of the time.
     EXPECT_NEAR(allan_deviation(samples, per_s, turn), 1.7e-4, 0.05 * 1.7e-4);
@@ -125,7 +123,7 @@ TEST(ImuRecording, NoiseHasTheDensitiesItSays) {
     ImuDevice walking;
     walking.rate_hz = rate_hz;
     walking.noise = {0.0, 0.0, 2.0e-5, 3.0e-3};
-    const Samples walks = record(walking, still);
+    const Recorded walks = record_from_start(walking, still);
     // That of a walk at 3 s is its density.
     EXPECT_NEAR(allan_deviation(walks, 3 * per_s, turn), 2.0e-5, 0.1 * 2.0e-5);
     EXPECT_NEAR(allan_deviation(walks, 3 * per_s, push), 3.0e-3, 0.1 * 3.0e-3);
@@ -139,8 +137,8 @@ TEST(ImuRecording, TheTruthKnowsTheBiases) {
   imu.noise.gyroscope_walk = 1e-3;
   imu.noise.accelerometer_walk = 1e-2;
   const Motion motion = make_motion("room", "inspect", 10.0);
-  const Samples samples = record(imu, motion);
-  const Samples exact = record(ImuDevice{}, motion);
+  const Recorded samples = record_from_start(imu, motion);
+  const Recorded exact = record_from_start(ImuDevice{}, motion);
   for (std::size_t i = 0; i < samples.size(); ++i) {
     const RecordedImuSample& now = samples[i];
     const Vector3d turn_bias =
@@ -157,10 +155,10 @@ TEST(ImuRecording, ShiftIsWhatIsAddedToTheTimeOfAnImage) {
   ImuDevice imu;
   imu.time_shift_s = 0.02;
   const Motion motion = make_motion("room", "inspect", 10.0);
-  const Samples late = record(imu, motion);
-  const Samples usual = record(ImuDevice{}, motion);
+  const Recorded late = record_from_start(imu, motion);
+  const Recorded usual = record_from_start(ImuDevice{}, motion);
   ASSERT_EQ(late.size(), 2001u);
-  EXPECT_EQ(usual[0].sample.timestamp_ns, kStartNs);
+  EXPECT_EQ(usual[0].sample.timestamp_ns, kRecordingStartNs);
   for (std::size_t i = 0; i < late.size(); ++i) {
     EXPECT_EQ(late[i].sample.timestamp_ns, usual[i].sample.timestamp_ns + 20'000'000);
     EXPECT_EQ(late[i].sample.acceleration, usual[i].sample.acceleration);
@@ -173,7 +171,7 @@ TEST(ImuRecording, ClipsAtItsRangeAndScalesItsAxes) {
   imu.gyroscope_range = 2.0;
   double largest = 0.0;
   int num_clipped = 0;
-  for (const RecordedImuSample& now : record(imu, motion)) {
+  for (const RecordedImuSample& now : record_from_start(imu, motion)) {
     largest = std::max(largest, now.sample.angular_velocity.cwiseAbs().maxCoeff());
     num_clipped += now.sample.angular_velocity.cwiseAbs().maxCoeff() == 2.0 ? 1 : 0;
   }
@@ -181,8 +179,8 @@ TEST(ImuRecording, ClipsAtItsRangeAndScalesItsAxes) {
   EXPECT_GT(num_clipped, 50);
   ImuDevice scaled;
   scaled.accelerometer_scale = 0.01;
-  const Samples samples = record(scaled, motion);
-  const Samples exact = record(ImuDevice{}, motion);
+  const Recorded samples = record_from_start(scaled, motion);
+  const Recorded exact = record_from_start(ImuDevice{}, motion);
   const Vector3d scale = samples[7].sample.acceleration.cwiseQuotient(exact[7].sample.acceleration);
   EXPECT_GT((scale - Vector3d::Ones()).norm(), 1e-3);
   EXPECT_LT((scale - Vector3d::Ones()).norm(), 0.05);
@@ -196,9 +194,9 @@ TEST(ImuRecording, ClipsAtItsRangeAndScalesItsAxes) {
 TEST(ImuRecording, IsTheSameForTheSameSeed) {
   const Motion motion = make_motion("room", "loop", 5.0);
   ImuDevice imu = parse_imu({"consumer", "vibration=2"});
-  const Samples first = record(imu, motion, 7);
-  const Samples again = record(imu, motion, 7);
-  const Samples other = record(imu, motion, 8);
+  const Recorded first = record_from_start(imu, motion, 7);
+  const Recorded again = record_from_start(imu, motion, 7);
+  const Recorded other = record_from_start(imu, motion, 8);
   ASSERT_EQ(first.size(), again.size());
   for (std::size_t i = 0; i < first.size(); ++i) {
     EXPECT_EQ(first[i].sample.acceleration, again[i].sample.acceleration);

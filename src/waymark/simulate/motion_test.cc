@@ -65,7 +65,8 @@ double usual_duration_s(const std::string& world, const std::string& motion) {
   const bool is_long = world == "corridor" || world == "shop";
   const double once_s = is_long ? 120.0 : world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
   if (motion == "standing_start") return 5.5 + once_s;
-  if (motion == "drive") return 1.5 * once_s;  // It stops.
+  if (motion == "drive") return 2.5 * once_s;  // It stops, and turns with its way.
+  if (motion == "flight") return 2.0 * once_s;
   return motion == "rounds" ? 3.0 * once_s : motion == "thirty_rounds" ? 30.0 * once_s : once_s;
 }
 
@@ -95,7 +96,7 @@ TEST(Motion, IsSmooth) {
 TEST(Motion, DerivativesAreThoseOfThePose) {
   for (const std::string& name : motion_names()) {
     SCOPED_TRACE(name);
-    const Motion motion = make_motion("room", name, 20.0);
+    const Motion motion = make_motion("room", name, usual_duration_s("room", name));
     constexpr double kStep = 1e-4;
     for (double t = 0.511; t < 19.5; t += 0.37) {
       const MotionState before = motion.state(t - kStep);

@@ -13,12 +13,12 @@ namespace {
 
 using Eigen::Vector3d;
 
-constexpr double kRateHz = 1000.0;
+constexpr double kShakesPerSecond = 1000.0;
 
 std::vector<RotorVibration::Shake> shakes(double acceleration, std::uint64_t seed) {
   RotorVibration vibration(acceleration, seed);
   std::vector<RotorVibration::Shake> result;
-  for (int i = 0; i < 20000; ++i) result.push_back(vibration.next(i / kRateHz));
+  for (int i = 0; i < 20000; ++i) result.push_back(vibration.next(i / kShakesPerSecond));
   return result;
 }
 
@@ -48,7 +48,8 @@ TEST(RotorVibration, HasItsPowerWhereRotorsTurn) {
       double real = 0.0;
       double imaginary = 0.0;
       for (std::size_t i = 0; i < all.size(); i += 1) {
-        const double angle = 2.0 * std::numbers::pi * hz * static_cast<double>(i) / kRateHz;
+        const double angle =
+            2.0 * std::numbers::pi * hz * static_cast<double>(i) / kShakesPerSecond;
         real += all[i].acceleration.x() * std::cos(angle);
         imaginary += all[i].acceleration.x() * std::sin(angle);
       }
