@@ -30,6 +30,16 @@ std::string format_mounting(const ChainCamera& camera, const ImuCalibration& tol
   return text;
 }
 
+std::string format_densities(const ImuNoise& noise) {
+  return fmt::format(
+      "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
+      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
+      noise.gyroscope,
+      noise.gyroscope_walk,
+      noise.accelerometer,
+      noise.accelerometer_walk);
+}
+
 }  // namespace
 
 std::string format_imu_samples(std::span<const RecordedImuSample> samples) {
@@ -75,26 +85,11 @@ std::string format_imu_sensor(const ImuCalibration& told, double rate_hz) {
                         fmt::join(body_from_imu.reshaped<Eigen::RowMajor>(), ", "));
   }
   text += fmt::format("rate_hz: {}\n", rate_hz);
-  if (!told.noise) return text;
-  return text + fmt::format(
-                    "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
-                    "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-                    told.noise->gyroscope,
-                    told.noise->gyroscope_walk,
-                    told.noise->accelerometer,
-                    told.noise->accelerometer_walk);
+  return told.noise ? text + format_densities(*told.noise) : text;
 }
 
 std::string format_imu_noise(const ImuNoise& noise, double rate_hz) {
-  return fmt::format(
-      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n"
-      "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
-      "rostopic: /imu0\nupdate_rate: {}\n",
-      noise.accelerometer,
-      noise.accelerometer_walk,
-      noise.gyroscope,
-      noise.gyroscope_walk,
-      rate_hz);
+  return format_densities(noise) + fmt::format("rostopic: /imu0\nupdate_rate: {}\n", rate_hz);
 }
 
 std::string format_camchain_imu(const CameraChain& chain, const ImuCalibration& told) {

@@ -12,17 +12,20 @@
 
 namespace waymark {
 
-/// A simulated inertial measurement unit: how it measures, and how it is mounted. As it is here it
-/// measures exactly.
+/// How the three axes of a sensor measure, in rad/s or m/s^2: exactly, unless something is set.
+struct ImuAxes {
+  double noise_density = 0.0;  ///< Of white noise, per sqrt(Hz).
+  double random_walk = 0.0;    ///< Of the bias, per second and sqrt(Hz).
+  double bias = 0.0;           ///< At the start: standard deviation along each axis.
+  double scale = 0.0;          ///< Standard deviation of the relative error of each axis.
+  double range = std::numeric_limits<double>::infinity();  ///< Beyond it values are clipped.
+};
+
+/// A simulated inertial measurement unit: how it measures, and how it is mounted.
 struct ImuDevice {
-  double rate_hz = 200.0;            ///< Samples per second.
-  ImuNoise noise;                    ///< White, and walks of the biases.
-  double gyroscope_bias = 0.0;       ///< At the start: standard deviation along each axis, rad/s.
-  double accelerometer_bias = 0.0;   ///< At the start, m/s^2.
-  double gyroscope_scale = 0.0;      ///< Standard deviation of the relative error of each axis.
-  double accelerometer_scale = 0.0;  ///< The same.
-  double gyroscope_range = std::numeric_limits<double>::infinity();      ///< rad/s; then it clips.
-  double accelerometer_range = std::numeric_limits<double>::infinity();  ///< m/s^2.
+  double rate_hz = 200.0;  ///< Samples per second.
+  ImuAxes gyroscope;       ///< rad/s.
+  ImuAxes accelerometer;   ///< m/s^2.
   /// Standard deviation of what rotors add to the acceleration along each axis, m/s^2; see
   /// RotorVibration.
   double vibration = 0.0;

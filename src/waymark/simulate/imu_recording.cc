@@ -21,11 +21,7 @@ constexpr std::uint64_t kAccelerometerStream = std::uint64_t{1} << 41;
 /// scale * truth + bias + white noise, clipped, and the bias walks.
 class InertialTriad {
  public:
-  struct Errors {
-    double density, walk, bias, scale, range;
-  };
-
-  InertialTriad(const Errors& errors, double rate_hz, std::uint64_t seed, std::uint64_t stream)
+  InertialTriad(const ImuAxes& errors, double rate_hz, std::uint64_t seed, std::uint64_t stream)
       : errors_(errors), rate_hz_(rate_hz), rng_(seed, stream) {
     bias_ = draw(errors.bias);
     scale_ = Vector3d::Ones() + draw(errors.scale);
@@ -35,12 +31,12 @@ class InertialTriad {
 
   Vector3d measure(const Vector3d& truth) {
     // Sampling white noise of a density averages it over 1 / rate (Crassidis 2006).
-    const Vector3d noise = draw(errors_.density * std::sqrt(rate_hz_));
+    const Vector3d noise = draw(errors_.noise_density * std::sqrt(rate_hz_));
     const Vector3d value = scale_.cwiseProduct(truth) + bias_ + noise;
     return value.cwiseMax(-errors_.range).cwiseMin(errors_.range);
   }
 
-  void step() { bias_ += draw(errors_.walk / std::sqrt(rate_hz_)); }
+  void step() { bias_ += draw(errors_.random_walk / std::sqrt(rate_hz_)); }
 
  private:
   Vector3d draw(double sigma) {
@@ -49,42 +45,14 @@ class InertialTriad {
     return sigma * Vector3d(x, y, rng_.normal());
   }
 
-  Errors errors_;
+  ImuAxes errors_;
   double rate_hz_;
   Rng rng_;
   Vector3d bias_;
   Vector3d scale_;
 };
 
-InertialTriad gyroscope_of(const ImuDevice& imu, std::uint64_t seed) {
-  return {{imu.noise.gyroscope,
-           imu.noise.gyroscope_walk,
-           imu.gyroscope_bias,
-           imu.gyroscope_scale,
-           imu.gyroscope_range},
-          imu.rate_hz,
-          seed,
-          kGyroscopeStream};
-}
-
-InertialTriad accelerometer_of(const ImuDevice& imu, std::uint64_t seed) {
-  return {{imu.noise.accelerometer,
-           imu.noise.accelerometer_walk,
-           imu.accelerometer_bias,
-           imu.accelerometer_scale,
-           imu.accelerometer_range},
-          imu.rate_hz,
-          seed,
-          kAccelerometerStream};
-}
-
-/// Of a point that is fixed to the rig, from the rig's origin in axes of the world.
-Vector3d velocity_at(const MotionState& state, const Vector3d& lever) {
-  return state.velocity + state.angular_velocity.cross(lever);
-}
-
-}  // namespace
-
+/// What a perfect IMU measures; without time stamp.
 ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig) {
   const Vector3d lever = state.world_from_rig.rotation * imu_from_rig.origin_in_source();
   const Vector3d& turn = state.angular_velocity;
@@ -99,6 +67,8 @@ ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig)
   return sample;
 }
 
+}  // namespace
+
 std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
                                           const Motion& motion,
                                           std::int64_t start_ns,
@@ -106,18 +76,19 @@ std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
   WAYMARK_CHECK(imu.rate_hz > 0.0);
   const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
   const Rigid3 rig_from_imu = imu_from_rig.inverse();
-  InertialTriad gyroscope = gyroscope_of(imu, seed);
-  InertialTriad accelerometer = accelerometer_of(imu, seed);
+  InertialTriad gyroscope(imu.gyroscope, imu.rate_hz, seed, kGyroscopeStream);
+  InertialTriad accelerometer(imu.accelerometer, imu.rate_hz, seed, kAccelerometerStream);
   RotorVibration vibration(imu.vibration, seed);
   std::vector<RecordedImuSample> recorded;
-  const auto last = static_cast<std::int64_t>(std::floor(imu.rate_hz * motion.duration_s() + 1e-6));
-  for (std::int64_t i = 0; i <= last; ++i) {
+  const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kImuLeadS));
+  for (std::int64_t i = -std::llround(imu.rate_hz * kImuLeadS); i <= last; ++i) {
     const double seconds = static_cast<double>(i) / imu.rate_hz;
     const MotionState state = motion.state(seconds);
     const RotorVibration::Shake shake = vibration.next(seconds);
     RecordedImuSample now;
     now.world_from_imu = state.world_from_rig * rig_from_imu;
-    now.velocity = velocity_at(state, state.world_from_rig.rotation * rig_from_imu.translation);
+    const Vector3d lever = state.world_from_rig.rotation * rig_from_imu.translation;
+    now.velocity = state.velocity + state.angular_velocity.cross(lever);
     now.gyroscope_bias = gyroscope.bias();
     now.accelerometer_bias = accelerometer.bias();
     now.sample = exact_imu_sample(state, imu_from_rig);

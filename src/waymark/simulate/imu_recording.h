@@ -22,11 +22,12 @@ struct RecordedImuSample {
   Eigen::Vector3d accelerometer_bias;  ///< m/s^2.
 };
 
-/// What a perfect IMU measures where the rig moves so; without time stamp.
-ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig);
+/// Recordings begin so long before the motion and end so long after it, as real ones do before the
+/// first image and after the last.
+inline constexpr double kImuLeadS = 0.5;
 
-/// The samples of a whole motion, from its first moment on, which is start_ns by the clock of the
-/// cameras. The same seed gives the same errors whatever the motion.
+/// The samples of a whole motion, whose first moment is start_ns by the clock of the cameras. The
+/// same seed gives the same errors whatever the motion.
 std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
                                           const Motion& motion,
                                           std::int64_t start_ns,

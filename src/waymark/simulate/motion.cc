@@ -111,9 +111,14 @@ MotionKey Motion::key(double seconds, int order) const {
 Rigid3 Motion::world_from_rig(double seconds) const { return pose_of(key(seconds)); }
 
 MotionState Motion::state(double seconds) const {
-  const MotionKey at = key(seconds);
+  MotionKey at = key(seconds);
   const MotionKey first = key(seconds, 1);
-  const MotionKey second = key(seconds, 2);
+  MotionKey second = key(seconds, 2);
+  const double beyond = seconds - std::clamp(seconds, 0.0, duration_s_);
+  if (beyond != 0.0) {
+    add_scaled(first, beyond, at);
+    second = {};
+  }
   const double yaw = at.yaw_deg * kRadPerKeyDeg;
   const Vector3d up = Vector3d::UnitZ();
   const Vector3d right(std::sin(yaw), -std::cos(yaw), 0.0);

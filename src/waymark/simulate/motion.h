@@ -37,7 +37,7 @@ struct CameraShake {
 
 /// How the rig moves at a moment. Vectors are in the world.
 struct MotionState {
-  Rigid3 world_from_rig;                 ///< As Motion::world_from_rig().
+  Rigid3 world_from_rig;
   Eigen::Vector3d velocity;              ///< Of the rig's origin, m/s.
   Eigen::Vector3d acceleration;          ///< Of the rig's origin, m/s^2; without gravity.
   Eigen::Vector3d angular_velocity;      ///< rad/s.
@@ -58,7 +58,8 @@ class Motion {
   Rigid3 world_from_rig(double seconds) const;
   /// The same as position and angles; or their derivative by time, order 1 or 2, in 1/s^order.
   MotionKey key(double seconds, int order = 0) const;
-  /// The pose and its exact derivatives, which are continuous.
+  /// The pose and its exact derivatives, which are continuous. Beyond [0, duration] it goes on at
+  /// the rates of the nearer end, as what is measured before the first image and after the last.
   MotionState state(double seconds) const;
 
  private:

@@ -21,8 +21,6 @@ double smooth_step(double x) {
   return t * t * (3.0 - 2.0 * t);
 }
 
-double steady(double) { return 1.0; }
-
 /// Relative to full speed, at a phase of [0, 1]; it brakes and starts in a tenth of the time each.
 double speed_with_stops(double phase) {
   double speed = 1.0;
@@ -97,7 +95,7 @@ std::vector<MotionKey> drive_along(const Motion& way, double duration_s) {
 std::vector<MotionKey> fly_along(const Motion& way, double duration_s) {
   constexpr double kRiseM = 0.15;
   constexpr int kNumRises = 5;
-  const std::vector<double> shares = progress(duration_s, steady);
+  const std::vector<double> shares = progress(duration_s, [](double) { return 1.0; });
   std::vector<MotionKey> keys = keys_at(way, shares);
   for (std::size_t i = 0; i < keys.size(); ++i) {
     keys[i].position.z() += kRiseM * std::sin(2.0 * std::numbers::pi * kNumRises * shares[i]);

@@ -129,8 +129,7 @@ class SimulatedSequence {
   std::int64_t timestamp_ns(int index) const;
   /// True pose of a frame, without rendering it.
   Rigid3 world_from_rig(int index) const;
-  /// What the IMU of the spec measures from frame 0 on until a frame's time after the last one;
-  /// none without an IMU.
+  /// What the IMU of the spec measures, see record_imu(); nothing without one.
   std::vector<RecordedImuSample> imu_samples() const;
   /// Renders a frame; index in [0, num_frames()).
   SimulatedFrame frame(int index);
