@@ -103,6 +103,19 @@ CameraChain read_camera_chain(const std::filesystem::path& file, Setup setup) {
   return *chain;
 }
 
+/// Frames that are black but for the sensor's noise.
+void blacken(const std::vector<int>& firsts_and_counts, SequenceSpec& spec) {
+  if (firsts_and_counts.size() % 2 != 0) {
+    throw InputError("--black", "ends with a first frame, expected FIRST,COUNT,...");
+  }
+  ImageEffects black = spec.effects;
+  black.gain = 0.0;
+  for (std::size_t i = 0; i < firsts_and_counts.size(); i += 2) {
+    const int first = firsts_and_counts[i];
+    spec.spans.insert(spec.spans.begin(), {first, first + firsts_and_counts[i + 1], black});
+  }
+}
+
 struct SimulateOptions {
   std::string name;  ///< Of a world, or of a sequence of the suite.
   std::filesystem::path out;
@@ -119,6 +132,8 @@ struct SimulateOptions {
   std::vector<double> warped_px;  ///< Along and across the epipolar lines; empty: none.
   std::vector<double> gain1;      ///< Of camera 1, in the first frame and the last; empty: 1.
   std::vector<std::string> told;  ///< KEY=VALUE each.
+  std::vector<std::string> imu;   ///< Name or file, then KEY=VALUE each; empty: none.
+  std::vector<int> black;         ///< First frame and number of frames, by turns.
   bool is_list = false;
   bool is_quiet = false;
 };
@@ -159,9 +174,12 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   if (!options.warped_px.empty()) spec.warped_px = Eigen::Vector2d(options.warped_px.data());
   if (!options.gain1.empty()) spec.gain1 = Eigen::Vector2d(options.gain1.data());
   turn_camera1(options.turn_deg, spec.chain);
+  if (!options.imu.empty()) spec.imu = parse_imu(options.imu);
+  blacken(options.black, spec);
   spec.told = parse_calibration_error(options.told);
-  make_rig(
-      told_chain(spec.chain, spec.told));  // What cannot be told fails before anything is written.
+  // What cannot be told fails before anything is written.
+  make_rig(told_chain(spec.chain, spec.told));
+  told_imu(spec.imu ? spec.imu->calibration() : ImuCalibration{}, spec.told);
   return spec;
 }
 
@@ -169,6 +187,7 @@ int list_choices() {
   for (const std::string& world : world_names()) print_result("world {}\n", world);
   for (const std::string& motion : motion_names()) print_result("motion {}\n", motion);
   for (const std::string& camera : camera_names()) print_result("camera {}\n", camera);
+  for (const std::string& imu : imu_names()) print_result("imu {}\n", imu);
   for (const SuiteEntry& entry : simulated_suite()) {
     print_result("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
   }
@@ -278,12 +297,28 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
                   options.compressed_kbit_per_s,
                   "Kilobits per second that each camera's images are compressed to, as H.264 [not]")
       ->check(number_between(1.0, 1e6));
+  simulation
+      .add_option("--black",
+                  options.black,
+                  "FIRST,COUNT,...: frames that are black, as many from each first one on [none]")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 1000000));
   add_pair_options(simulation, options);
+}
+
+void add_imu_options(CLI::App& simulation, SimulateOptions& options) {
+  reads(simulation
+            .add_option("--imu",
+                        options.imu,
+                        "NAME|FILE[,KEY=VALUE,...]: samples of an inertial measurement unit, by "
+                        "name, see --list, or a file of Kalibr [none]")
+            ->delimiter(','));
   simulation
       .add_option("--told",
                   options.told,
                   "KEY=VALUE,...: write a calibration that is off; factors focal, distortion, "
-                  "baseline, depth; centre in px; turn_x, turn_y, turn_z of camera 1 in mrad [the "
+                  "baseline, depth, imu_noise; centre in px; turn_x, turn_y, turn_z of camera 1 in "
+                  "mrad; imu_turn in degrees, imu_lever in cm, imu_shift in ms; imu=none [the "
                   "true one]")
       ->delimiter(',');
 }
@@ -328,6 +363,7 @@ void add_simulate_command(CLI::App& program, Command& command) {
   add_population_options(simulation, spec);
   simulation.add_option("--seed", spec.seed, "Of textures and noise")->capture_default_str();
   add_flaw_options(simulation, *options);
+  add_imu_options(simulation, *options);
   simulation.add_flag("--list", options->is_list, "Print the worlds, motions and sequences");
   simulation.add_flag("--quiet", options->is_quiet, "Errors only");
   simulation.callback([options, &command] { command = [options] { return simulate(*options); }; });

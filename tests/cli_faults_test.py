@@ -159,6 +159,10 @@ class BadInput(CliTest):
         self.assert_fails(waymark("simulate", "moon", "-o", self.out), 2, "moon", "--list")
         self.assert_fails(waymark("simulate", "room"), 2, "--out")
         self.assert_fails(waymark("simulate", "room", "--told", "fokal=1", "-o", self.out), 2, "fokal=1", "focal")
+        self.assert_fails(waymark("simulate", "room", "--told", "imu_turn=5", "-o", self.out), 2, "no IMU", "--imu")
+        self.assert_fails(waymark("simulate", "room", "--imu", "fone", "-o", self.out), 2, "fone")
+        self.assert_fails(waymark("simulate", "room", "--imu", "phone,shft=1", "-o", self.out), 2, "--imu", "'shift'")
+        self.assert_fails(waymark("simulate", "room", "--black", "3", "-o", self.out), 2, "--black", "FIRST,COUNT")
         self.assert_fails(waymark("simulate", "room", "--setup", "mono", "--turn", "1,0,0", "-o", self.out), 2, "--turn")
         camera = self.config("cam0: {camera_model: pinhole}\n")
         self.assert_fails(waymark("simulate", "room", "--camera", camera, "--setup", "mono", "-o",

@@ -4,6 +4,8 @@
 
 #include <fmt/format.h>
 
+#include <numbers>
+
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 
@@ -21,6 +23,10 @@ double* number_of(CalibrationError& error, std::string_view key) {
   if (key == "turn_z") return &error.turn_mrad.z();
   if (key == "baseline") return &error.baseline;
   if (key == "depth") return &error.depth;
+  if (key == "imu_turn") return &error.imu_turn_deg;
+  if (key == "imu_lever") return &error.imu_lever_cm;
+  if (key == "imu_shift") return &error.imu_shift_ms;
+  if (key == "imu_noise") return &error.imu_noise;
   return nullptr;
 }
 
@@ -45,6 +51,10 @@ void mistell(CameraDescription& camera, const CalibrationError& error) {
 CalibrationError parse_calibration_error(const std::vector<std::string>& assignments) {
   CalibrationError error;
   for (const std::string& assignment : assignments) {
+    if (assignment == "imu=none") {
+      error.is_imu_told = false;
+      continue;
+    }
     const std::size_t equals = assignment.find('=');
     double* const number = number_of(error, std::string_view(assignment).substr(0, equals));
     const std::optional<double> value =
@@ -52,7 +62,8 @@ CalibrationError parse_calibration_error(const std::vector<std::string>& assignm
     if (number == nullptr || !value) {
       throw InputError(kWhere,
                        fmt::format("is {}, expected focal, centre, distortion, turn_x, turn_y, "
-                                   "turn_z, baseline or depth, '=' and a number",
+                                   "turn_z, baseline, depth, imu_turn, imu_lever, imu_shift or "
+                                   "imu_noise, '=' and a number, or imu=none",
                                    quote_for_message(assignment)));
     }
     *number = *value;
@@ -75,6 +86,29 @@ CameraChain told_chain(CameraChain truth, const CalibrationError& error) {
     *truth.depth_factor *= error.depth;
   } else if (error.depth != 1.0) {
     throw InputError(kWhere, "no depth is measured, expected no depth");
+  }
+  return truth;
+}
+
+ImuCalibration told_imu(ImuCalibration truth, const CalibrationError& error) {
+  if (!truth.imu_from_rig || !truth.time_shift_s || !truth.noise) {
+    const bool is_right = error.is_imu_told && error.imu_turn_deg == 0.0 &&
+                          error.imu_lever_cm == 0.0 && error.imu_shift_ms == 0.0 &&
+                          error.imu_noise == 1.0;
+    if (!is_right) throw InputError(kWhere, "there is no IMU, expected nothing of one (--imu)");
+    return truth;
+  }
+  if (!error.is_imu_told) return {};
+  const Eigen::Vector3d diagonal = Eigen::Vector3d::Ones().normalized();
+  const double turn_rad = error.imu_turn_deg * std::numbers::pi / 180.0;
+  const Rigid3 told_from_true(so3_exp(turn_rad * diagonal), 1e-2 * error.imu_lever_cm * diagonal);
+  truth.imu_from_rig = told_from_true * *truth.imu_from_rig;
+  *truth.time_shift_s += 1e-3 * error.imu_shift_ms;
+  for (double* noise : {&truth.noise->gyroscope,
+                        &truth.noise->accelerometer,
+                        &truth.noise->gyroscope_walk,
+                        &truth.noise->accelerometer_walk}) {
+    *noise *= error.imu_noise;
   }
   return truth;
 }

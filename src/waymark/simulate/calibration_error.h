@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "waymark/camera/camchain.h"
+#include "waymark/imu/imu.h"
 
 namespace waymark {
 
@@ -21,15 +22,25 @@ struct CalibrationError {
   Eigen::Vector3d turn_mrad = Eigen::Vector3d::Zero();
   double baseline = 1.0;  ///< Factor of the distance of camera 1 from camera 0.
   double depth = 1.0;     ///< Factor of the units of the depth image per metre.
+  /// The IMU is told turned by this angle, and so far away, each along (1, 1, 1) of its own axes.
+  double imu_turn_deg = 0.0;
+  double imu_lever_cm = 0.0;
+  double imu_shift_ms = 0.0;  ///< Added to the time shift of the IMU.
+  double imu_noise = 1.0;     ///< Factor of its densities and walks.
+  bool is_imu_told = true;    ///< Otherwise there is nothing but samples.
 };
 
-/// Reads "KEY=VALUE" each: focal, centre, distortion, turn_x, turn_y, turn_z, baseline, depth.
-/// Throws InputError.
+/// Reads "KEY=VALUE" each: focal, centre, distortion, turn_x, turn_y, turn_z, baseline, depth,
+/// imu_turn, imu_lever, imu_shift, imu_noise; and "imu=none". Throws InputError.
 CalibrationError parse_calibration_error(const std::vector<std::string>& assignments);
 
 /// The calibration that is told in place of the true one. Intrinsics are taken to end with fu fv pu
 /// pv, as those of all models of the library do. Throws InputError for what the chain does not
 /// have.
 CameraChain told_chain(CameraChain truth, const CalibrationError& error);
+
+/// What is told of an IMU of which all is known; nothing of none. Throws InputError where something
+/// is to be told wrong of none.
+ImuCalibration told_imu(ImuCalibration truth, const CalibrationError& error);
 
 }  // namespace waymark

@@ -15,6 +15,7 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/image/opencv_image.h"
 #include "waymark/results/trajectory.h"
+#include "waymark/simulate/imu_dataset.h"
 #include "waymark/simulate/video_compression.h"
 
 namespace waymark {
@@ -79,6 +80,8 @@ class Writer {
   Writer(const SequenceSpec& spec, fs::path folder)
       : spec_(spec),
         told_(told_chain(spec.chain, spec.told)),
+        true_imu_(spec.imu ? spec.imu->calibration() : ImuCalibration{}),
+        told_imu_(told_imu(true_imu_, spec.told)),
         folder_(std::move(folder)),
         layout_(layout_of(spec.chain)) {
     for (const fs::path& sub : image_folders()) make_output_folder(folder_ / sub);
@@ -125,13 +128,35 @@ class Writer {
     }
     if (layout_ == Layout::kTumVi) {
       make_output_folder(folder_ / "dso");
-      write_file_atomically(folder_ / "dso" / "camchain.yaml", format_camchain(told_));
+      write_file_atomically(folder_ / "dso" / "camchain.yaml",
+                            format_camchain_imu(told_, told_imu_));
     }
-    const std::string told = format_camchain(told_);
-    const std::string truth = format_camchain(spec_.chain);
+    const std::string told = format_camchain_imu(told_, told_imu_);
+    const std::string truth = format_camchain_imu(spec_.chain, true_imu_);
     write_file_atomically(folder_ / "camchain.yaml", told);
     if (told != truth) write_file_atomically(folder_ / "calibration_true.yaml", truth);
     write_trajectory(folder_ / "groundtruth.txt", truth_, TrajectoryFormat::kTum);
+  }
+
+  void add_imu(const std::vector<RecordedImuSample>& samples) const {
+    const bool is_csv = layout_ == Layout::kEuroc || layout_ == Layout::kTumVi;
+    const fs::path sensor = is_csv ? folder_ / "mav0" / "imu0" : folder_;
+    make_output_folder(sensor);
+    write_file_atomically(sensor / (is_csv ? "data.csv" : "imu0.csv"), format_imu_samples(samples));
+    write_file_atomically(folder_ / "imu0_truth.csv", format_imu_truth(samples));
+    const double rate_hz = spec_.imu->rate_hz;
+    if (layout_ == Layout::kEuroc && told_imu_.imu_from_rig) {
+      write_file_atomically(sensor / "sensor.yaml", format_imu_sensor(told_imu_, rate_hz));
+    }
+    if (!told_imu_.noise) return;
+    if (spec_.told.imu_noise != 1.0) {
+      write_file_atomically(folder_ / "imu_true.yaml", format_imu_noise(*true_imu_.noise, rate_hz));
+    }
+    const std::string noise = format_imu_noise(*told_imu_.noise, rate_hz);
+    write_file_atomically(folder_ / "imu.yaml", noise);
+    if (layout_ != Layout::kTumVi) return;
+    make_output_folder(folder_ / "dso");
+    write_file_atomically(folder_ / "dso" / "imu_config.yaml", noise);
   }
 
  private:
@@ -156,6 +181,8 @@ class Writer {
 
   const SequenceSpec& spec_;
   CameraChain told_;
+  ImuCalibration true_imu_;
+  ImuCalibration told_imu_;
   fs::path folder_;
   Layout layout_;
   std::vector<VideoCompression> compressions_;  ///< Per camera, or none.
@@ -179,6 +206,7 @@ void write_dataset(SimulatedSequence& sequence,
   if (sequence.spec().num_markers > 0) {
     write_file_atomically(folder / "markers.yaml", format_known_markers(sequence.markers()));
   }
+  if (sequence.spec().imu) writer.add_imu(sequence.imu_samples());
   writer.finish();
 }
 

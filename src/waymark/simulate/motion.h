@@ -12,6 +12,9 @@
 
 namespace waymark {
 
+/// Standard acceleration of free fall, m/s^2 (ISO 80000-3), along -z of the world.
+inline constexpr double kStandardGravity = 9.80665;
+
 /// Where the rig is and looks: yaw 0 looks along +x, 90 along +y; pitch up and roll clockwise are
 /// positive. The world's z axis points up.
 struct MotionKey {
@@ -32,6 +35,15 @@ struct CameraShake {
   double lowest_hz = 0.4;  ///< Frequency of the slowest and largest sine; the quickest has 5 times.
 };
 
+/// How the rig moves at a moment. Vectors are in the world.
+struct MotionState {
+  Rigid3 world_from_rig;
+  Eigen::Vector3d velocity;              ///< Of the rig's origin, m/s.
+  Eigen::Vector3d acceleration;          ///< Of the rig's origin, m/s^2; without gravity.
+  Eigen::Vector3d angular_velocity;      ///< rad/s.
+  Eigen::Vector3d angular_acceleration;  ///< rad/s^2.
+};
+
 /// A camera motion with continuous acceleration: a uniform cubic B-spline (de Boor 1978) whose
 /// control points are the keys, plus sway. Where four keys in a row are equal it stands still; it
 /// never leaves the hull of four neighbours.
@@ -44,6 +56,11 @@ class Motion {
   double duration_s() const { return duration_s_; }
   /// Pose at a time of [0, duration]; times outside are moved to the nearer end.
   Rigid3 world_from_rig(double seconds) const;
+  /// The same as position and angles; or their derivative by time, order 1 or 2, in 1/s^order.
+  MotionKey key(double seconds, int order = 0) const;
+  /// The pose and its exact derivatives, which are continuous. Beyond [0, duration] it goes on at
+  /// the rates of the nearer end, as what is measured before the first image and after the last.
+  MotionState state(double seconds) const;
 
  private:
   struct Wave {
@@ -53,7 +70,7 @@ class Motion {
     double phase_rad;
   };
 
-  MotionKey spline(double seconds) const;
+  MotionKey spline(double seconds, int order) const;
 
   std::vector<MotionKey> keys_;
   double duration_s_;
@@ -65,7 +82,11 @@ class Motion {
 ///   rounds     three times around and a bit on, over the same ground
 ///   thirty_rounds  thirty times around, each time looking at the same
 ///   fast_turn  the path of one loop, with quick turns of the head
-///   turns_150, turns_250  looking around slowly, then with turns of so many degrees per second
+///   turns_150, turns_250, turns_400  looking around slowly, then with turns of so many degrees per
+///              second
+///   standing_start  at rest for 5 s, then a loop
+///   drive      a loop as of a car: it looks where it goes, at a constant speed, and stops twice
+///   flight     a loop as of a quadrotor, with banked turns
 ///   shaken     as inspect, by a hand that shakes at up to 5 Hz
 ///   inspect    hand-held, around the starting place
 ///   slide      to the side and back

@@ -64,6 +64,9 @@ double usual_duration_s(const std::string& world, const std::string& motion) {
   if (motion.starts_with("turns_")) return 20.0;
   const bool is_long = world == "corridor" || world == "shop";
   const double once_s = is_long ? 120.0 : world == "street" ? 16.0 : world == "twins" ? 35.0 : 20.0;
+  if (motion == "standing_start") return 5.5 + once_s;
+  if (motion == "drive") return 2.5 * once_s;  // It stops, and turns with its way.
+  if (motion == "flight") return 2.0 * once_s;
   return motion == "rounds" ? 3.0 * once_s : motion == "thirty_rounds" ? 30.0 * once_s : once_s;
 }
 
@@ -86,6 +89,30 @@ TEST(Motion, IsSmooth) {
       if (name.starts_with("turns_")) {
         EXPECT_GT(bounds.turn_deg_per_s, std::stod(name.substr(6)));
       }
+    }
+  }
+}
+
+TEST(Motion, DerivativesAreThoseOfThePose) {
+  for (const std::string& name : motion_names()) {
+    SCOPED_TRACE(name);
+    const Motion motion = make_motion("room", name, usual_duration_s("room", name));
+    constexpr double kStep = 1e-4;
+    for (double t = 0.511; t < 19.5; t += 0.37) {
+      const MotionState before = motion.state(t - kStep);
+      const MotionState now = motion.state(t);
+      const MotionState after = motion.state(t + kStep);
+      const auto slope = [&](auto member) {
+        return Vector3d((after.*member - before.*member) / (2.0 * kStep));
+      };
+      const Vector3d velocity =
+          (after.world_from_rig.translation - before.world_from_rig.translation) / (2.0 * kStep);
+      EXPECT_LT((now.velocity - velocity).norm(), 1e-5);
+      EXPECT_LT((now.acceleration - slope(&MotionState::velocity)).norm(), 2e-3);
+      const Vector3d turn =
+          so3_log(after.world_from_rig.rotation * before.world_from_rig.rotation.conjugate());
+      EXPECT_LT((now.angular_velocity - turn / (2.0 * kStep)).norm(), 1e-4);
+      EXPECT_LT((now.angular_acceleration - slope(&MotionState::angular_velocity)).norm(), 0.02);
     }
   }
 }

@@ -135,6 +135,11 @@ Rigid3 SimulatedSequence::world_from_rig(int index) const {
   return motion_.world_from_rig(seconds(index));
 }
 
+std::vector<RecordedImuSample> SimulatedSequence::imu_samples() const {
+  if (!spec_.imu) return {};
+  return record_imu(*spec_.imu, motion_, kFirstTimestampNs, spec_.seed);
+}
+
 ImageEffects SimulatedSequence::effects_of(std::size_t camera, int index) const {
   const auto span = std::ranges::find_if(spec_.spans, [&](const EffectSpan& each) {
     return index >= each.first_frame && index < each.end_frame;

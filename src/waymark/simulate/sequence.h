@@ -31,6 +31,8 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/marker/known_markers.h"
 #include "waymark/simulate/calibration_error.h"
+#include "waymark/simulate/imu_device.h"
+#include "waymark/simulate/imu_recording.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
 #include "waymark/simulate/stabilizer.h"
@@ -80,7 +82,8 @@ struct SequenceSpec {
   Eigen::Vector2d warped_px = Eigen::Vector2d::Zero();
   /// Bit rate of each camera's images in a data set, see VideoCompression. 0: as rendered.
   double compressed_kbit_per_s = 0.0;
-  CalibrationError told;  ///< Of the calibration that data sets come with.
+  std::optional<ImuDevice> imu;  ///< Which is fixed to the rig; none: no samples.
+  CalibrationError told;         ///< Of the calibration that data sets come with.
 };
 
 /// Chains of cameras for sequences.
@@ -126,6 +129,8 @@ class SimulatedSequence {
   std::int64_t timestamp_ns(int index) const;
   /// True pose of a frame, without rendering it.
   Rigid3 world_from_rig(int index) const;
+  /// What the IMU of the spec measures, see record_imu(); nothing without one.
+  std::vector<RecordedImuSample> imu_samples() const;
   /// Renders a frame; index in [0, num_frames()).
   SimulatedFrame frame(int index);
 

@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 #include "waymark/base/check.h"
 
@@ -45,6 +46,28 @@ TEST(Sequence, FramesDoNotDependOnOrderOrThreads) {
   EXPECT_EQ(last.depth.values, three.frame(7).depth.values);
   EXPECT_NE(first.images[0].values, last.images[0].values);
   EXPECT_EQ(last.timestamp_ns - first.timestamp_ns, 250'000'000);
+}
+
+/// Of three frames (FNV-1a).
+std::uint64_t checksum(SimulatedSequence& sequence) {
+  std::uint64_t sum = 14695981039346656037ull;
+  for (const int index : {0, 7, 19}) {
+    const SimulatedFrame frame = sequence.frame(index);
+    for (const std::uint8_t value : frame.images[0].values) sum = (sum ^ value) * 1099511628211ull;
+  }
+  return sum;
+}
+
+/// Results are compared with those of earlier versions, on the same images.
+TEST(Sequence, ImagesStayWhatTheyWere) {
+  SequenceSpec spec = small_spec();
+  spec.effects.noise_sigma = 2.0;
+  spec.effects.exposure_s = 0.02;
+  SimulatedSequence loop(spec);
+  EXPECT_EQ(checksum(loop), 0x23462de840ce997aull);
+  spec.motion = "turns_250";
+  SimulatedSequence turns(spec);
+  EXPECT_EQ(checksum(turns), 0x5efb6262d0ad1129ull);
 }
 
 TEST(Sequence, NoiseHasTheSigmaAskedFor) {

@@ -1,0 +1,106 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/imu_recording.h"
+
+#include <cmath>
+
+#include "waymark/base/check.h"
+#include "waymark/base/rng.h"
+#include "waymark/simulate/rotor_vibration.h"
+
+namespace waymark {
+namespace {
+
+using Eigen::Vector3d;
+
+/// Beyond those of the frames.
+constexpr std::uint64_t kGyroscopeStream = std::uint64_t{1} << 40;
+constexpr std::uint64_t kAccelerometerStream = std::uint64_t{1} << 41;
+
+/// Three axes with their errors (the model of Kalibr's documentation, and scales): a measurement is
+/// scale * truth + bias + white noise, clipped, and the bias walks.
+class InertialTriad {
+ public:
+  InertialTriad(const ImuAxes& errors, double rate_hz, std::uint64_t seed, std::uint64_t stream)
+      : errors_(errors), rate_hz_(rate_hz), rng_(seed, stream) {
+    bias_ = draw(errors.bias);
+    scale_ = Vector3d::Ones() + draw(errors.scale);
+  }
+
+  const Vector3d& bias() const { return bias_; }
+
+  Vector3d measure(const Vector3d& truth) {
+    // Sampling white noise of a density averages it over 1 / rate (Crassidis 2006).
+    const Vector3d noise = draw(errors_.noise_density * std::sqrt(rate_hz_));
+    const Vector3d value = scale_.cwiseProduct(truth) + bias_ + noise;
+    return value.cwiseMax(-errors_.range).cwiseMin(errors_.range);
+  }
+
+  void step() { bias_ += draw(errors_.random_walk / std::sqrt(rate_hz_)); }
+
+ private:
+  Vector3d draw(double sigma) {
+    const double x = rng_.normal();
+    const double y = rng_.normal();
+    return sigma * Vector3d(x, y, rng_.normal());
+  }
+
+  ImuAxes errors_;
+  double rate_hz_;
+  Rng rng_;
+  Vector3d bias_;
+  Vector3d scale_;
+};
+
+/// What a perfect IMU measures; without time stamp.
+ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig) {
+  const Vector3d lever = state.world_from_rig.rotation * imu_from_rig.origin_in_source();
+  const Vector3d& turn = state.angular_velocity;
+  Vector3d specific_force =
+      state.acceleration + state.angular_acceleration.cross(lever) + turn.cross(turn.cross(lever));
+  specific_force.z() += kStandardGravity;
+  const Eigen::Quaterniond imu_from_world =
+      imu_from_rig.rotation * state.world_from_rig.rotation.conjugate();
+  ImuSample sample;
+  sample.angular_velocity = imu_from_world * turn;
+  sample.acceleration = imu_from_world * specific_force;
+  return sample;
+}
+
+}  // namespace
+
+std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
+                                          const Motion& motion,
+                                          std::int64_t start_ns,
+                                          std::uint64_t seed) {
+  WAYMARK_CHECK(imu.rate_hz > 0.0);
+  const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
+  const Rigid3 rig_from_imu = imu_from_rig.inverse();
+  InertialTriad gyroscope(imu.gyroscope, imu.rate_hz, seed, kGyroscopeStream);
+  InertialTriad accelerometer(imu.accelerometer, imu.rate_hz, seed, kAccelerometerStream);
+  RotorVibration vibration(imu.vibration, seed);
+  std::vector<RecordedImuSample> recorded;
+  const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kImuLeadS));
+  for (std::int64_t i = -std::llround(imu.rate_hz * kImuLeadS); i <= last; ++i) {
+    const double seconds = static_cast<double>(i) / imu.rate_hz;
+    const MotionState state = motion.state(seconds);
+    const RotorVibration::Shake shake = vibration.next(seconds);
+    RecordedImuSample now;
+    now.world_from_imu = state.world_from_rig * rig_from_imu;
+    const Vector3d lever = state.world_from_rig.rotation * rig_from_imu.translation;
+    now.velocity = state.velocity + state.angular_velocity.cross(lever);
+    now.gyroscope_bias = gyroscope.bias();
+    now.accelerometer_bias = accelerometer.bias();
+    now.sample = exact_imu_sample(state, imu_from_rig);
+    now.sample.timestamp_ns = start_ns + std::llround(1e9 * (seconds + imu.time_shift_s));
+    now.sample.angular_velocity =
+        gyroscope.measure(now.sample.angular_velocity + shake.angular_velocity);
+    now.sample.acceleration = accelerometer.measure(now.sample.acceleration + shake.acceleration);
+    recorded.push_back(now);
+    gyroscope.step();
+    accelerometer.step();
+  }
+  return recorded;
+}
+
+}  // namespace waymark

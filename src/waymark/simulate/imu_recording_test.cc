@@ -1,0 +1,225 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/simulate/imu_recording.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <numbers>
+#include <vector>
+
+namespace waymark {
+namespace {
+
+using Eigen::Vector3d;
+
+constexpr std::int64_t kRecordingStartNs = 1'000'000'000;
+using Recorded = std::vector<RecordedImuSample>;
+
+Recorded record_from_start(const ImuDevice& imu, const Motion& motion, std::uint64_t seed = 1) {
+  return record_imu(imu, motion, kRecordingStartNs, seed);
+}
+
+/// The pose and the velocity of an IMU.
+struct InertialState {
+  Rigid3 world_from_imu;
+  Vector3d velocity;
+};
+
+/// From samples alone and where it started. Turns by the fourth-order Magnus expansion over two
+/// samples, velocity and position by Simpson's rule over them (Iserles et al. 2000).
+void integrate(const Recorded& samples, std::size_t first, double step_s, InertialState& flight) {
+  const Vector3d& w0 = samples[first].sample.angular_velocity;
+  const Vector3d& w1 = samples[first + 1].sample.angular_velocity;
+  const Vector3d& w2 = samples[first + 2].sample.angular_velocity;
+  const double h = 2.0 * step_s;
+  const Eigen::Quaterniond start = flight.world_from_imu.rotation;
+  const Vector3d half = 0.5 * h * (5.0 * w0 + 8.0 * w1 - w2) / 12.0;
+  const Vector3d whole = h * (w0 + 4.0 * w1 + w2) / 6.0 + h * h / 12.0 * w0.cross(w2);
+  const Eigen::Quaterniond middle = start * so3_exp(half);
+  const Eigen::Quaterniond end = start * so3_exp(whole);
+  const Vector3d gravity(0.0, 0.0, -kStandardGravity);
+  const Vector3d a0 = start * samples[first].sample.acceleration + gravity;
+  const Vector3d a1 = middle * samples[first + 1].sample.acceleration + gravity;
+  const Vector3d a2 = end * samples[first + 2].sample.acceleration + gravity;
+  flight.world_from_imu.translation += h * flight.velocity + h * h * (a0 + 2.0 * a1) / 6.0;
+  flight.velocity += h * (a0 + 4.0 * a1 + a2) / 6.0;
+  flight.world_from_imu.rotation = end.normalized();
+}
+
+TEST(ImuRecording, PerfectSamplesIntegrateToTheRenderedPath) {
+  ImuDevice imu;
+  imu.rate_hz = 1000.0;
+  imu.turn_rad = {0.4, -1.2, 2.0};
+  imu.lever_m = {0.3, -0.1, 0.05};
+  for (const std::string& name : motion_names()) {
+    SCOPED_TRACE(name);
+    const double duration_s = name == "rounds" ? 60.0 : name == "thirty_rounds" ? 600.0 : 20.0;
+    const Motion motion = make_motion("apartment", name, duration_s);
+    const Recorded samples = record_from_start(imu, motion);
+    const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
+    const std::size_t start = 500;
+    ASSERT_EQ(samples[start].sample.timestamp_ns, kRecordingStartNs);
+    InertialState flight{samples[start].world_from_imu, samples[start].velocity};
+    double worst_m = 0.0;
+    double worst_rad = 0.0;
+    for (std::size_t i = start; i < start + 20000; i += 2) {
+      integrate(samples, i, 1e-3, flight);
+      const double seconds = 1e-3 * static_cast<double>(i + 2 - start);
+      const Rigid3 rig = flight.world_from_imu * imu_from_rig;
+      const Rigid3 truth = motion.world_from_rig(seconds);
+      worst_m = std::max(worst_m, (rig.translation - truth.translation).norm());
+      worst_rad = std::max(worst_rad, rig.rotation.angularDistance(truth.rotation));
+      const RecordedImuSample& told = samples[i + 2];
+      EXPECT_LT((told.world_from_imu * imu_from_rig * truth.inverse()).log().norm(), 1e-9);
+      EXPECT_LT((told.velocity - flight.velocity).norm(), 2e-3);
+    }
+    EXPECT_LT(worst_m, 1e-3);
+    EXPECT_LT(worst_rad, 0.01 * std::numbers::pi / 180.0);
+  }
+}
+
+TEST(ImuRecording, GoesOnBeforeAndAfterTheMotion) {
+  ImuDevice imu;
+  imu.rate_hz = 1000.0;
+  const Motion motion = make_motion("room", "loop", 20.0);
+  const Recorded samples = record_from_start(imu, motion);
+  InertialState flight{samples[0].world_from_imu, samples[0].velocity};
+  for (std::size_t i = 0; i < 500; i += 2) integrate(samples, i, 1e-3, flight);
+  const Rigid3 start = motion.world_from_rig(0.0);
+  EXPECT_LT((flight.world_from_imu * start.inverse()).log().norm(), 1e-3);
+  EXPECT_LT((flight.velocity - motion.state(0.0).velocity).norm(), 3e-3);
+}
+
+TEST(ImuRecording, AtRestItFeelsGravityUpwards) {
+  ImuDevice imu;
+  imu.turn_rad = {0.1, 0.7, -0.3};
+  imu.lever_m = {0.2, 0.0, 0.0};
+  for (const RecordedImuSample& now : record_from_start(imu, make_motion("room", "still", 1.0))) {
+    EXPECT_NEAR(now.sample.acceleration.norm(), kStandardGravity, 1e-9);
+    const Vector3d upwards = now.world_from_imu.rotation * now.sample.acceleration;
+    EXPECT_LT((upwards - kStandardGravity * Vector3d::UnitZ()).norm(), 1e-9);
+    EXPECT_LT(now.sample.angular_velocity.norm(), 1e-12);
+  }
+}
+
+/// Allan deviation of an axis at rest, for an averaging time of so many samples (IEEE Std 952).
+double allan_deviation(const Recorded& samples,
+                       std::size_t count,
+                       const std::function<double(const RecordedImuSample&)>& axis) {
+  std::vector<double> means;
+  for (std::size_t i = 0; i + count <= samples.size(); i += count) {
+    double sum = 0.0;
+    for (std::size_t k = i; k < i + count; ++k) sum += axis(samples[k]);
+    means.push_back(sum / static_cast<double>(count));
+  }
+  double squares = 0.0;
+  for (std::size_t i = 1; i < means.size(); ++i) squares += std::pow(means[i] - means[i - 1], 2);
+  return std::sqrt(0.5 * squares / static_cast<double>(means.size() - 1));
+}
+
+TEST(ImuRecording, NoiseHasTheDensitiesItSays) {
+  const Motion still = make_motion("room", "still", 2000.0);
+  const auto turn = [](const RecordedImuSample& now) { return now.sample.angular_velocity.y(); };
+  const auto push = [](const RecordedImuSample& now) { return now.sample.acceleration.x(); };
+  for (const double rate_hz : {100.0, 400.0}) {
+    ImuDevice white;
+    white.rate_hz = rate_hz;
+    white.gyroscope.noise_density = 1.7e-4;
+    white.accelerometer.noise_density = 2.0e-3;
+    const Recorded samples = record_from_start(white, still);
+    const auto per_s = static_cast<std::size_t>(rate_hz);
+    // The deviation at 1 s is the density, and falls by the root of the time.
+    EXPECT_NEAR(allan_deviation(samples, per_s, turn), 1.7e-4, 0.05 * 1.7e-4);
+    EXPECT_NEAR(allan_deviation(samples, per_s, push), 2.0e-3, 0.05 * 2.0e-3);
+    EXPECT_NEAR(allan_deviation(samples, 4 * per_s, push), 1.0e-3, 0.1 * 1.0e-3);
+    ImuDevice walking;
+    walking.rate_hz = rate_hz;
+    walking.gyroscope.random_walk = 2.0e-5;
+    walking.accelerometer.random_walk = 3.0e-3;
+    const Recorded walks = record_from_start(walking, still);
+    // That of a walk at 3 s is its density.
+    EXPECT_NEAR(allan_deviation(walks, 3 * per_s, turn), 2.0e-5, 0.1 * 2.0e-5);
+    EXPECT_NEAR(allan_deviation(walks, 3 * per_s, push), 3.0e-3, 0.1 * 3.0e-3);
+  }
+}
+
+TEST(ImuRecording, TheTruthKnowsTheBiases) {
+  ImuDevice imu;
+  imu.gyroscope.bias = 0.01;
+  imu.accelerometer.bias = 0.2;
+  imu.gyroscope.random_walk = 1e-3;
+  imu.accelerometer.random_walk = 1e-2;
+  const Motion motion = make_motion("room", "inspect", 10.0);
+  const Recorded samples = record_from_start(imu, motion);
+  const Recorded exact = record_from_start(ImuDevice{}, motion);
+  for (std::size_t i = 0; i < samples.size(); ++i) {
+    const RecordedImuSample& now = samples[i];
+    const Vector3d turn_bias =
+        now.sample.angular_velocity - exact[i].sample.angular_velocity - now.gyroscope_bias;
+    const Vector3d push_bias =
+        now.sample.acceleration - exact[i].sample.acceleration - now.accelerometer_bias;
+    EXPECT_LT(turn_bias.norm() + push_bias.norm(), 1e-12);
+  }
+  EXPECT_GT(samples[0].gyroscope_bias.norm(), 1e-3);
+  EXPECT_GT((samples.back().gyroscope_bias - samples[0].gyroscope_bias).norm(), 5e-4);
+}
+
+TEST(ImuRecording, ShiftIsWhatIsAddedToTheTimeOfAnImage) {
+  ImuDevice imu;
+  imu.time_shift_s = 0.02;
+  const Motion motion = make_motion("room", "inspect", 10.0);
+  const Recorded late = record_from_start(imu, motion);
+  const Recorded usual = record_from_start(ImuDevice{}, motion);
+  ASSERT_EQ(late.size(), 2201u);
+  EXPECT_EQ(usual[0].sample.timestamp_ns, kRecordingStartNs - 500'000'000);
+  for (std::size_t i = 0; i < late.size(); ++i) {
+    EXPECT_EQ(late[i].sample.timestamp_ns, usual[i].sample.timestamp_ns + 20'000'000);
+    EXPECT_EQ(late[i].sample.acceleration, usual[i].sample.acceleration);
+  }
+}
+
+TEST(ImuRecording, ClipsAtItsRangeAndScalesItsAxes) {
+  const Motion motion = make_motion("room", "turns_400", 10.0);
+  ImuDevice imu;
+  imu.gyroscope.range = 2.0;
+  double largest = 0.0;
+  int num_clipped = 0;
+  for (const RecordedImuSample& now : record_from_start(imu, motion)) {
+    largest = std::max(largest, now.sample.angular_velocity.cwiseAbs().maxCoeff());
+    num_clipped += now.sample.angular_velocity.cwiseAbs().maxCoeff() == 2.0 ? 1 : 0;
+  }
+  EXPECT_EQ(largest, 2.0);
+  EXPECT_GT(num_clipped, 50);
+  ImuDevice scaled;
+  scaled.accelerometer.scale = 0.01;
+  const Recorded samples = record_from_start(scaled, motion);
+  const Recorded exact = record_from_start(ImuDevice{}, motion);
+  const Vector3d scale = samples[7].sample.acceleration.cwiseQuotient(exact[7].sample.acceleration);
+  EXPECT_GT((scale - Vector3d::Ones()).norm(), 1e-3);
+  EXPECT_LT((scale - Vector3d::Ones()).norm(), 0.05);
+  for (std::size_t i = 0; i < samples.size(); i += 50) {
+    EXPECT_LT(
+        (samples[i].sample.acceleration - scale.cwiseProduct(exact[i].sample.acceleration)).norm(),
+        1e-6);
+  }
+}
+
+TEST(ImuRecording, IsTheSameForTheSameSeed) {
+  const Motion motion = make_motion("room", "loop", 5.0);
+  ImuDevice imu = parse_imu({"consumer", "vibration=2"});
+  const Recorded first = record_from_start(imu, motion, 7);
+  const Recorded again = record_from_start(imu, motion, 7);
+  const Recorded other = record_from_start(imu, motion, 8);
+  ASSERT_EQ(first.size(), again.size());
+  for (std::size_t i = 0; i < first.size(); ++i) {
+    EXPECT_EQ(first[i].sample.acceleration, again[i].sample.acceleration);
+    EXPECT_EQ(first[i].sample.angular_velocity, again[i].sample.angular_velocity);
+    EXPECT_NE(first[i].sample.acceleration, other[i].sample.acceleration);
+  }
+}
+
+}  // namespace
+}  // namespace waymark
