@@ -22,6 +22,7 @@ set(roots
   image/convert.h # colour to grey, depth from metres
   image/image.h
   input/decode.h # images
+  input/imu_stream.h # inertial data
   input/input.h # data sets, folders, video files and devices
   input/listing.h
   map/map.h

@@ -35,6 +35,8 @@ std::vector<testing::WrittenMessage> small_recording(RosEncoding encoding) {
   }
   add("/depth", "sensor_msgs/Image", RosImage{"f", 2, 4, "16UC1", true, 8, "abcdefghabcdefgh"});
   add("/packed", "sensor_msgs/CompressedImage", RosCompressedImage{"f", "jpeg", "\xFF\xD8\xFF"});
+  add("/imu", "sensor_msgs/Imu", RosImu{{0.1, 0.2, 0.3}, {0, 0, 9.8}});
+  add("/imu", "sensor_msgs/Imu", RosImu{{0.1, 0.2, 0.3}, {0, 0, 9.8}});
   return messages;
 }
 

@@ -19,6 +19,8 @@ namespace {
 /// compressed must not fill the memory.
 constexpr std::size_t kMaxNameBytes = std::size_t{1} << 25;
 constexpr std::size_t kMaxBagMessages = std::size_t{1} << 22;
+/// Five hours at 200 Hz; what comes later is left out.
+constexpr std::size_t kMaxBagImuMessages = std::size_t{1} << 22;
 
 /// The time in the std_msgs/Header with which a message begins; 0 where it has none.
 std::int64_t header_time_ns(const BagTopic& topic, std::string_view start) {
@@ -49,6 +51,14 @@ bool BagTopic::is_listed() const {
           type == kRosCompressedImage || type == kRosCompressedVideo || type == kRosFfmpegPacket);
 }
 
+bool BagTopic::is_imu() const {
+  return encoding != RosEncoding::kUnknown && type == "sensor_msgs/Imu";
+}
+
+std::size_t BagTopic::num_start_bytes() const {
+  return is_imu() ? kImuStartBytes : kMessageStartBytes;
+}
+
 std::uint32_t BagContent::topic_of(std::string_view name,
                                    std::string_view type,
                                    RosEncoding encoding) {
@@ -71,19 +81,27 @@ void BagContent::add(std::uint32_t topic,
                      std::string_view start) {
   BagTopic& of = topics.at(topic);
   ++of.num_messages;
-  if (!of.is_listed()) return;
+  if (!of.is_listed() && !of.is_imu()) return;
   recorded_ns = std::max<std::int64_t>(recorded_ns, 0);
   std::int64_t timestamp_ns = header_time_ns(of, start);
-  if (timestamp_ns == 0) {
-    timestamp_ns = recorded_ns;
-    ++num_unstamped;
-  }
+  const bool is_unstamped = timestamp_ns == 0;
+  if (is_unstamped) timestamp_ns = recorded_ns;
+  if (of.is_imu()) return add_imu({topic, timestamp_ns, recorded_ns, place}, start);
+  num_unstamped += is_unstamped;
   if (messages.size() == kMaxBagMessages) {
     throw InputError(
         "topic " + quote_for_message(of.name),
         fmt::format("has too many messages, expected at most {} images in a bag", kMaxBagMessages));
   }
   messages.push_back({topic, timestamp_ns, recorded_ns, place});
+}
+
+void BagContent::add_imu(const BagMessage& message, std::string_view start) {
+  if (imu.size() == kMaxBagImuMessages) return;
+  const auto measured = parse_ros_imu(start, topics[message.topic].encoding);
+  if (measured) imu.push_back({message, *measured});
+  if (imu.size() < kMaxBagImuMessages) return;
+  faults.push_back(fmt::format("inertial data after {} messages are left out", imu.size()));
 }
 
 }  // namespace waymark

@@ -11,14 +11,10 @@
 #include <tuple>
 #include <vector>
 
-namespace waymark {
+#include "waymark/bag/ros_encoding.h"
+#include "waymark/bag/ros_messages.h"
 
-/// How the messages of a topic are written.
-enum class RosEncoding {
-  kRos1,
-  kCdr,      ///< Of ROS 2.
-  kUnknown,  ///< Not ROS: is counted, not read.
-};
+namespace waymark {
 
 /// A topic of a bag.
 struct BagTopic {
@@ -29,6 +25,10 @@ struct BagTopic {
 
   /// Whether its messages are listed: images and what tells of cameras. Of others the number.
   bool is_listed() const;
+  /// Whether its messages are read while the bag is scanned: those of an IMU are small and many.
+  bool is_imu() const;
+  /// How many bytes of a message BagContent::add() takes.
+  std::size_t num_start_bytes() const;
 };
 
 /// Where in a file a message is.
@@ -53,25 +53,37 @@ struct BagMessage {
 
 /// Bytes of a message that hold its time.
 inline constexpr std::size_t kMessageStartBytes = 12;
+/// Bytes that hold what an IMU measured, with a name of its frame of up to 200 letters.
+inline constexpr std::size_t kImuStartBytes = 512;
+
+/// A message of sensor_msgs/Imu.
+struct BagImu {
+  BagMessage message;
+  RosImu measured;
+};
 
 /// What scanning bag files found.
 struct BagContent {
   std::vector<BagTopic> topics;      ///< In order of their appearance.
   std::vector<BagMessage> messages;  ///< Of listed topics, in the order of the files.
   std::vector<std::string> faults;   ///< What is damaged or missing, for people.
+  std::vector<BagImu> imu;           ///< Of all topics of an IMU, in the order of the files.
   std::size_t num_unstamped = 0;     ///< Listed messages without a time in their header.
 
   /// The topic of that name and type, new if need be. type: as in ROS 1 or ROS 2. InputError where
   /// all names become longer than those of a bag can be.
   std::uint32_t topic_of(std::string_view name, std::string_view type, RosEncoding encoding);
 
-  /// Counts a message and lists it if its topic is. start: its first kMessageStartBytes, or fewer.
+  /// Counts a message and lists it if its topic is. start: its first bytes, num_start_bytes() of
+  /// the topic or fewer.
   void add(std::uint32_t topic,
            std::int64_t recorded_ns,
            const BagPlace& place,
            std::string_view start);
 
  private:
+  void add_imu(const BagMessage& message, std::string_view start);
+
   std::map<std::tuple<std::string, std::string, RosEncoding>, std::uint32_t> topic_by_name_;
   std::size_t num_name_bytes_ = 0;
 };

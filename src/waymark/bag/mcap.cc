@@ -124,7 +124,7 @@ class McapScanner {
 
   void take_message(const Region& region, const McapRecord& record) {
     if (record.size < kMcapMessageStart) return;
-    FieldReader reader(region.source.peek(record.offset, kMcapMessageStart + kMessageStartBytes));
+    FieldReader reader(region.source.peek(record.offset, kMcapMessageStart));
     const auto channel = channels_.find(reader.number<std::uint16_t>());
     reader.take(4);  // Sequence number.
     const auto recorded_ns = static_cast<std::int64_t>(reader.number<std::uint64_t>());
@@ -134,7 +134,11 @@ class McapScanner {
                          region.chunk,
                          record.offset + kMcapMessageStart,
                          record.size - kMcapMessageStart};
-    content_.add(channel->second, recorded_ns, place, reader.rest().substr(0, place.size));
+    const std::size_t num_start = content_.topics[channel->second].num_start_bytes();
+    content_.add(channel->second,
+                 recorded_ns,
+                 place,
+                 region.source.peek(place.offset, std::min<std::uint64_t>(place.size, num_start)));
   }
 
   /// False if it is damaged.

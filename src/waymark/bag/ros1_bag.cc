@@ -150,7 +150,8 @@ class Ros1Scanner {
     const auto seconds = time.number<std::uint32_t>();
     const auto nanoseconds = time.number<std::uint32_t>();
     if (connection == connections_.end() || time.has_failed()) return;
-    const std::size_t size = std::min<std::uint64_t>(record.size, kMessageStartBytes);
+    const std::size_t num_start = content_.topics[connection->second].num_start_bytes();
+    const std::size_t size = std::min<std::uint64_t>(record.size, num_start);
     content_.add(connection->second,
                  std::int64_t{seconds} * 1'000'000'000 + nanoseconds,
                  {file_index_, region.chunk, record.offset, record.size},

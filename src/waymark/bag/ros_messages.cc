@@ -135,4 +135,21 @@ std::optional<RosCameraInfo> parse_ros_camera_info(std::string_view bytes, RosEn
   return reader.is_good() ? std::optional(info) : std::nullopt;
 }
 
+std::optional<RosImu> parse_ros_imu(std::string_view bytes, RosEncoding encoding) {
+  MessageReader reader(bytes, encoding);
+  RosImu imu;
+  reader.header();
+  std::array<double, 4> orientation;
+  std::array<double, 9> covariance;
+  reader.read(orientation);
+  reader.read(covariance);
+  reader.read(imu.angular_velocity);
+  reader.read(covariance);
+  imu.has_angular_velocity = covariance[0] != -1.0;
+  reader.read(imu.linear_acceleration);
+  if (!reader.is_good()) return std::nullopt;
+  imu.has_linear_acceleration = reader.number<double>() != -1.0;
+  return imu;
+}
+
 }  // namespace waymark

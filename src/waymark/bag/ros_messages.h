@@ -9,7 +9,7 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/bag/bag_content.h"
+#include "waymark/bag/ros_encoding.h"
 
 namespace waymark {
 
@@ -56,10 +56,21 @@ struct RosCameraInfo {
   std::uint32_t roi_width_px = 0;
 };
 
+/// sensor_msgs/Imu. What the message says it has not (REP 145: the first covariance is -1) is not
+/// there.
+struct RosImu {
+  std::array<double, 3> angular_velocity = {};     ///< rad/s.
+  std::array<double, 3> linear_acceleration = {};  ///< m/s^2, with gravity.
+  bool has_angular_velocity = true;
+  bool has_linear_acceleration = true;
+};
+
 /// Each gives nothing for bytes that are no such message.
 std::optional<RosImage> parse_ros_image(std::string_view bytes, RosEncoding encoding);
 std::optional<RosCompressedImage> parse_ros_compressed_image(
     std::string_view bytes, RosEncoding encoding, std::string_view type = kRosCompressedImage);
 std::optional<RosCameraInfo> parse_ros_camera_info(std::string_view bytes, RosEncoding encoding);
+/// The covariance of the acceleration, the last field, need not be there.
+std::optional<RosImu> parse_ros_imu(std::string_view bytes, RosEncoding encoding);
 
 }  // namespace waymark

@@ -61,6 +61,21 @@ TEST_P(Messages, OfACameraInfoComeBack) {
   EXPECT_EQ(parsed->roi_width_px, 4U);
 }
 
+TEST_P(Messages, OfAnImuComeBack) {
+  const RosImu imu{{0.1, 0.2, 0.3}, {1, 2, 9.8}, true, false};
+  const std::string bytes = write_message(GetParam(), 5, imu);
+  const auto parsed = parse_ros_imu(bytes, GetParam());
+  ASSERT_TRUE(parsed);
+  EXPECT_EQ(parsed->angular_velocity, imu.angular_velocity);
+  EXPECT_EQ(parsed->linear_acceleration, imu.linear_acceleration);
+  EXPECT_TRUE(parsed->has_angular_velocity);
+  EXPECT_FALSE(parsed->has_linear_acceleration);
+  EXPECT_LT(bytes.size(), kImuStartBytes);
+  for (std::size_t size = 0; size < bytes.size() - 9 * sizeof(double); ++size) {
+    EXPECT_FALSE(parse_ros_imu(std::string_view(bytes).substr(0, size), GetParam())) << size;
+  }
+}
+
 TEST_P(Messages, CutOffAnywhereAreNone) {
   const std::string bytes = write_message(GetParam(), 5, some_info());
   for (std::size_t size = 0; size + 1 < bytes.size(); ++size) {  // The last byte is not needed.

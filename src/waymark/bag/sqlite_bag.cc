@@ -50,10 +50,11 @@ class SqliteBag : public BagFile {
       const std::int64_t recorded_ns = sqlite3_column_int64(rows.get(), 2);
       BagPlace place{file, kNoChunk, static_cast<std::uint64_t>(row), 0};
       std::string start;
-      if (content.topics[topic->second].is_listed()) {
+      const BagTopic& of = content.topics[topic->second];
+      if (of.is_listed() || of.is_imu()) {
         sqlite3_blob* blob = open_blob(row);
         place.size = blob ? static_cast<std::uint64_t>(sqlite3_blob_bytes(blob)) : 0;
-        start.resize(std::min<std::uint64_t>(place.size, kMessageStartBytes));
+        start.resize(std::min<std::uint64_t>(place.size, of.num_start_bytes()));
         const bool is_good =
             blob &&
             sqlite3_blob_read(blob, start.data(), static_cast<int>(start.size()), 0) == SQLITE_OK;

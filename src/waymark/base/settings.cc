@@ -17,9 +17,9 @@ namespace {
 
 using Section = SettingField::Section;
 
-/// Keys of the calibration, which shares the document: cam0, cam1, ... and depth.factor.
+/// Keys of the calibration, which shares the document: cam0, cam1, ..., imu0 and depth.factor.
 bool is_calibration_key(std::string_view key) {
-  if (key == "depth" || key == "depth.factor") return true;
+  if (key == "depth" || key == "depth.factor" || key == "imu0") return true;
   return key.size() > 3 && key.starts_with("cam") &&
          std::all_of(key.begin() + 3, key.end(), [](unsigned char c) { return std::isdigit(c); });
 }

@@ -30,10 +30,7 @@ bool is_camera_key(std::string_view key) {
          std::all_of(key.begin() + 3, key.end(), [](unsigned char c) { return std::isdigit(c); });
 }
 
-bool is_ignored_key(std::string_view key) {
-  return key == "rostopic" || key == "cam_overlaps" || key == "T_cam_imu" ||
-         key == "timeshift_cam_imu";
-}
+bool is_ignored_key(std::string_view key) { return key == "rostopic" || key == "cam_overlaps"; }
 
 void check_keys(const ConfigNode& camera, const std::string& name, CameraChain& chain) {
   const std::vector<std::string> known = {name + ".camera_model",
@@ -45,7 +42,9 @@ void check_keys(const ConfigNode& camera, const std::string& name, CameraChain& 
                                           name + ".resolution",
                                           name + ".T_cn_cnm1",
                                           name + ".T_cn_cnm1_sigma",
-                                          name + ".readout_ms"};
+                                          name + ".readout_ms",
+                                          name + ".T_cam_imu",
+                                          name + ".timeshift_cam_imu"};
   for (std::size_t i = 0; i < camera.items.size(); ++i) {
     const std::string key = name + "." + camera.keys[i];
     if (is_ignored_key(camera.keys[i])) {
@@ -94,23 +93,6 @@ CameraDescription read_description(const ConfigNode& camera, const std::string& 
   description.width_px = config_int(resolution.items[0], name + ".resolution[0]", {.low = 1});
   description.height_px = config_int(resolution.items[1], name + ".resolution[1]", {.low = 1});
   return description;
-}
-
-Rigid3 read_transform(const ConfigNode& node, const std::string& key) {
-  const auto fail_shape = [&] {
-    throw InputError(
-        node.where(),
-        fmt::format("{} is {}, expected 4 rows of 4 numbers", key, describe_value(node)));
-  };
-  if (node.kind != ConfigNode::Kind::kList || node.items.size() != 4) fail_shape();
-  Eigen::Matrix4d matrix;
-  for (int row = 0; row < 4; ++row) {
-    const std::vector<double> values =
-        config_doubles(node.items[static_cast<std::size_t>(row)], fmt::format("{}[{}]", key, row));
-    if (values.size() != 4) fail_shape();
-    matrix.row(row) = Eigen::Map<const Eigen::RowVector4d>(values.data());
-  }
-  return rigid_from_matrix(matrix, node.where(), key);
 }
 
 Rigid3 read_cam_from_rig(const ConfigNode& camera, const std::string& name, CameraChain& chain) {
@@ -249,6 +231,23 @@ std::string format_transform(const ChainCamera& camera, const ChainCamera& previ
 }
 
 }  // namespace
+
+Rigid3 read_transform(const ConfigNode& node, const std::string& key) {
+  const auto fail_shape = [&] {
+    throw InputError(
+        node.where(),
+        fmt::format("{} is {}, expected 4 rows of 4 numbers", key, describe_value(node)));
+  };
+  if (node.kind != ConfigNode::Kind::kList || node.items.size() != 4) fail_shape();
+  Eigen::Matrix4d matrix;
+  for (int row = 0; row < 4; ++row) {
+    const std::vector<double> values =
+        config_doubles(node.items[static_cast<std::size_t>(row)], fmt::format("{}[{}]", key, row));
+    if (values.size() != 4) fail_shape();
+    matrix.row(row) = Eigen::Map<const Eigen::RowVector4d>(values.data());
+  }
+  return rigid_from_matrix(matrix, node.where(), key);
+}
 
 std::optional<CameraChain> read_camchain(const ConfigNode& config) {
   CameraChain chain;

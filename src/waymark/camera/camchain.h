@@ -55,6 +55,9 @@ std::string format_camchain(const CameraChain& chain);
 Rig make_rig(const CameraChain& chain,
              const CameraRegistry& registry = CameraRegistry::with_builtin_models());
 
+/// A rigid motion from 4 rows of 4 numbers of a document, as below. Throws InputError.
+Rigid3 read_transform(const ConfigNode& node, const std::string& key);
+
 /// A rigid motion from a 4x4 matrix of a file: InputError at `where` unless the rotation is
 /// orthonormal within 1e-3 (it is then made so exactly) and the last row is 0 0 0 1.
 Rigid3 rigid_from_matrix(const Eigen::Matrix4d& matrix,

@@ -12,9 +12,11 @@
 #include "waymark/input/bag_calibration.h"
 #include "waymark/input/bag_frames.h"
 #include "waymark/input/bag_image.h"
+#include "waymark/input/bag_imu.h"
 #include "waymark/input/bag_topics.h"
 #include "waymark/input/bag_video.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/imu_choice.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
 
@@ -66,6 +68,9 @@ class BagInput : public Input {
     masks_.match(stems);
     start();
     describe_all(options);
+    const auto time_of = [this](const BagMessage& message) { return frames_.time_of(message); };
+    take_imu(
+        options, [&] { return imu_of_bag(bag_, time_of); }, info_);
   }
 
   const InputInfo& info() const override { return info_; }
@@ -276,9 +281,6 @@ class BagInput : public Input {
           i == choice_.first.topic || (choice_.second && i == choice_.second->topic);
       info_.topics.push_back(
           {printable(topic.name), printable(topic.type), topic.num_messages, is_used});
-      if (topic.type == "sensor_msgs/Imu") {
-        notes_.push_back(fmt::format("{} is not used: IMU", printable(topic.name)));
-      }
     }
     std::vector<std::string>& lines = info_.lines;
     lines.push_back(

@@ -31,7 +31,8 @@ std::optional<CameraChain> read_foreign_cameras(
     const ConfigSource& source, SlamSettingsReader read_slam_settings = refuse_slam_settings);
 
 /// A file of cameras and settings as `-c` takes it: YAML of ours as it is; one of another program
-/// turned into a camchain. What of it was passed over is appended to notes. Throws InputError.
+/// turned into a camchain; Kalibr's imu.yaml becomes imu0 of ours. What of it was passed over is
+/// appended to notes. Throws InputError.
 ConfigSource read_config_file(const std::filesystem::path& path,
                               std::vector<std::string>& notes,
                               SlamSettingsReader read_slam_settings = refuse_slam_settings);

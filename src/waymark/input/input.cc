@@ -74,6 +74,8 @@ void check_companions(const std::string& format, const InputOptions& options) {
     fail("--depth", "one folder of images");
   }
   if (!options.topics.empty() && format != "bag") fail("--topics", "a bag");
+  const bool has_imu = !options.imu.empty() && options.imu != "none";
+  if (has_imu && format == "camera") fail("--imu", "a recording");
 }
 
 Listing list_files(const std::filesystem::path& path,

@@ -22,8 +22,11 @@
 
 #include "waymark/camera/camchain.h"
 #include "waymark/image/image.h"
+#include "waymark/imu/imu.h"
 
 namespace waymark {
+
+struct ImuStream;
 
 /// How two cameras come in one picture, or in one file.
 enum class Split { kNone, kSideBySide, kTopBottom, kTracks };
@@ -101,6 +104,10 @@ struct InputOptions {
   std::optional<BagTimes> times = {};
   /// Calibration from settings; takes the place of the one the data set carries.
   std::optional<CameraChain> calibration = {};
+  /// Inertial data: a file or folder (read_imu_file()), or "none"; empty: what the input carries.
+  std::filesystem::path imu = {};
+  /// What settings say of the IMU; takes the place, part by part, of what the input knows.
+  ImuCalibration imu_calibration = {};
 };
 
 /// What of a recording is imperfect, which is made the best of.
@@ -135,7 +142,8 @@ struct InputInfo {
   int enlargement = 1;                 ///< How many times larger images are than in their files.
   InputCounts counts = {};             ///< Of the whole input, before --first, --every.
   std::vector<TopicInfo> topics = {};  ///< Of a bag.
-  std::vector<std::int64_t> times_ns = {};  ///< Of all frames, where that is known.
+  std::vector<std::int64_t> times_ns = {};    ///< Of all frames, where that is known.
+  std::shared_ptr<const ImuStream> imu = {};  ///< Inertial data (input/imu_stream.h); null: none.
   bool has_times = true;  ///< Times are stated somewhere, rather than made up from the order.
   std::vector<std::string> lines;  ///< The same in words, for people.
 };

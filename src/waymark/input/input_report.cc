@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "waymark/base/text.h"
+#include "waymark/input/imu_stream.h"
 #include "waymark/input/reading.h"
 
 namespace waymark {
@@ -42,6 +43,33 @@ nlohmann::ordered_json cameras_as_json(const InputInfo& info) {
     cameras.push_back(std::move(camera));
   }
   return cameras;
+}
+
+nlohmann::ordered_json imu_as_json(const ImuStream& stream) {
+  const ImuStatistics statistics = measure_imu(stream);
+  const auto or_null = [](const std::optional<double>& value) {
+    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
+  };
+  nlohmann::ordered_json json = {{"source", stream.source},
+                                 {"samples", stream.samples.size()},
+                                 {"rate_hz", statistics.rate_hz},
+                                 {"duration_s", statistics.duration_s},
+                                 {"mean_acceleration", statistics.mean_acceleration},
+                                 {"mean_angular_speed", statistics.mean_angular_speed},
+                                 {"rest_s", statistics.rest_s},
+                                 {"gyroscope_noise", or_null(statistics.gyroscope_noise)},
+                                 {"accelerometer_noise", or_null(statistics.accelerometer_noise)},
+                                 {"time_shift_s", or_null(stream.calibration.time_shift_s)},
+                                 {"has_mounting", stream.calibration.imu_from_rig.has_value()},
+                                 {"out_of_order", stream.num_out_of_order},
+                                 {"doubles", stream.num_doubles}};
+  json["gaps"] = nlohmann::ordered_json::array();
+  for (const ImuGap& gap : statistics.gaps) {
+    json["gaps"].push_back(
+        {{"start_s", seconds(gap.start_ns)}, {"duration_s", seconds(gap.duration_ns)}});
+  }
+  json["notes"] = stream.notes;
+  return json;
 }
 
 std::string format_camera(const CameraDescription& camera, std::size_t index) {
@@ -95,6 +123,7 @@ std::string format_input(const InputInfo& info) {
     text += format_camera(info.calibration->cameras[i].description, i);
   }
   text += format_gaps(info.times_ns);
+  if (info.imu) text += format_imu(*info.imu, info.times_ns);
   if (info.topics.empty()) return text;
   text += "topics:\n";
   for (const TopicInfo& topic : info.topics) {
@@ -129,6 +158,7 @@ std::string format_input_json(const InputInfo& info) {
   }
   json["out_of_order"] = info.counts.out_of_order;
   json["without_partner"] = info.counts.without_partner;
+  json["imu"] = info.imu ? imu_as_json(*info.imu) : nlohmann::ordered_json(nullptr);
   json["topics"] = nlohmann::ordered_json::array();
   for (const TopicInfo& topic : info.topics) {
     json["topics"].push_back({{"name", topic.name},

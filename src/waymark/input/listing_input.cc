@@ -10,7 +10,9 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
+#include "waymark/input/imu_choice.h"
 
 namespace waymark {
 namespace {
@@ -83,6 +85,9 @@ ListingInput::ListingInput(const std::filesystem::path& path,
   check_first_frame(find_first_readable());
   check_first_depth();
   describe(path, options);
+  const bool may_have_imu = listing_.format == "euroc";
+  take_imu(
+      options, [&] { return may_have_imu ? read_euroc_imu(path) : std::nullopt; }, info_);
 }
 
 std::optional<InputFrame> ListingInput::next() {

@@ -11,6 +11,7 @@
 #include "waymark/camera/rotated_camera.h"
 #include "waymark/image/opencv_image.h"
 #include "waymark/input/changed_input.h"
+#include "waymark/input/imu_choice.h"
 #include "waymark/input/reading.h"
 
 namespace waymark {
@@ -47,6 +48,7 @@ class RotatedInput final : public ChangedInput {
                                       90 * num_quarters,
                                       info_.width_px,
                                       info_.height_px));
+    turn_imu(info_, num_quarters);
     if (!info_.calibration) return;
     for (ChainCamera& camera : info_.calibration->cameras) {
       const bool has_readout = camera.readout_s != 0.0 && num_quarters % 2 == 1;

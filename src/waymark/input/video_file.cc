@@ -130,6 +130,16 @@ AvPointer<AVFormatContext> open_container(const std::filesystem::path& path) {
   return container;
 }
 
+/// The stream of GoPro's telemetry, "GoPro MET"; -1: none.
+int telemetry_stream(const AVFormatContext& container) {
+  for (unsigned i = 0; i < container.nb_streams; ++i) {
+    if (container.streams[i]->codecpar->codec_tag == MKTAG('g', 'p', 'm', 'd')) {
+      return static_cast<int>(i);
+    }
+  }
+  return -1;
+}
+
 }  // namespace
 
 VideoFile::VideoFile(const std::filesystem::path& path, std::size_t track)
@@ -183,6 +193,8 @@ std::optional<std::int64_t> VideoFile::created_s() const {
   return time_us / 1'000'000;
 }
 
+bool VideoFile::has_telemetry() const { return telemetry_stream(*container_) >= 0; }
+
 bool VideoFile::grab() {
   while (!decoder_->receive()) {
     if (has_ended_) return false;
@@ -214,6 +226,40 @@ std::optional<cv::Mat> VideoFile::picture() {
   cv::Mat turned;
   cv::rotate(*picture, turned, kCodes[static_cast<std::size_t>(track_.num_quarters - 1)]);
   return turned;
+}
+
+std::vector<TelemetryPacket> read_telemetry(const std::filesystem::path& path) {
+  constexpr std::size_t kMaxTelemetryBytes = std::size_t{256} << 20;
+  std::vector<TelemetryPacket> packets;
+  const AvPointer<AVFormatContext> container = open_container(path);
+  if (!container) return packets;
+  const int telemetry = telemetry_stream(*container);
+  const std::vector<VideoTrack> tracks = tracks_of(*container);
+  if (telemetry < 0 || tracks.empty()) return packets;
+  for (unsigned i = 0; i < container->nb_streams; ++i) {
+    const bool is_used = static_cast<int>(i) == telemetry;
+    container->streams[i]->discard = is_used ? AVDISCARD_DEFAULT : AVDISCARD_ALL;
+  }
+  const AVStream& pictures = *container->streams[tracks.front().stream];
+  const double start_s =
+      pictures.start_time == AV_NOPTS_VALUE
+          ? 0.0
+          : static_cast<double>(pictures.start_time) * av_q2d(pictures.time_base);
+  const double unit_s = av_q2d(container->streams[telemetry]->time_base);
+  const AvPointer<AVPacket> packet(av_packet_alloc());
+  for (std::size_t num_bytes = 0; packet && av_read_frame(container.get(), packet.get()) >= 0;) {
+    const bool is_telemetry = packet->stream_index == telemetry && packet->pts != AV_NOPTS_VALUE;
+    const auto size = static_cast<std::size_t>(std::max(packet->size, 0));
+    num_bytes += size;
+    if (is_telemetry && num_bytes <= kMaxTelemetryBytes) {
+      packets.push_back({static_cast<double>(packet->pts) * unit_s - start_s,
+                         static_cast<double>(packet->duration) * unit_s,
+                         std::string(reinterpret_cast<const char*>(packet->data), size)});
+    }
+    av_packet_unref(packet.get());
+    if (num_bytes > kMaxTelemetryBytes) break;
+  }
+  return packets;
 }
 
 bool is_video_file(const std::filesystem::path& path) {

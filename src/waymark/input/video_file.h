@@ -24,6 +24,13 @@ struct VideoTrack {
   int num_quarters = 0;        ///< By which the file says to turn pictures clockwise, 0 to 3.
 };
 
+/// A packet of the telemetry of a file, as GoPro cameras write it (GPMF).
+struct TelemetryPacket {
+  double time_s = 0.0;      ///< Since the first picture.
+  double duration_s = 0.0;  ///< As the container has it.
+  std::string bytes;
+};
+
 /// One file of a video, read by FFmpeg's libraries (libavformat).
 class VideoFile {
  public:
@@ -41,6 +48,8 @@ class VideoFile {
   bool has_times() const;
   /// When the recording began, as the camera noted it, since 1970.
   std::optional<std::int64_t> created_s() const;
+  /// Whether it has telemetry.
+  bool has_telemetry() const;
 
   /// Steps to the next picture, past what is damaged; false at the end.
   bool grab();
@@ -57,6 +66,9 @@ class VideoFile {
   AvPointer<AVPacket> packet_;
   bool has_ended_ = false;
 };
+
+/// The telemetry of a file that has some: at most 256 MiB of it.
+std::vector<TelemetryPacket> read_telemetry(const std::filesystem::path& path);
 
 /// Whether a file holds a video, by what is in it.
 bool is_video_file(const std::filesystem::path& path);

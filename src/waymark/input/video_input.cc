@@ -10,6 +10,8 @@
 #include "waymark/camera/rotated_camera.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
+#include "waymark/input/gopro_imu.h"
+#include "waymark/input/imu_choice.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
 #include "waymark/input/video_reader.h"
@@ -35,6 +37,11 @@ class VideoInput : public Input {
     info_.calibration = choose_calibration(path, options.calibration, std::nullopt, info_.setup);
     start(path);
     describe(files, options, num_frames);
+    take_imu(
+        options,
+        [&] { return reader_.file().has_telemetry() ? imu_of_videos(files) : std::nullopt; },
+        info_);
+    turn_imu(info_, turned_deg_ / 90);
   }
 
   const InputInfo& info() const override { return info_; }

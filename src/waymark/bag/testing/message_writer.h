@@ -5,6 +5,7 @@
 // Messages and bags for tests, written from the formats' documentation and not with what reads
 // them.
 
+#include <array>
 #include <bit>
 #include <cstdint>
 #include <string>
@@ -121,6 +122,22 @@ inline std::string write_message(RosEncoding encoding,
       .number(info.roi_height_px)
       .number(info.roi_width_px)
       .number(std::uint8_t{0})
+      .bytes();
+}
+
+inline std::string write_message(RosEncoding encoding,
+                                 std::int64_t timestamp_ns,
+                                 const RosImu& imu) {
+  const std::array<double, 9> known = {0.1, 0, 0, 0, 0.1, 0, 0, 0, 0.1};
+  const std::array<double, 9> unknown = {-1, 0, 0, 0, 0, 0, 0, 0, 0};
+  return MessageWriter(encoding)
+      .header(timestamp_ns, "imu_link")
+      .each(std::array{0.0, 0.0, 0.0, 1.0})
+      .each(unknown)
+      .each(imu.angular_velocity)
+      .each(imu.has_angular_velocity ? known : unknown)
+      .each(imu.linear_acceleration)
+      .each(imu.has_linear_acceleration ? known : unknown)
       .bytes();
 }
 

@@ -1,0 +1,80 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/imu_calibration.h"
+
+#include <gmock/gmock.h>
+
+#include "waymark/base/settings.h"
+#include "waymark/base/testing/errors.h"
+#include "waymark/base/testing/temporary_folder.h"
+#include "waymark/input/config_file.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::ElementsAre;
+using ::testing::HasSubstr;
+using testing::input_error_of;
+using ::testing::IsEmpty;
+using testing::TemporaryFolder;
+
+constexpr const char* kImu =
+    "accelerometer_noise_density: 2.0e-3\naccelerometer_random_walk: 3.0e-3\n"
+    "gyroscope_noise_density: 1.7e-4\ngyroscope_random_walk: 2.0e-5\n"
+    "rostopic: /imu0\nupdate_rate: 200.0\n";
+
+constexpr const char* kCamera =
+    "cam0:\n  camera_model: pinhole\n  intrinsics: [500, 500, 320, 240]\n  resolution: [640, 480]\n"
+    "  T_cam_imu:\n  - [0, -1, 0, 0.1]\n  - [1, 0, 0, 0.2]\n  - [0, 0, 1, 0.3]\n  - [0, 0, 0, 1]\n"
+    "  timeshift_cam_imu: -0.008\n";
+
+struct NoSettings {
+  template <class Self, class Field>
+  static void describe(Self&, Field&&) {}
+};
+
+TEST(ImuCalibration, IsReadFromFilesOfKalibr) {
+  const TemporaryFolder folder;
+  folder.write("camchain-imucam.yaml", kCamera);
+  folder.write("imu.yaml", kImu);
+  std::vector<std::string> notes;
+  const std::vector<std::filesystem::path> files = {folder / "camchain-imucam.yaml",
+                                                    folder / "imu.yaml"};
+  const ConfigNode config = merge_configs(read_config_files(files, notes));
+  NoSettings settings;
+  read_settings(settings, config);
+  const ImuCalibration calibration = read_imu_calibration(config, notes);
+  EXPECT_THAT(notes, IsEmpty());
+  ASSERT_TRUE(calibration.imu_from_rig);
+  const Eigen::Vector3d origin = calibration.imu_from_rig->inverse().translation;
+  EXPECT_LT((origin - Eigen::Vector3d(0.1, 0.2, 0.3)).norm(), 1e-12);
+  EXPECT_EQ(calibration.time_shift_s, -0.008);
+  ASSERT_TRUE(calibration.noise);
+  EXPECT_EQ(calibration.noise->gyroscope, 1.7e-4);
+  EXPECT_EQ(calibration.noise->gyroscope_walk, 2.0e-5);
+  EXPECT_EQ(calibration.noise->accelerometer, 2.0e-3);
+  EXPECT_EQ(calibration.noise->accelerometer_walk, 3.0e-3);
+}
+
+TEST(ImuCalibration, IsNeededNowhere) {
+  std::vector<std::string> notes;
+  const ImuCalibration none = read_imu_calibration(parse_config({"a", "cam0: {}\n"}), notes);
+  EXPECT_FALSE(none.imu_from_rig || none.time_shift_s || none.noise);
+  const ConfigNode bent = parse_config({"a.yaml", "cam0:\n  T_cam_imu: [1, 2]\n"});
+  EXPECT_FALSE(read_imu_calibration(bent, notes).imu_from_rig);
+  EXPECT_THAT(notes, ElementsAre(HasSubstr("a.yaml:2: cam0.T_cam_imu is")));
+  const ConfigNode part = parse_config({"a.yaml", "imu0:\n  gyroscope_noise_density: 1e-4\n"});
+  EXPECT_THAT(input_error_of([&] { read_imu_calibration(part, notes); }),
+              HasSubstr("a.yaml:1: imu0 has no accelerometer_random_walk, expected all four"));
+  ImuCalibration own;
+  own.time_shift_s = 1.0;
+  ImuCalibration other;
+  other.time_shift_s = 2.0;
+  other.noise = ImuNoise{};
+  fill_in(own, other);
+  EXPECT_EQ(own.time_shift_s, 1.0);
+  EXPECT_TRUE(own.noise);
+}
+
+}  // namespace
+}  // namespace waymark

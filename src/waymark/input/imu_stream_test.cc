@@ -1,0 +1,81 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/input/imu_stream.h"
+
+#include <gmock/gmock.h>
+
+#include "waymark/base/check.h"
+#include "waymark/base/rng.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::HasSubstr;
+using ::testing::Not;
+
+constexpr std::int64_t kSampleStepNs = 5'000'000;
+
+/// So many samples of an IMU with noise, the first half at rest.
+ImuStream some_stream(int count) {
+  ImuStream stream;
+  stream.source = "imu.csv";
+  Rng rng(1, 0);
+  for (int i = 0; i < count; ++i) {
+    const double turn = i < count / 2 ? 0.0 : std::sin(0.1 * i);
+    const auto noise = [&](double sigma) {
+      return Eigen::Vector3d(sigma * rng.normal(), sigma * rng.normal(), sigma * rng.normal());
+    };
+    stream.samples.push_back({i * kSampleStepNs,
+                              Eigen::Vector3d(turn, 0, 0) + noise(0.002),
+                              Eigen::Vector3d(0, 0, 9.81) + noise(0.02)});
+  }
+  return stream;
+}
+
+TEST(ImuStream, SortsAndCounts) {
+  ImuStream stream = some_stream(10);
+  std::swap(stream.samples[2], stream.samples[5]);
+  stream.samples.push_back(stream.samples[4]);
+  sort_samples(stream);
+  ASSERT_EQ(stream.samples.size(), 10U);
+  EXPECT_EQ(stream.num_doubles, 1U);
+  EXPECT_EQ(stream.num_out_of_order, 4U);
+  for (int i = 0; i < 10; ++i) EXPECT_EQ(stream.samples[i].timestamp_ns, i * kSampleStepNs);
+  stream.samples.resize(1);
+  EXPECT_THROW(sort_samples(stream), InputError);
+}
+
+TEST(ImuStream, IsMeasured) {
+  ImuStream stream = some_stream(4000);
+  stream.samples.erase(stream.samples.begin() + 3000, stream.samples.begin() + 3010);
+  const ImuStatistics statistics = measure_imu(stream);
+  EXPECT_DOUBLE_EQ(statistics.rate_hz, 200.0);
+  EXPECT_NEAR(statistics.duration_s, 19.995, 1e-9);
+  ASSERT_EQ(statistics.gaps.size(), 1U);
+  EXPECT_EQ(statistics.gaps[0].start_ns, 2999 * kSampleStepNs);
+  EXPECT_EQ(statistics.gaps[0].duration_ns, 11 * kSampleStepNs);
+  EXPECT_NEAR(statistics.mean_acceleration, 9.81, 0.001);
+  EXPECT_NEAR(statistics.rest_s, 10.0, 1.0);
+  ASSERT_TRUE(statistics.gyroscope_noise);
+  EXPECT_NEAR(*statistics.gyroscope_noise, 0.002 / std::sqrt(200.0), 1e-5);
+  EXPECT_NEAR(*statistics.accelerometer_noise, 0.02 / std::sqrt(200.0), 1e-4);
+}
+
+TEST(ImuStream, IsToldOf) {
+  ImuStream stream = some_stream(4000);
+  stream.num_out_of_order = 1000;
+  stream.calibration.time_shift_s = 0.01;
+  const std::string text = format_imu(stream, {0, 10'000'000'000});
+  EXPECT_THAT(text, HasSubstr("inertial data: imu.csv\n  4000 samples over 19.995 s, 200.0 per"));
+  EXPECT_THAT(text, HasSubstr("note: 1000 samples out of order are sorted in: as those of two"));
+  EXPECT_THAT(text, HasSubstr("gaps: none"));
+  EXPECT_THAT(text, HasSubstr("at rest for"));
+  EXPECT_THAT(text, HasSubstr("images are 0.01 s later"));
+  EXPECT_THAT(text, Not(HasSubstr("another clock")));
+  EXPECT_THAT(format_imu(stream, {INT64_MAX - 5, INT64_MAX}), HasSubstr("another clock"));
+  EXPECT_THAT(format_imu(stream, {19'000'000'000, 39'000'000'000}),
+              HasSubstr("only 0.995 s of the images' 20.000 s"));
+}
+
+}  // namespace
+}  // namespace waymark
