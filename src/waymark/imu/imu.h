@@ -10,6 +10,9 @@
 
 namespace waymark {
 
+/// Acceleration of free fall, m/s^2 (standard gravity, ISO 80000-3). It differs by 0.3 % on Earth.
+inline constexpr double kStandardGravity = 9.80665;
+
 /// What an inertial measurement unit measured at one moment, in its own frame.
 struct ImuSample {
   std::int64_t timestamp_ns = 0;     ///< By the IMU's clock.

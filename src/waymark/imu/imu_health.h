@@ -2,14 +2,24 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <optional>
 #include <span>
+#include <vector>
 
 #include "waymark/imu/imu.h"
 
 namespace waymark {
 
-/// Whether one of the sensors of an IMU works.
+/// Time without samples.
+struct ImuGap {
+  std::int64_t start_ns = 0;     ///< Time of the sample before it.
+  std::int64_t duration_ns = 0;  ///< To the next one.
+};
+
+/// What one of the sensors of an IMU shows.
 struct SensorHealth {
+  double mean_length = 0.0;  ///< rad/s, or m/s^2.
   bool is_constant = false;  ///< All values are the same to the bit: it is not connected.
   /// Of samples at the end of the range, beyond which nothing is told.
   double saturated_share = 0.0;
@@ -17,14 +27,27 @@ struct SensorHealth {
 
 /// What samples look like, whatever moved.
 struct ImuHealth {
-  double rate_hz = 0.0;  ///< By the median period.
+  double rate_hz = 0.0;      ///< By the median step from sample to sample.
+  double duration_s = 0.0;   ///< From the first to the last sample.
+  std::vector<ImuGap> gaps;  ///< Steps of more than 2.5 median ones.
   SensorHealth gyroscope;
   SensorHealth accelerometer;
+  double rest_s = 0.0;  ///< How long the IMU lay still, in pieces of a second.
+  /// White noise while it lay still, by Allan deviations at lags of up to 0.1 s (IEEE Std 952-1997,
+  /// annex C): the largest, since filters hide noise at the shortest. Walks are those by default.
+  /// Nothing without three seconds of rest.
+  std::optional<ImuNoise> noise;
 };
 
 /// samples: of ascending times. A value is at the end of the range if it is the largest of all axes
 /// and stays there for two samples or more. That is asked of ranges from 2 rad/s and 15 m/s^2 on
 /// only, which are narrower than any in use: below it, a still sensor with few bits looks the same.
 ImuHealth imu_health(std::span<const ImuSample> samples);
+
+/// For an IMU that nothing is known of: twice the white noise of one as in phones and cheap cameras
+/// (Bosch BMI160 data sheet: 0.007 deg/s/sqrt(Hz) and 180 ug/sqrt(Hz)), for vibration, scale and
+/// misalignment, and the random walks of the Analog Devices ADIS16448 of EuRoC (Burri et al. 2016),
+/// which hold what temperature does.
+ImuNoise default_imu_noise();
 
 }  // namespace waymark

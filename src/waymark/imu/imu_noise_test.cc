@@ -1,10 +1,9 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/imu/imu_noise.h"
-
 #include <gtest/gtest.h>
 
 #include "waymark/base/rng.h"
+#include "waymark/imu/imu_health.h"
 #include "waymark/imu/testing/imu_motion.h"
 
 namespace waymark {
@@ -19,7 +18,7 @@ TEST(ImuNoise, OfARestIsThatOfTheSensor) {
     Rng rng(1, 0);
     const ImuSamples samples =
         testing::simulated_samples({}, 0.0, 8.0, rate, truth, kRestBiases, kRestGravity, rng);
-    const auto found = estimate_imu_noise(samples);
+    const auto found = imu_health(samples.all()).noise;
     ASSERT_TRUE(found);
     EXPECT_NEAR(found->gyroscope / truth.gyroscope, 1.05, 0.12) << rate;
     EXPECT_NEAR(found->accelerometer / truth.accelerometer, 1.05, 0.12) << rate;
@@ -39,7 +38,7 @@ TEST(ImuNoise, IsNotHiddenByAFilter) {
     sample.acceleration = 0.6 * last.acceleration + 0.4 * sample.acceleration;
     smooth.add(last = sample);
   }
-  const auto found = estimate_imu_noise(smooth);
+  const auto found = imu_health(smooth.all()).noise;
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->gyroscope / truth.gyroscope, 1.0, 0.2);
   EXPECT_NEAR(found->accelerometer / truth.accelerometer, 1.0, 0.2);
@@ -51,11 +50,11 @@ TEST(ImuNoise, ComesFromTheRestAloneAndNotFromMotion) {
   const testing::ImuMotion motion = testing::hand_held_motion(rng);
   ImuSamples moving =
       testing::simulated_samples(motion, 0.0, 10.0, 200.0, truth, kRestBiases, kRestGravity, rng);
-  EXPECT_FALSE(estimate_imu_noise(moving));
+  EXPECT_FALSE(imu_health(moving.all()).noise);
   const ImuSamples rest =
       testing::simulated_samples({}, 10.5, 18.0, 200.0, truth, kRestBiases, kRestGravity, rng);
   for (const ImuSample& sample : rest.all()) moving.add(sample);
-  const auto found = estimate_imu_noise(moving);
+  const auto found = imu_health(moving.all()).noise;
   ASSERT_TRUE(found);
   EXPECT_NEAR(found->gyroscope / truth.gyroscope, 1.05, 0.15);
   EXPECT_NEAR(found->accelerometer / truth.accelerometer, 1.05, 0.15);
@@ -65,11 +64,11 @@ TEST(ImuNoise, OfAConstantOutputIsNotZero) {
   Rng rng(4, 0);
   const ImuSamples samples =
       testing::simulated_samples({}, 0.0, 8.0, 200.0, {}, kRestBiases, kRestGravity, rng);
-  const auto found = estimate_imu_noise(samples);
+  const auto found = imu_health(samples.all()).noise;
   ASSERT_TRUE(found);
   EXPECT_GT(found->gyroscope, 0.0);
   EXPECT_GT(found->accelerometer, 0.0);
-  EXPECT_FALSE(estimate_imu_noise(ImuSamples()));
+  EXPECT_FALSE(imu_health({}).noise);
 }
 
 }  // namespace

@@ -30,31 +30,25 @@ InertialState state_after(const InertialState& first,
 
 }  // namespace
 
-InertialEstimate predict(const InertialEstimate& first,
-                         const Preintegration& preintegration,
-                         const InertialSetup& setup) {
-  WAYMARK_CHECK(setup.time_shift_change_s == 0.0);
-  InertialEstimate second;
-  second.state = state_after(first.state, preintegration, setup);
-  // The whitened residual of both has unit covariance: by_first * e_1 + by_second * e_2 = n.
-  const InertialResidual residual =
-      inertial_residual(preintegration, first.state, second.state, setup);
-  const Matrix15d inverse = residual.by_second.inverse();
-  const Matrix15d by_first = inverse * residual.by_first;
-  second.covariance =
-      by_first * first.covariance * by_first.transpose() + inverse * inverse.transpose();
-  return second;
-}
-
 std::optional<InertialEstimate> predict(const InertialEstimate& first,
                                         const ImuSamples& samples,
                                         std::int64_t begin_ns,
                                         std::int64_t end_ns,
                                         const ImuNoise& noise,
                                         const InertialSetup& setup) {
+  WAYMARK_CHECK(setup.time_shift_change_s == 0.0);
   ImuSpan span = samples.between(begin_ns, end_ns);
   if (span.coverage != ImuCoverage::kWhole) return std::nullopt;
-  return predict(first, Preintegration(std::move(span.samples), noise, first.state.biases), setup);
+  const Preintegration measured(std::move(span.samples), noise, first.state.biases);
+  InertialEstimate second;
+  second.state = state_after(first.state, measured, setup);
+  // The whitened residual of both has unit covariance: by_first * e_1 + by_second * e_2 = n.
+  const InertialResidual residual = inertial_residual(measured, first.state, second.state, setup);
+  const Matrix15d inverse = residual.by_second.inverse();
+  const Matrix15d by_first = inverse * residual.by_first;
+  second.covariance =
+      by_first * first.covariance * by_first.transpose() + inverse * inverse.transpose();
+  return second;
 }
 
 }  // namespace waymark

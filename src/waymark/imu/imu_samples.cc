@@ -12,12 +12,9 @@ namespace {
 
 /// The median of so many periods is not moved by gaps among them; it is updated as often.
 constexpr std::size_t kNumPeriods = 100;
+constexpr double kMaxGapPeriods = 5.0;
 
 }  // namespace
-
-ImuSamples::ImuSamples(double max_gap_periods) : max_gap_periods_(max_gap_periods) {
-  WAYMARK_CHECK(max_gap_periods > 1.0);
-}
 
 bool ImuSamples::add(const ImuSample& sample) {
   const bool is_late = !samples_.empty() && sample.timestamp_ns <= samples_.back().timestamp_ns;
@@ -49,7 +46,7 @@ std::size_t ImuSamples::first_from(std::int64_t timestamp_ns) const {
 
 bool ImuSamples::is_gap(std::size_t after) const {
   const std::int64_t period = samples_[after].timestamp_ns - samples_[after - 1].timestamp_ns;
-  return static_cast<double>(period) > max_gap_periods_ * static_cast<double>(period_ns_);
+  return static_cast<double>(period) > kMaxGapPeriods * static_cast<double>(period_ns_);
 }
 
 ImuCoverage ImuSamples::coverage(std::int64_t begin_ns, std::int64_t end_ns) const {
@@ -78,13 +75,8 @@ ImuSample ImuSamples::interpolate(std::size_t after, std::int64_t timestamp_ns) 
 }
 
 std::optional<ImuSample> ImuSamples::at(std::int64_t timestamp_ns) const {
-  if (samples_.empty() || timestamp_ns < samples_.front().timestamp_ns ||
-      timestamp_ns > samples_.back().timestamp_ns) {
-    return std::nullopt;
-  }
-  const std::size_t after = first_from(timestamp_ns);
-  if (samples_[after].timestamp_ns != timestamp_ns && is_gap(after)) return std::nullopt;
-  return interpolate(after, timestamp_ns);
+  if (coverage(timestamp_ns, timestamp_ns) != ImuCoverage::kWhole) return std::nullopt;
+  return interpolate(first_from(timestamp_ns), timestamp_ns);
 }
 
 ImuSpan ImuSamples::between(std::int64_t begin_ns, std::int64_t end_ns) const {

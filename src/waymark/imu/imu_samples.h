@@ -25,12 +25,10 @@ struct ImuSpan {
   std::vector<ImuSample> samples;  ///< At least two, of ascending times, if the coverage is whole.
 };
 
-/// A stream of samples in the order of time.
+/// A stream of samples in the order of time. Nothing is told across a gap, which is longer than
+/// five median periods.
 class ImuSamples {
  public:
-  /// A gap is longer than max_gap_periods (> 1) median periods: nothing is told across it.
-  explicit ImuSamples(double max_gap_periods = 5.0);
-
   /// Appends a sample, unless it is not later than the last one or not finite: returns whether it
   /// was taken. Such samples are counted and left out.
   bool add(const ImuSample& sample);
@@ -56,7 +54,6 @@ class ImuSamples {
   ImuSample interpolate(std::size_t after, std::int64_t timestamp_ns) const;
   void update_period();
 
-  double max_gap_periods_;
   std::vector<ImuSample> samples_;
   std::int64_t period_ns_ = 0;
   std::size_t num_rejected_ = 0;

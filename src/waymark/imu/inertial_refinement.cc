@@ -1,14 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/imu/inertial_refinement.h"
-
 #include <Eigen/Cholesky>
 #include <cmath>
 #include <limits>
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/geometry/rigid3.h"
+#include "waymark/imu/start_steps.h"
 #include "waymark/solver/levenberg_marquardt.h"
 
 namespace waymark {
@@ -69,37 +67,34 @@ struct UnknownsEquations {
   }
 };
 
-struct RefinementProblem {
-  std::span<const VisionPose> poses;
-  const PreintegrationChain& chain;
-  const InertialBelief& belief;
-  const InertialStartOptions& options;
-};
-
-void add_setup_priors(const RefinementProblem& problem,
-                      const InertialUnknowns& unknowns,
+void add_setup_priors(const StartProblem& problem,
+                      const PreintegrationChain& chain,
+                      const InertialSetup& setup,
+                      double log_scale_sigma,
                       UnknownsEquations& equations) {
-  const InertialSetup& setup = unknowns.setup;
-  const InertialBelief& belief = problem.belief;
-  equations.add_prior(
-      2, Eigen::VectorXd::Constant(1, setup.log_scale - belief.log_scale), belief.log_scale_sigma);
+  const InertialStartOptions& options = problem.options;
+  const auto one = [](double error) { return Eigen::VectorXd::Constant(1, error); };
+  equations.add_prior(2, one(setup.log_scale - options.log_scale), log_scale_sigma);
   // Steps move the lever arm by -R^T; its standard deviation is the same for all axes.
+  const Rigid3 believed = problem.imu_from_rig();
+  const Eigen::Quaterniond& rotation = setup.imu_from_rig.rotation;
   const Eigen::Vector3d lever_arm =
-      setup.imu_from_rig.origin_in_source() - belief.imu_from_rig.origin_in_source();
-  equations.add_prior(3, -(setup.imu_from_rig.rotation * lever_arm), belief.lever_arm_sigma);
-  equations.add_prior(
-      6,
-      so3_log(setup.imu_from_rig.rotation * belief.imu_from_rig.rotation.conjugate()),
-      belief.rotation_sigma);
-  equations.add_prior(
-      9,
-      Eigen::VectorXd::Constant(1, setup.time_shift_change_s - belief.time_shift_change_s),
-      belief.time_shift_sigma_s);
+      setup.imu_from_rig.origin_in_source() - believed.origin_in_source();
+  equations.add_prior(3, -(rotation * lever_arm), problem.lever_arm_sigma());
+  equations.add_prior(6,
+                      so3_log(rotation * believed.rotation.conjugate()),
+                      problem.calibration.imu_from_rig ? options.told_rotation_sigma : M_PI);
+  const auto& told_shift = problem.calibration.time_shift_s;
+  const double time_shift_s = chain.time_shift_s + setup.time_shift_change_s;
+  equations.add_prior(9,
+                      one(time_shift_s - told_shift.value_or(0.0)),
+                      told_shift ? options.told_time_shift_sigma_s : options.time_shift_sigma_s);
 }
 
 /// Poses by vision. Their errors are small, so that those of tangent vectors are those of steps.
 /// Biases are new where samples are missing before a pose.
-void add_state_priors(const RefinementProblem& problem,
+void add_state_priors(const StartProblem& problem,
+                      const PreintegrationChain& chain,
                       const InertialUnknowns& unknowns,
                       UnknownsEquations& equations) {
   for (std::size_t i = 0; i < problem.poses.size(); ++i) {
@@ -109,24 +104,27 @@ void add_state_priors(const RefinementProblem& problem,
     equations.add_prior(at, error.head<3>(), problem.options.pose_position_sigma);
     equations.add_prior(at + 3, error.tail<3>(), problem.options.pose_rotation_sigma);
     equations.add_prior(at + 6, unknowns.states[i].velocity, kAnySpeed);
-    if (i > 0 && problem.chain[i - 1]) continue;
+    if (i > 0 && chain.intervals[i - 1]) continue;
     const ImuBiases& biases = unknowns.states[i].biases;
     equations.add_prior(at + 9, biases.gyroscope, problem.options.gyroscope_bias_sigma);
     equations.add_prior(at + 12, biases.accelerometer, problem.options.accelerometer_bias_sigma);
   }
 }
 
-UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
+UnknownsEquations linearize_unknowns(const StartProblem& problem,
+                                     const PreintegrationChain& chain,
+                                     double log_scale_sigma,
                                      const InertialUnknowns& unknowns) {
   UnknownsEquations equations(10 + 15 * static_cast<Eigen::Index>(unknowns.states.size()));
-  add_setup_priors(problem, unknowns, equations);
-  add_state_priors(problem, unknowns, equations);
+  add_setup_priors(problem, chain, unknowns.setup, log_scale_sigma, equations);
+  add_state_priors(problem, chain, unknowns, equations);
   Eigen::Matrix<double, 15, 30> by_states;
-  for (std::size_t i = 0; i < problem.chain.size(); ++i) {
-    if (!problem.chain[i]) continue;
+  for (std::size_t i = 0; i < chain.intervals.size(); ++i) {
+    if (!chain.intervals[i]) continue;
     const InertialState& first = unknowns.states[i];
     const InertialState& second = unknowns.states[i + 1];
-    InertialResidual residual = inertial_residual(*problem.chain[i], first, second, unknowns.setup);
+    InertialResidual residual =
+        inertial_residual(*chain.intervals[i], first, second, unknowns.setup);
     residual.by_setup.col(2) += residual.by_first.middleCols<3>(6) * first.velocity +
                                 residual.by_second.middleCols<3>(6) * second.velocity;
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
@@ -144,49 +142,43 @@ UnknownsEquations linearize_unknowns(const RefinementProblem& problem,
   return equations;
 }
 
-/// Covariance and determinant of the last equations; none where rounding has left them singular.
-void judge(const Eigen::MatrixXd& hessian, InertialRefinement& refined) {
-  const Eigen::Index size = hessian.rows();
-  Eigen::MatrixXd units = Eigen::MatrixXd::Zero(size, 25);
-  units.topLeftCorner<10, 10>().setIdentity();
-  units.bottomRightCorner<15, 15>().setIdentity();
+/// Of the setup and the last state, by the last equations; none where rounding has left them
+/// singular.
+Matrix25d covariance_of(const Eigen::MatrixXd& hessian, const Eigen::Vector3d& last_velocity) {
   const Eigen::LLT<Eigen::MatrixXd> factor(hessian);
   if (factor.info() != Eigen::Success) {
-    refined.covariance.setConstant(std::numeric_limits<double>::quiet_NaN());
-    refined.log_determinant = std::numeric_limits<double>::infinity();
-    return;
+    return Matrix25d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
+  Eigen::MatrixXd units = Eigen::MatrixXd::Zero(hessian.rows(), 25);
+  units.topLeftCorner<10, 10>().setIdentity();
+  units.bottomRightCorner<15, 15>().setIdentity();
   // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
-  by_step.block<3, 1>(16, 2) = refined.unknowns.states.back().velocity;
+  by_step.block<3, 1>(16, 2) = last_velocity;
   const Matrix25d covariance =
       by_step * (units.transpose() * factor.solve(units)) * by_step.transpose();
-  refined.covariance = 0.5 * (covariance + covariance.transpose());
-  refined.log_determinant = 2.0 * factor.matrixLLT().diagonal().array().log().sum();
+  return 0.5 * (covariance + covariance.transpose());
 }
 
 }  // namespace
 
-InertialRefinement refine_inertial_start(std::span<const VisionPose> poses,
+InertialRefinement refine_inertial_start(const StartProblem& problem,
                                          const PreintegrationChain& chain,
                                          InertialUnknowns unknowns,
-                                         const InertialBelief& belief,
-                                         const InertialStartOptions& options) {
-  WAYMARK_CHECK(unknowns.states.size() == poses.size() && chain.size() + 1 == poses.size());
-  const RefinementProblem problem{poses, chain, belief, options};
+                                         double log_scale_sigma) {
+  WAYMARK_CHECK(unknowns.states.size() == problem.poses.size());
   SteppedUnknowns stepped{{std::move(unknowns)}};
   int num_iterations = 0;
   const UnknownsEquations last = minimize_over_pose(
       stepped,
-      [&](const SteppedUnknowns& at) { return linearize_unknowns(problem, at); },
+      [&](const SteppedUnknowns& at) {
+        return linearize_unknowns(problem, chain, log_scale_sigma, at);
+      },
       kMaxRefinements,
       kNegligibleError,
       num_iterations);
-  InertialRefinement refined;
-  refined.unknowns = std::move(stepped);
-  refined.squared_error = last.cost;
-  judge(last.hessian, refined);
-  return refined;
+  const Matrix25d covariance = covariance_of(last.hessian, stepped.states.back().velocity);
+  return {std::move(stepped), covariance, last.cost};
 }
 
 }  // namespace waymark

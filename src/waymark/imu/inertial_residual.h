@@ -10,9 +10,6 @@
 
 namespace waymark {
 
-/// Acceleration of free fall, m/s^2 (standard gravity, ISO 80000-3). It differs by 0.3 % on Earth.
-inline constexpr double kStandardGravity = 9.80665;
-
 using Vector10d = Eigen::Matrix<double, 10, 1>;
 using Vector15d = Eigen::Matrix<double, 15, 1>;
 using Matrix15x10d = Eigen::Matrix<double, 15, 10>;

@@ -2,14 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/imu/inertial_start.h"
 
+#include <algorithm>
 #include <cmath>
 #include <utility>
 
 #include "waymark/base/check.h"
-#include "waymark/imu/inertial_refinement.h"
-#include "waymark/imu/linear_start.h"
-#include "waymark/imu/rotation_start.h"
-#include "waymark/imu/weak_scale.h"
+#include "waymark/imu/start_steps.h"
 
 namespace waymark {
 namespace {
@@ -18,92 +16,79 @@ namespace {
 constexpr int kMaxCuts = 5;
 /// Smaller changes of the time shift are exact to first order.
 constexpr double kStillShift = 3e-4;
-/// Standard deviation of the logarithm of a scale whose posterior is not taken to be normal.
+/// A scale whose logarithm has a larger standard deviation is not told.
 constexpr double kWeakScale = 0.1;
 
-struct StartProblem {
-  const ImuSamples& samples;
-  std::span<const VisionPose> poses;
-  const ImuCalibration& calibration;
-  const ImuNoise& noise;
-  const InertialStartOptions& options;
-};
-
-/// Nothing in it where samples are missing.
 PreintegrationChain cut_chain(const StartProblem& problem,
                               double time_shift_s,
-                              std::span<const ImuBiases> biases) {
-  PreintegrationChain chain;
+                              std::span<const InertialState> states) {
+  PreintegrationChain chain{time_shift_s, {}};
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * time_shift_s));
   for (std::size_t i = 0; i + 1 < problem.poses.size(); ++i) {
     ImuSpan span = problem.samples.between(problem.poses[i].timestamp_ns + shift_ns,
                                            problem.poses[i + 1].timestamp_ns + shift_ns);
-    chain.emplace_back();
+    chain.intervals.emplace_back();
     if (span.coverage != ImuCoverage::kWhole) continue;
-    chain.back().emplace(std::move(span.samples), problem.noise, biases[i]);
+    chain.intervals.back().emplace(std::move(span.samples), problem.noise, states[i].biases);
   }
   return chain;
 }
 
-bool is_empty(const PreintegrationChain& chain) {
-  for (const auto& one : chain) {
-    if (one) return false;
-  }
-  return true;
-}
-
-InertialBelief belief_before(const StartProblem& problem, const RotationStart& rotation) {
-  const InertialStartOptions& options = problem.options;
-  const auto& told = problem.calibration.imu_from_rig;
-  InertialBelief belief;
-  belief.log_scale = options.log_scale;
-  belief.log_scale_sigma = options.log_scale_sigma;
-  belief.imu_from_rig = told.value_or(Rigid3(rotation.imu_from_rig, Eigen::Vector3d::Zero()));
-  belief.rotation_sigma = told ? options.told_rotation_sigma : M_PI;
-  belief.lever_arm_sigma = told ? options.told_lever_arm_sigma : options.lever_arm_sigma;
-  belief.time_shift_sigma_s = problem.calibration.time_shift_s ? options.told_time_shift_sigma_s
-                                                               : options.time_shift_sigma_s;
-  return belief;
-}
-
 /// What the squared error is in the mean: measured numbers and beliefs without what is fitted.
 double degrees_of_freedom(const PreintegrationChain& chain) {
-  const double num_states = static_cast<double>(chain.size() + 1);
+  const double num_states = static_cast<double>(chain.intervals.size() + 1);
   double freedom = 8.0 - 10.0 + 6.0 - (15.0 - 6.0) * num_states;
-  for (const auto& one : chain) freedom += one ? 15.0 : 6.0;
+  for (const auto& interval : chain.intervals) freedom += interval ? 15.0 : 6.0;
   return freedom;
 }
 
 /// Refines, and cuts and integrates anew until time shift and biases stay. The chain is left as it
-/// was refined with, and the time shift as it was cut at.
-void refine_with_cuts(const StartProblem& problem,
-                      double& time_shift_s,
-                      PreintegrationChain& chain,
-                      InertialBelief& belief,
-                      InertialRefinement& refined) {
-  std::vector<ImuBiases> biases(problem.poses.size());
-  const double told_shift = problem.calibration.time_shift_s.value_or(0.0);
+/// was refined with.
+InertialRefinement refine_with_cuts(const StartProblem& problem,
+                                    InertialUnknowns unknowns,
+                                    PreintegrationChain& chain) {
+  InertialRefinement refined{std::move(unknowns), {}, 0.0};
+  const auto has_samples = [](const auto& interval) { return interval.has_value(); };
   for (int cut = 0; cut < kMaxCuts; ++cut) {
-    belief.time_shift_change_s = told_shift - time_shift_s;
-    refined = refine_inertial_start(
-        problem.poses, chain, std::move(refined.unknowns), belief, problem.options);
+    const double sigma = problem.options.log_scale_sigma;
+    refined = refine_inertial_start(problem, chain, std::move(refined.unknowns), sigma);
     InertialSetup& setup = refined.unknowns.setup;
-    for (std::size_t i = 0; i < biases.size(); ++i) biases[i] = refined.unknowns.states[i].biases;
+    const std::vector<InertialState>& states = refined.unknowns.states;
     if (std::abs(setup.time_shift_change_s) > kStillShift) {
-      const double next_shift = time_shift_s + setup.time_shift_change_s;
-      PreintegrationChain next = cut_chain(problem, next_shift, biases);
-      if (is_empty(next)) return;
+      PreintegrationChain next =
+          cut_chain(problem, chain.time_shift_s + setup.time_shift_change_s, states);
+      if (std::ranges::none_of(next.intervals, has_samples)) return refined;
       chain = std::move(next);
-      time_shift_s = next_shift;
       setup.time_shift_change_s = 0.0;
       continue;
     }
     bool is_integrated_anew = false;
-    for (std::size_t i = 0; i < chain.size(); ++i) {
-      if (chain[i] && chain[i]->reintegrate_if_far(biases[i])) is_integrated_anew = true;
+    for (std::size_t i = 0; i < chain.intervals.size(); ++i) {
+      auto& interval = chain.intervals[i];
+      if (interval && interval->reintegrate_if_far(states[i].biases)) is_integrated_anew = true;
     }
-    if (!is_integrated_anew) return;
+    if (!is_integrated_anew) break;
   }
+  return refined;
+}
+
+/// Where motion hardly tells the scale, the joint maximum is no estimate: the smaller the scale,
+/// the less vision says in metres, and the better any noise fits (Neyman and Scott 1948). So it is
+/// what was believed before, as sure as that, and all else follows it to first order.
+InertialRefinement refine_at_believed_scale(const StartProblem& problem,
+                                            const PreintegrationChain& chain,
+                                            InertialUnknowns unknowns) {
+  constexpr double kHeldSigma = 1e-4;
+  const double growth = std::exp(problem.options.log_scale - unknowns.setup.log_scale);
+  for (InertialState& state : unknowns.states) state.velocity *= growth;
+  unknowns.setup.log_scale = problem.options.log_scale;
+  InertialRefinement refined =
+      refine_inertial_start(problem, chain, std::move(unknowns), kHeldSigma);
+  const double held = refined.covariance(2, 2);
+  const double variance = problem.options.log_scale_sigma * problem.options.log_scale_sigma;
+  const Eigen::Matrix<double, 25, 1> by_scale = refined.covariance.col(2) / held;
+  refined.covariance += (variance - held) * by_scale * by_scale.transpose();
+  return refined;
 }
 
 }  // namespace
@@ -117,26 +102,23 @@ std::optional<InertialStart> start_inertial(const ImuSamples& samples,
     WAYMARK_CHECK(poses[i - 1].timestamp_ns < poses[i].timestamp_ns);
   }
   const StartProblem problem{samples, poses, calibration, noise, options};
-  const auto rotation = rotation_start(samples, poses, calibration, noise, options);
+  const std::optional<RotationStart> rotation = rotation_start(problem);
   if (!rotation) return std::nullopt;
-  InertialStart start;
-  start.time_shift_s = rotation->time_shift_s;
-  std::vector<ImuBiases> biases(poses.size(), {rotation->gyroscope_bias, Eigen::Vector3d::Zero()});
-  PreintegrationChain chain = cut_chain(problem, start.time_shift_s, biases);
-  if (is_empty(chain)) return std::nullopt;
-  InertialBelief belief = belief_before(problem, *rotation);
-  InertialRefinement refined;
-  refined.unknowns =
-      linear_start(poses, chain, belief.imu_from_rig, belief.lever_arm_sigma, options);
-  for (InertialState& state : refined.unknowns.states) {
-    state.biases.gyroscope = rotation->gyroscope_bias;
-  }
-  refine_with_cuts(problem, start.time_shift_s, chain, belief, refined);
+  InertialState still;
+  still.biases.gyroscope = rotation->gyroscope_bias;
+  PreintegrationChain chain =
+      cut_chain(problem, rotation->time_shift_s, std::vector(poses.size(), still));
+  InertialRefinement refined =
+      refine_with_cuts(problem, linear_start(problem, chain, *rotation), chain);
   if (std::sqrt(refined.covariance(2, 2)) > kWeakScale) {
-    refined = refine_weak_scale(poses, chain, std::move(refined.unknowns), belief, options);
+    const double squared_error = refined.squared_error;
+    refined = refine_at_believed_scale(problem, chain, std::move(refined.unknowns));
+    refined.squared_error = squared_error;
   }
   if (!refined.covariance.allFinite()) return std::nullopt;
-  start.time_shift_s += std::exchange(refined.unknowns.setup.time_shift_change_s, 0.0);
+  InertialStart start;
+  start.time_shift_s =
+      chain.time_shift_s + std::exchange(refined.unknowns.setup.time_shift_change_s, 0.0);
   start.setup = refined.unknowns.setup;
   start.states = std::move(refined.unknowns.states);
   start.covariance = refined.covariance;

@@ -51,7 +51,7 @@ struct InertialStart {
   /// Of the tangent vectors of (setup 10, last state 15). What cannot be told has about the
   /// standard deviation that was believed before; a rotation of imu_from_rig that was not told, pi.
   Matrix25d covariance;
-  double squared_error = 0.0;       ///< In standard deviations.
+  double squared_error = 0.0;       ///< In standard deviations; at the scale that fits best.
   double degrees_of_freedom = 0.0;  ///< What squared_error is in the mean.
 
   /// Standard deviation of a component of the tangent vector.
@@ -60,8 +60,9 @@ struct InertialStart {
 
 /// Finds gravity, scale, velocities, biases, and what is not told of the calibration, from poses in
 /// the order of time (a few dozen, .1 to 1 s apart) and the samples around them. No motion is asked
-/// for: what it does not tell has a large standard deviation. Three steps: rotation_start,
-/// linear_start, refine_inertial_start. Nothing if no two neighbouring poses have all samples
+/// for: what it does not tell has a large standard deviation; a scale that is not told to 10 % is
+/// the one believed before, as sure as that. Three steps: rotation_start, linear_start,
+/// refine_inertial_start. Nothing if no two neighbouring poses have all samples
 /// between.
 std::optional<InertialStart> start_inertial(const ImuSamples& samples,
                                             std::span<const VisionPose> poses,

@@ -12,7 +12,7 @@
 
 #include "waymark/base/rng.h"
 #include "waymark/geometry/bearing.h"
-#include "waymark/imu/rotation_start.h"
+#include "waymark/imu/start_steps.h"
 #include "waymark/imu/testing/imu_motion.h"
 
 namespace waymark {
@@ -267,14 +267,14 @@ TEST(InertialStart, OutliersAmongTurnsDoNotSpoilTheMounting) {
   Rng rng(10, 0);
   StartScene scene(testing::hand_held_motion, {false, true}, rng);
   const auto found =
-      rotation_start(scene.samples, scene.poses, scene.calibration, kStartNoise, scene.options);
+      rotation_start({scene.samples, scene.poses, scene.calibration, kStartNoise, scene.options});
   ASSERT_TRUE(found);
   EXPECT_LT(found->imu_from_rig.angularDistance(scene.setup.imu_from_rig.rotation), 0.005);
   EXPECT_LT((found->gyroscope_bias - scene.biases.gyroscope).norm(), 0.003);
   Rigid3& wrong = scene.poses[5].rig_from_world;
   wrong.rotation = so3_exp({0.2, -0.1, 0.1}) * wrong.rotation;
   const auto robust =
-      rotation_start(scene.samples, scene.poses, scene.calibration, kStartNoise, scene.options);
+      rotation_start({scene.samples, scene.poses, scene.calibration, kStartNoise, scene.options});
   ASSERT_TRUE(robust);
   EXPECT_LT(robust->imu_from_rig.angularDistance(scene.setup.imu_from_rig.rotation), 0.03);
 }

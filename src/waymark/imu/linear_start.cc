@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/imu/linear_start.h"
-
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <cmath>
 
 #include "waymark/base/check.h"
+#include "waymark/imu/start_steps.h"
 
 namespace waymark {
 namespace {
@@ -43,26 +42,19 @@ struct LinearEquations {
   }
 };
 
-struct LinearProblem {
-  std::span<const VisionPose> poses;
-  const PreintegrationChain& chain;
-  const Rigid3& imu_from_rig;
-  double lever_arm_sigma;
-  const InertialStartOptions& options;
-};
-
 /// Adds how velocity and position changed between a pose and the next.
-void add_interval(const LinearProblem& problem,
+void add_interval(const StartProblem& problem,
+                  const Preintegration& measured,
+                  const RotationStart& rotation,
                   std::size_t i,
                   double scale,
                   LinearEquations& equations) {
-  const Preintegration& measured = *problem.chain[i];
   const Rigid3& first = problem.poses[i].rig_from_world;
   const Rigid3& second = problem.poses[i + 1].rig_from_world;
   const double t = measured.duration_s();
   const Eigen::Matrix3d world_from_rig = first.rotation_matrix().transpose();
   const Eigen::Matrix3d world_from_imu =
-      world_from_rig * problem.imu_from_rig.rotation_matrix().transpose();
+      world_from_rig * rotation.imu_from_rig.toRotationMatrix().transpose();
   const Eigen::Matrix3d one = Eigen::Matrix3d::Identity();
   const auto velocity_at = kVelocities + 3 * static_cast<Eigen::Index>(i);
   // A pose that is turned wrongly turns what pushes against gravity.
@@ -92,21 +84,24 @@ void add_interval(const LinearProblem& problem,
 }
 
 /// down: the direction of gravity as far as it is known, or 0.
-Eigen::VectorXd solve_linear(const LinearProblem& problem,
+Eigen::VectorXd solve_linear(const StartProblem& problem,
+                             const PreintegrationChain& chain,
+                             const RotationStart& rotation,
                              double scale,
                              const Eigen::Vector3d& down) {
   const InertialStartOptions& options = problem.options;
   const auto size = kVelocities + 3 * static_cast<Eigen::Index>(problem.poses.size());
   LinearEquations equations(size);
-  for (std::size_t i = 0; i < problem.chain.size(); ++i) {
-    if (problem.chain[i]) add_interval(problem, i, scale, equations);
+  for (std::size_t i = 0; i < chain.intervals.size(); ++i) {
+    const auto& measured = chain.intervals[i];
+    if (measured) add_interval(problem, *measured, rotation, i, scale, equations);
   }
   const double believed = std::exp(options.log_scale);
   equations.add_prior(kScale, believed, kAnyScale * believed);
-  const Eigen::Vector3d lever_arm = problem.imu_from_rig.origin_in_source();
+  const Eigen::Vector3d lever_arm = problem.imu_from_rig().origin_in_source();
   for (Eigen::Index i = 0; i < 3; ++i) {
     equations.add_prior(kGravity + i, 0.0, 10.0 * options.gravity);
-    equations.add_prior(kLeverArm + i, lever_arm[i], problem.lever_arm_sigma);
+    equations.add_prior(kLeverArm + i, lever_arm[i], problem.lever_arm_sigma());
     equations.add_prior(kBias + i, 0.0, options.accelerometer_bias_sigma);
   }
   for (Eigen::Index i = kVelocities; i < size; ++i) equations.add_prior(i, 0.0, kAnyVelocity);
@@ -118,33 +113,30 @@ Eigen::VectorXd solve_linear(const LinearProblem& problem,
 
 }  // namespace
 
-InertialUnknowns linear_start(std::span<const VisionPose> poses,
+InertialUnknowns linear_start(const StartProblem& problem,
                               const PreintegrationChain& chain,
-                              const Rigid3& imu_from_rig,
-                              double lever_arm_sigma,
-                              const InertialStartOptions& options) {
-  WAYMARK_CHECK(chain.size() + 1 == poses.size());
-  const LinearProblem problem{poses, chain, imu_from_rig, lever_arm_sigma, options};
-  const double believed = std::exp(options.log_scale);
+                              const RotationStart& rotation) {
+  WAYMARK_CHECK(chain.intervals.size() + 1 == problem.poses.size());
+  const double believed = std::exp(problem.options.log_scale);
   double scale = believed;
   Eigen::Vector3d down = Eigen::Vector3d::Zero();
   Eigen::VectorXd found;
   for (int round = 0; round < kLinearRounds; ++round) {
-    found = solve_linear(problem, scale, down);
+    found = solve_linear(problem, chain, rotation, scale, down);
     scale = std::max(found[kScale], kLeastScale * believed);
     down = found.segment<3>(kGravity).normalized();
   }
   InertialUnknowns unknowns;
-  unknowns.setup.gravity = options.gravity * down;
+  unknowns.setup.gravity = problem.options.gravity * down;
   unknowns.setup.log_scale = std::log(scale);
-  unknowns.setup.imu_from_rig = {imu_from_rig.rotation,
-                                 -(imu_from_rig.rotation * found.segment<3>(kLeverArm))};
-  for (std::size_t i = 0; i < poses.size(); ++i) {
-    InertialState state;
-    state.rig_from_world = poses[i].rig_from_world;
-    state.velocity = found.segment<3>(kVelocities + 3 * static_cast<Eigen::Index>(i));
-    state.biases.accelerometer = found.segment<3>(kBias);
-    unknowns.states.push_back(state);
+  unknowns.setup.imu_from_rig = {rotation.imu_from_rig,
+                                 -(rotation.imu_from_rig * found.segment<3>(kLeverArm))};
+  Eigen::Index at = kVelocities;
+  for (const VisionPose& pose : problem.poses) {
+    unknowns.states.push_back({pose.rig_from_world,
+                               found.segment<3>(at),
+                               {rotation.gyroscope_bias, found.segment<3>(kBias)}});
+    at += 3;
   }
   return unknowns;
 }

@@ -1,16 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/imu/rotation_start.h"
-
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <vector>
 
-#include "waymark/base/check.h"
 #include "waymark/geometry/alignment.h"
-#include "waymark/geometry/rigid3.h"
 #include "waymark/geometry/robust_loss.h"
+#include "waymark/imu/start_steps.h"
 
 namespace waymark {
 namespace {
@@ -66,15 +62,7 @@ struct TurnFit {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-struct RotationProblem {
-  const ImuSamples& samples;
-  std::span<const VisionPose> poses;
-  const ImuCalibration& calibration;
-  const ImuNoise& noise;
-  const InertialStartOptions& options;
-};
-
-TurnRates turn_rates(const RotationProblem& problem, const OrientationTrack& track, double shift) {
+TurnRates turn_rates(const StartProblem& problem, const OrientationTrack& track, double shift) {
   TurnRates rates;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * shift));
   for (std::size_t i = 1; i < problem.poses.size(); ++i) {
@@ -120,7 +108,7 @@ Eigen::Matrix3d align_rates(const TurnRates& rates, std::span<const double> weig
 }
 
 /// known_bias is in the rates already; the fit's is what is left of it.
-TurnFit fit_turns(const RotationProblem& problem,
+TurnFit fit_turns(const StartProblem& problem,
                   const TurnRates& rates,
                   const Eigen::Vector3d& known_bias) {
   TurnFit fit;
@@ -151,7 +139,7 @@ TurnFit fit_turns(const RotationProblem& problem,
 }
 
 /// The time shift of the least cost: on a grid, then by the parabola through it and its neighbours.
-double best_time_shift(const RotationProblem& problem,
+double best_time_shift(const StartProblem& problem,
                        const OrientationTrack& track,
                        const Eigen::Vector3d& bias) {
   const double sigma = problem.options.time_shift_sigma_s;
@@ -175,19 +163,14 @@ double best_time_shift(const RotationProblem& problem,
 
 }  // namespace
 
-std::optional<RotationStart> rotation_start(const ImuSamples& samples,
-                                            std::span<const VisionPose> poses,
-                                            const ImuCalibration& calibration,
-                                            const ImuNoise& noise,
-                                            const InertialStartOptions& options) {
-  if (samples.all().empty() || poses.size() < 2) return std::nullopt;
-  const RotationProblem problem{samples, poses, calibration, noise, options};
+std::optional<RotationStart> rotation_start(const StartProblem& problem) {
+  if (problem.samples.all().empty() || problem.poses.size() < 2) return std::nullopt;
   RotationStart start;
   for (int round = 0; round < kRounds; ++round) {
-    const OrientationTrack track(samples.all(), start.gyroscope_bias);
-    start.time_shift_s = calibration.time_shift_s
-                             ? *calibration.time_shift_s
-                             : best_time_shift(problem, track, start.gyroscope_bias);
+    const OrientationTrack track(problem.samples.all(), start.gyroscope_bias);
+    const auto& told_shift = problem.calibration.time_shift_s;
+    start.time_shift_s =
+        told_shift ? *told_shift : best_time_shift(problem, track, start.gyroscope_bias);
     const TurnFit fit =
         fit_turns(problem, turn_rates(problem, track, start.time_shift_s), start.gyroscope_bias);
     if (!std::isfinite(fit.cost)) return std::nullopt;
