@@ -13,7 +13,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/input/gopro_imu.h"
-#include "waymark/input/imu_csv.h"
+#include "waymark/input/imu_table.h"
 
 namespace {
 
@@ -33,11 +33,7 @@ void read_telemetry_twice(const std::string& payload) {
 
 void read_table(const std::string& text, const std::string& name) {
   ImuTable table = parse_imu_table(text, name);
-  ImuStream stream;
-  stream.source = name;
-  stream.samples = merge_imu(table.gyroscope, std::move(table.accelerometer));
-  sort_samples(stream);
-  check(stream);
+  check(merge_imu(table.gyroscope, std::move(table.accelerometer), name));
 }
 
 }  // namespace

@@ -6,12 +6,10 @@
 
 #include <algorithm>
 #include <map>
-#include <utility>
 #include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/imu_merge.h"
 
 namespace waymark {
 namespace {
@@ -20,7 +18,6 @@ namespace {
 struct ImuTopic {
   std::vector<SensorReading> gyroscope;
   std::vector<SensorReading> accelerometer;
-  std::vector<ImuSample> samples;  ///< Of messages with both.
 };
 
 std::map<std::uint32_t, ImuTopic> read_topics(
@@ -34,7 +31,6 @@ std::map<std::uint32_t, ImuTopic> read_topics(
     ImuTopic& topic = topics[imu.message.topic];
     const bool has_turn = imu.measured.has_angular_velocity && !turn.isZero(0.0);
     const bool has_push = imu.measured.has_linear_acceleration && !push.isZero(0.0);
-    if (has_turn && has_push) topic.samples.push_back({time_ns, turn, push});
     if (has_turn) topic.gyroscope.push_back({time_ns, turn});
     if (has_push) topic.accelerometer.push_back({time_ns, push});
   }
@@ -46,42 +42,37 @@ std::map<std::uint32_t, ImuTopic> read_topics(
 std::optional<ImuStream> imu_of_bag(const Bag& bag,
                                     const std::function<std::int64_t(const BagMessage&)>& time_of) {
   const BagContent& content = bag.content();
-  std::map<std::uint32_t, ImuTopic> topics = read_topics(content, time_of);
   const auto listed = std::ranges::find_if(content.topics, &BagTopic::is_imu);
   if (listed == content.topics.end()) return std::nullopt;
-  const auto fail = [&] {
+  const std::map<std::uint32_t, ImuTopic> topics = read_topics(content, time_of);
+  const auto with_most = [&](auto size) {
+    return std::ranges::max_element(
+        topics, {}, [&](const auto& topic) { return size(topic.second); });
+  };
+  const auto num_turns = [](const ImuTopic& topic) { return topic.gyroscope.size(); };
+  const auto num_pushes = [](const ImuTopic& topic) { return topic.accelerometer.size(); };
+  const auto num_both = [&](const ImuTopic& topic) {
+    return std::min(num_turns(topic), num_pushes(topic));
+  };
+  auto turns = with_most(num_both), pushes = turns;
+  if (turns == topics.end() || num_both(turns->second) < 2) {
+    turns = with_most(num_turns);
+    pushes = with_most(num_pushes);
+  }
+  if (turns == topics.end() || num_turns(turns->second) == 0 || num_pushes(pushes->second) == 0) {
     throw InputError(printable(listed->name),
                      "has no turns and accelerations, expected messages of sensor_msgs/Imu with "
                      "both, or two topics");
-  };
-  if (topics.empty()) fail();
-  const auto most_of = [&](auto part) {
-    return std::ranges::max_element(
-        topics, {}, [&](const auto& topic) { return (topic.second.*part).size(); });
-  };
-  const auto name_of = [&](const auto& topic) {
-    return printable(content.topics[topic->first].name);
-  };
-  ImuStream stream;
-  const auto both = most_of(&ImuTopic::samples);
-  const auto turns = most_of(&ImuTopic::gyroscope);
-  const auto pushes = most_of(&ImuTopic::accelerometer);
-  if (both->second.samples.size() >= 2) {
-    stream.source = name_of(both);
-    stream.samples = std::move(both->second.samples);
-  } else {
-    if (turns->second.gyroscope.empty() || pushes->second.accelerometer.empty()) fail();
-    stream.source = fmt::format("{} and {}", name_of(turns), name_of(pushes));
-    stream.samples = merge_imu(turns->second.gyroscope, std::move(pushes->second.accelerometer));
-    stream.notes.emplace_back("acceleration interpolated at the times of the gyroscope");
   }
+  const auto name_of = [&](std::uint32_t topic) { return printable(content.topics[topic].name); };
+  std::string source = name_of(turns->first);
+  if (pushes != turns) source += " and " + name_of(pushes->first);
+  ImuStream stream = merge_imu(turns->second.gyroscope, pushes->second.accelerometer, source);
   stream.notes.emplace_back("sensor_msgs/Imu: rad/s, m/s^2");
-  for (auto topic = topics.begin(); topic != topics.end(); ++topic) {
-    const std::string name = name_of(topic);
-    if (stream.source.find(name) != std::string::npos) continue;
-    stream.notes.push_back(fmt::format("note: {} is not used", name));
+  for (const auto& [topic, readings] : topics) {
+    if (topic == turns->first || topic == pushes->first) continue;
+    stream.notes.push_back(fmt::format("note: {} is not used", name_of(topic)));
   }
-  sort_samples(stream);
   return stream;
 }
 

@@ -6,7 +6,7 @@
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/imu_calibration.h"
-#include "waymark/input/imu_csv.h"
+#include "waymark/input/imu_table.h"
 
 namespace waymark {
 

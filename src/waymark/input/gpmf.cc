@@ -39,59 +39,18 @@ std::optional<Element> next_element(std::string_view& rest) {
   return element;
 }
 
-/// Bytes of a number; 0: of that type there is none.
-std::size_t size_of_type(char type) {
-  switch (type) {
-    case 'b':
-    case 'B':
-      return 1;
-    case 's':
-    case 'S':
-      return 2;
-    case 'l':
-    case 'L':
-    case 'f':
-    case 'q':
-      return 4;
-    case 'j':
-    case 'J':
-    case 'd':
-    case 'Q':
-      return 8;
-    default:
-      return 0;
-  }
-}
-
-double number_of(char type, std::string_view bytes) {
-  const std::uint64_t value = big_endian(bytes);
-  switch (type) {
-    case 'b':
-      return static_cast<std::int8_t>(value);
-    case 's':
-      return static_cast<std::int16_t>(value);
-    case 'l':
-      return static_cast<std::int32_t>(value);
-    case 'j':
-      return static_cast<double>(static_cast<std::int64_t>(value));
-    case 'f':
-      return std::bit_cast<float>(static_cast<std::uint32_t>(value));
-    case 'd':
-      return std::bit_cast<double>(value);
-    case 'q':
-      return static_cast<std::int32_t>(value) / 65536.0;
-    case 'Q':
-      return static_cast<double>(static_cast<std::int64_t>(value)) / 4294967296.0;
-    default:
-      return static_cast<double>(value);
-  }
-}
-
+/// Nothing of types that no sensor has.
 std::vector<double> numbers_of(const Element& element) {
+  const bool is_short = element.type == 's' || element.type == 'S';
+  const bool is_long = element.type == 'l' || element.type == 'L' || element.type == 'f';
+  const std::size_t size = is_short ? 2 : 4;
   std::vector<double> numbers;
-  const std::size_t size = size_of_type(element.type);
-  for (std::size_t at = 0; size > 0 && at + size <= element.data.size(); at += size) {
-    numbers.push_back(number_of(element.type, element.data.substr(at, size)));
+  for (std::size_t at = 0; (is_short || is_long) && at + size <= element.data.size(); at += size) {
+    const auto bits = static_cast<std::uint32_t>(big_endian(element.data.substr(at, size)));
+    numbers.push_back(element.type == 's'   ? static_cast<std::int16_t>(bits)
+                      : element.type == 'l' ? static_cast<std::int32_t>(bits)
+                      : element.type == 'f' ? std::bit_cast<float>(bits)
+                                            : static_cast<double>(bits));
   }
   return numbers;
 }
@@ -101,66 +60,53 @@ std::string text_of(const Element& element) {
   return std::string(element.data.substr(0, element.data.find('\0')));
 }
 
-class GpmfParser {
- public:
-  void parse(std::string_view rest, const std::string& outer_device, int depth) {
-    std::string device = outer_device;
-    while (const std::optional<Element> element = next_element(rest)) {
-      if (element->type == 0) {
-        if (element->key == "STRM") {
-          take_stream(element->data, device);
-        } else if (depth < kMaxGpmfNesting) {
-          parse(element->data, device, depth + 1);
-        }
-      } else if (element->key == "DVNM") {
-        device = text_of(*element);
-      }
+void take_stream(std::string_view rest,
+                 const std::string& device,
+                 std::vector<GpmfStream>& streams) {
+  GpmfStream stream;
+  stream.device = device;
+  std::vector<double> scales;
+  std::optional<Element> last;
+  while (const std::optional<Element> element = next_element(rest)) {
+    if (element->key == "ORIN") stream.axes = text_of(*element);
+    if (element->key == "SCAL") scales = numbers_of(*element);
+    if (element->key == "TSMP") stream.num_total = big_endian(element->data.substr(0, 8));
+    last = element;
+  }
+  if (!last) return;
+  stream.values = numbers_of(*last);
+  if (stream.values.empty() || last->sample_size == 0) return;
+  stream.key = last->key;
+  const std::size_t num_samples = std::max<std::size_t>(1, last->data.size() / last->sample_size);
+  stream.num_values = std::max<std::size_t>(1, stream.values.size() / num_samples);
+  for (std::size_t i = 0; i < stream.values.size() && !scales.empty(); ++i) {
+    const double scale = scales[std::min(i % stream.num_values, scales.size() - 1)];
+    if (scale != 0.0) stream.values[i] /= scale;
+  }
+  streams.push_back(std::move(stream));
+}
+
+void parse_elements(std::string_view rest,
+                    std::string device,
+                    int depth,
+                    std::vector<GpmfStream>& streams) {
+  while (const std::optional<Element> element = next_element(rest)) {
+    if (element->key == "DVNM") device = text_of(*element);
+    if (element->type != 0) continue;
+    if (element->key == "STRM") {
+      take_stream(element->data, device, streams);
+    } else if (depth < kMaxGpmfNesting) {
+      parse_elements(element->data, device, depth + 1, streams);
     }
   }
-
-  std::vector<GpmfStream> streams;
-
- private:
-  void take_stream(std::string_view rest, const std::string& device) {
-    GpmfStream stream;
-    stream.device = device;
-    std::vector<double> scales;
-    std::optional<Element> last;
-    while (const std::optional<Element> element = next_element(rest)) {
-      if (element->key == "STNM") stream.name = text_of(*element);
-      if (element->key == "SIUN" || element->key == "UNIT") stream.unit = text_of(*element);
-      if (element->key == "ORIN") stream.axes = text_of(*element);
-      if (element->key == "SCAL") scales = numbers_of(*element);
-      const bool has_one = size_of_type(element->type) > 0 && !element->data.empty();
-      if (element->key == "STMP" && has_one)
-        stream.stamp_us = big_endian(element->data.substr(0, 8));
-      if (element->key == "TSMP" && has_one)
-        stream.num_total = big_endian(element->data.substr(0, 8));
-      last = element;
-    }
-    if (!last) return;
-    const std::size_t size = size_of_type(last->type);
-    if (size == 0 || last->sample_size < size) return;
-    stream.key = last->key;
-    stream.num_values = last->sample_size / size;
-    stream.values = numbers_of(*last);
-    for (std::size_t i = 0; i < stream.values.size(); ++i) {
-      const std::size_t of_sample = i % stream.num_values;
-      const double scale = of_sample < scales.size() ? scales[of_sample]
-                           : scales.size() == 1      ? scales[0]
-                                                     : 1.0;
-      if (scale != 0.0) stream.values[i] /= scale;
-    }
-    streams.push_back(std::move(stream));
-  }
-};
+}
 
 }  // namespace
 
 std::vector<GpmfStream> parse_gpmf(std::string_view payload) {
-  GpmfParser parser;
-  parser.parse(payload, {}, 0);
-  return std::move(parser.streams);
+  std::vector<GpmfStream> streams;
+  parse_elements(payload, {}, 0, streams);
+  return streams;
 }
 
 }  // namespace waymark

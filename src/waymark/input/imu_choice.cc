@@ -13,7 +13,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/imu_calibration.h"
-#include "waymark/input/imu_csv.h"
+#include "waymark/input/imu_table.h"
 
 namespace waymark {
 

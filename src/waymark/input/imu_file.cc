@@ -3,41 +3,21 @@
 //
 // Which files the inertial data of a path are in.
 #include <algorithm>
-#include <array>
-#include <optional>
-#include <string>
+#include <iterator>
 #include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/imu_columns.h"
-#include "waymark/input/imu_csv.h"
+#include "waymark/input/imu_table.h"
 
 namespace waymark {
 namespace {
 
-constexpr std::string_view kExpectedTable = "a table of inertial data";
-
-/// In order of preference: the accelerations of Sensor Logger's Accelerometer.csv lack gravity.
-constexpr std::array<std::string_view, 5> kAccelerometerWords = {
-    "totalacceleration", "accelerometer", "acceleration", "accel", "acc"};
-constexpr std::array<std::string_view, 2> kGyroscopeWords = {"gyroscope", "gyro"};
-
 ImuTable read_table(const std::filesystem::path& path) {
-  return parse_imu_table(read_text_file(path, kExpectedTable), path.string());
+  return parse_imu_table(read_text_file(path, "a table of inertial data"), path.string());
 }
 
-/// The rest of the name of a file with one of the words in it, and the word's place in the list.
-template <std::size_t kCount>
-std::optional<std::pair<std::size_t, std::string>> without_word(
-    const std::filesystem::path& path, const std::array<std::string_view, kCount>& words) {
-  std::string stem = lower_case(path.stem().string());
-  for (std::size_t i = 0; i < kCount; ++i) {
-    const std::size_t at = stem.find(words[i]);
-    if (at != std::string::npos) return std::pair(i, stem.erase(at, words[i].size()));
-  }
-  return std::nullopt;
-}
+std::string name_of(const std::filesystem::path& path) { return lower_case(path.stem().string()); }
 
 std::vector<std::filesystem::path> tables_in(const std::filesystem::path& folder) {
   constexpr std::size_t kMaxFiles = 10000;
@@ -52,61 +32,50 @@ std::vector<std::filesystem::path> tables_in(const std::filesystem::path& folder
   return tables;
 }
 
-std::filesystem::path folder_of(const std::filesystem::path& path) {
-  return path.has_parent_path() ? path.parent_path() : ".";
+/// A name without what it says of a sensor.
+std::string without_sensor(std::string name) {
+  for (const std::string_view word :
+       {"total", "acceleration", "accelerometer", "accel", "acc", "gyroscope", "gyro"}) {
+    const std::size_t at = name.find(word);
+    if (at != std::string::npos) name.erase(at, word.size());
+  }
+  return name;
 }
 
 /// The table of the other sensor beside one: its name is the same but for the sensor.
-template <class Own, class Other>
-std::filesystem::path find_partner(const std::filesystem::path& path,
-                                   const Own& own_words,
-                                   const Other& other_words) {
-  const auto own = without_word(path, own_words);
-  std::optional<std::pair<std::size_t, std::filesystem::path>> best;
-  for (const std::filesystem::path& other : tables_in(folder_of(path))) {
-    const auto rest = without_word(other, other_words);
-    if (!own || !rest || rest->second != own->second || other == path) continue;
-    if (!best || rest->first < best->first) best = std::pair(rest->first, other);
+std::filesystem::path find_partner(const std::filesystem::path& path, ImuSensor other) {
+  std::filesystem::path best;
+  const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
+  for (const std::filesystem::path& table : tables_in(folder)) {
+    const std::string name = name_of(table);
+    const bool is_partner =
+        sensor_of_name(name) == other && without_sensor(name) == without_sensor(name_of(path));
+    // The accelerations of Sensor Logger's Accelerometer.csv lack gravity.
+    if (is_partner && (best.empty() || name.find("total") != std::string::npos)) best = table;
   }
-  if (best) return best->second;
+  if (!best.empty()) return best;
   throw InputError(path.string(),
                    "is of one sensor, expected that of the other beside it, as Gyroscope.csv and "
                    "Accelerometer.csv are");
 }
 
-ImuStream stream_of(const std::filesystem::path& path, ImuTable table) {
-  ImuStream stream;
-  stream.source = path.string();
-  std::filesystem::path partner;
-  if (table.accelerometer.empty()) {
-    partner = find_partner(path, kGyroscopeWords, kAccelerometerWords);
+ImuStream stream_of(const std::filesystem::path& path) {
+  ImuTable table = read_table(path);
+  std::string source = path.string();
+  if (table.accelerometer.empty() || table.gyroscope.empty()) {
+    const bool is_turn = table.accelerometer.empty();
+    const auto partner =
+        find_partner(path, is_turn ? ImuSensor::kAccelerometer : ImuSensor::kGyroscope);
     ImuTable other = read_table(partner);
-    table.accelerometer = std::move(other.accelerometer);
-    std::ranges::move(other.notes, std::back_inserter(table.notes));
-  } else if (table.gyroscope.empty()) {
-    partner = find_partner(path, kAccelerometerWords, kGyroscopeWords);
-    ImuTable other = read_table(partner);
-    table.gyroscope = std::move(other.gyroscope);
+    source += " and " + partner.string();
+    (is_turn ? table.accelerometer : table.gyroscope) =
+        std::move(is_turn ? other.accelerometer : other.gyroscope);
     std::ranges::move(other.notes, std::back_inserter(table.notes));
   }
-  if (!partner.empty()) stream.source += " and " + partner.string();
-  const auto is_at_once = [](const SensorReading& a, const SensorReading& b) {
-    return a.timestamp_ns == b.timestamp_ns;
-  };
-  const bool are_at_once = std::ranges::equal(table.gyroscope, table.accelerometer, is_at_once);
-  if (are_at_once) {
-    for (std::size_t i = 0; i < table.gyroscope.size(); ++i) {
-      const SensorReading& turn = table.gyroscope[i];
-      stream.samples.push_back({turn.timestamp_ns, turn.value, table.accelerometer[i].value});
-    }
-  } else {
-    stream.samples = merge_imu(table.gyroscope, std::move(table.accelerometer));
-    table.notes.push_back("acceleration interpolated at the times of the gyroscope");
-  }
-  stream.notes = std::move(table.notes);
+  ImuStream stream = merge_imu(table.gyroscope, std::move(table.accelerometer), source);
+  std::ranges::move(table.notes, std::back_inserter(stream.notes));
   std::ranges::sort(stream.notes);
   stream.notes.erase(std::unique(stream.notes.begin(), stream.notes.end()), stream.notes.end());
-  sort_samples(stream);
   return stream;
 }
 
@@ -114,18 +83,15 @@ std::filesystem::path table_in(const std::filesystem::path& folder) {
   for (const char* name : {"imu0/data.csv", "mav0/imu0/data.csv", "data.csv"}) {
     if (std::filesystem::is_regular_file(folder / name)) return folder / name;
   }
-  std::vector<std::filesystem::path> tables = tables_in(folder);
-  for (const bool is_of_both : {true, false}) {
-    for (const std::filesystem::path& table : tables) {
-      const std::string name = lower_case(table.stem().string());
-      const bool is_turn = name.find("gyr") != std::string::npos;
-      const bool is_imu = name.find("imu") != std::string::npos;
-      const bool is_single = sensor_of_word(name) == ImuSensor::kGyroscope;
-      if (is_of_both ? is_imu || (is_turn && name.find("acc") != std::string::npos) : is_single) {
-        return table;
-      }
-    }
+  std::filesystem::path gyroscope;
+  for (const std::filesystem::path& table : tables_in(folder)) {
+    const std::string name = name_of(table);
+    const bool has_turn = name.find("gyr") != std::string::npos;
+    const bool has_both = has_turn && name.find("acc") != std::string::npos;
+    if (has_both || name.find("imu") != std::string::npos) return table;
+    if (has_turn && gyroscope.empty()) gyroscope = table;
   }
+  if (!gyroscope.empty()) return gyroscope;
   throw InputError(folder.string(),
                    "holds no inertial data by the names of its files, expected imu.csv, "
                    "Gyroscope.csv with TotalAcceleration.csv or Accelerometer.csv, or the like");
@@ -135,8 +101,7 @@ std::filesystem::path table_in(const std::filesystem::path& folder) {
 
 ImuStream read_imu_file(const std::filesystem::path& path) {
   try {
-    const auto table = std::filesystem::is_directory(path) ? table_in(path) : path;
-    return stream_of(table, read_table(table));
+    return stream_of(std::filesystem::is_directory(path) ? table_in(path) : path);
   } catch (const std::filesystem::filesystem_error& error) {
     throw InputError(path.string(),
                      "cannot be read: " + error.code().message() + ", expected the right to");

@@ -10,7 +10,6 @@
 
 #include <cstddef>
 #include <cstdint>
-#include <optional>
 #include <string>
 #include <vector>
 
@@ -33,32 +32,22 @@ struct ImuStream {
 /// More samples are refused: more than two hours at 1 kHz.
 inline constexpr std::size_t kMaxImuSamples = std::size_t{1} << 23;
 
+/// What one sensor of three axes measured at one moment.
+struct SensorReading {
+  std::int64_t timestamp_ns = 0;
+  Eigen::Vector3d value;  ///< rad/s or m/s^2.
+};
+
+/// A stream at the times of the gyroscope, with the acceleration interpolated linearly between the
+/// readings before and after, but across no gap (see ImuSamples). Throws InputError at `source`
+/// where fewer than two samples are left.
+ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
+                    std::vector<SensorReading> accelerometer,
+                    const std::string& source);
+
 /// Sorts the samples by time, leaves double times out, and counts both. Throws InputError at
 /// `source` where fewer than two are left.
 void sort_samples(ImuStream& stream);
-
-/// Time without samples.
-struct ImuGap {
-  std::int64_t start_ns = 0;     ///< Time of the sample before it.
-  std::int64_t duration_ns = 0;  ///< To the next one.
-};
-
-/// Samples in numbers.
-struct ImuStatistics {
-  double rate_hz = 0.0;             ///< By the middle step from sample to sample.
-  double duration_s = 0.0;          ///< From the first to the last sample.
-  std::vector<ImuGap> gaps;         ///< Steps of more than 2.5 middle ones.
-  double mean_acceleration = 0.0;   ///< Mean length, m/s^2.
-  double mean_angular_speed = 0.0;  ///< Mean length, rad/s.
-  double rest_s = 0.0;              ///< How long the IMU was at rest, in pieces of a second.
-  /// White noise of a sample at rest (its standard deviation times the root of the step), per
-  /// axis; nothing where it was never at rest.
-  std::optional<double> gyroscope_noise;      ///< rad/s/sqrt(Hz).
-  std::optional<double> accelerometer_noise;  ///< m/s^2/sqrt(Hz).
-};
-
-/// Of a stream with at least two samples.
-ImuStatistics measure_imu(const ImuStream& stream);
 
 /// What the stream holds, a line each; image_times_ns: of the images beside it, if known.
 std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>& image_times_ns);

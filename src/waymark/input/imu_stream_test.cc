@@ -45,20 +45,31 @@ TEST(ImuStream, SortsAndCounts) {
   EXPECT_THROW(sort_samples(stream), InputError);
 }
 
-TEST(ImuStream, IsMeasured) {
-  ImuStream stream = some_stream(4000);
-  stream.samples.erase(stream.samples.begin() + 3000, stream.samples.begin() + 3010);
-  const ImuStatistics statistics = measure_imu(stream);
-  EXPECT_DOUBLE_EQ(statistics.rate_hz, 200.0);
-  EXPECT_NEAR(statistics.duration_s, 19.995, 1e-9);
-  ASSERT_EQ(statistics.gaps.size(), 1U);
-  EXPECT_EQ(statistics.gaps[0].start_ns, 2999 * kSampleStepNs);
-  EXPECT_EQ(statistics.gaps[0].duration_ns, 11 * kSampleStepNs);
-  EXPECT_NEAR(statistics.mean_acceleration, 9.81, 0.001);
-  EXPECT_NEAR(statistics.rest_s, 10.0, 1.0);
-  ASSERT_TRUE(statistics.gyroscope_noise);
-  EXPECT_NEAR(*statistics.gyroscope_noise, 0.002 / std::sqrt(200.0), 1e-5);
-  EXPECT_NEAR(*statistics.accelerometer_noise, 0.02 / std::sqrt(200.0), 1e-4);
+constexpr std::int64_t kMs = 1'000'000;
+
+TEST(ImuStream, InterpolatesTheAccelerationOfAnotherSensor) {
+  const ImuStream stream = merge_imu(
+      {{5 * kMs, {1, 0, 0}}, {20 * kMs, {2, 0, 0}}, {25 * kMs, {3, 0, 0}}, {41 * kMs, {4, 0, 0}}},
+      {{40 * kMs, {0, 0, 4}}, {10 * kMs, {0, 0, 1}}, {20 * kMs, {0, 0, 2}}, {30 * kMs, {0, 0, 3}}},
+      "a");
+  ASSERT_EQ(stream.samples.size(), 2U) << "nothing is made up before the first and after the last";
+  EXPECT_EQ(stream.samples[0].timestamp_ns, 20 * kMs);
+  EXPECT_DOUBLE_EQ(stream.samples[0].acceleration.z(), 2.0);
+  EXPECT_DOUBLE_EQ(stream.samples[1].acceleration.z(), 2.5);
+  EXPECT_DOUBLE_EQ(stream.samples[1].angular_velocity.x(), 3.0);
+}
+
+TEST(ImuStream, DoesNotBridgeGapsOfAnotherSensor) {
+  std::vector<SensorReading> gyroscope, accelerometer;
+  for (int i = 0; i < 100; ++i) {
+    gyroscope.push_back({i * 5 * kMs, {0, 0, 0}});
+    if (i < 20 || i > 60) accelerometer.push_back({i * 5 * kMs + 1, {0, 0, 9.8}});
+  }
+  EXPECT_EQ(merge_imu(gyroscope, accelerometer, "a").samples.size(), 19U + 38U);
+  EXPECT_THROW(merge_imu(gyroscope, {}, "a"), InputError);
+  EXPECT_THROW(merge_imu({}, accelerometer, "a"), InputError);
+  const std::vector<SensorReading> far = {{0, {0, 0, 0}}, {INT64_MAX, {0, 0, 1}}};
+  EXPECT_EQ(merge_imu(far, far, "a").samples.size(), 2U);
 }
 
 TEST(ImuStream, IsToldOf) {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "waymark/base/text.h"
+#include "waymark/imu/imu_health.h"
 #include "waymark/input/imu_stream.h"
 #include "waymark/input/reading.h"
 
@@ -46,29 +47,28 @@ nlohmann::ordered_json cameras_as_json(const InputInfo& info) {
 }
 
 nlohmann::ordered_json imu_as_json(const ImuStream& stream) {
-  const ImuStatistics statistics = measure_imu(stream);
-  const auto or_null = [](const std::optional<double>& value) {
-    return value ? nlohmann::ordered_json(*value) : nlohmann::ordered_json(nullptr);
-  };
+  const ImuHealth health = imu_health(stream.samples);
   nlohmann::ordered_json json = {{"source", stream.source},
                                  {"samples", stream.samples.size()},
-                                 {"rate_hz", statistics.rate_hz},
-                                 {"duration_s", statistics.duration_s},
-                                 {"mean_acceleration", statistics.mean_acceleration},
-                                 {"mean_angular_speed", statistics.mean_angular_speed},
-                                 {"rest_s", statistics.rest_s},
-                                 {"gyroscope_noise", or_null(statistics.gyroscope_noise)},
-                                 {"accelerometer_noise", or_null(statistics.accelerometer_noise)},
-                                 {"time_shift_s", or_null(stream.calibration.time_shift_s)},
-                                 {"has_mounting", stream.calibration.imu_from_rig.has_value()},
+                                 {"rate_hz", health.rate_hz},
+                                 {"duration_s", health.duration_s},
+                                 {"mean_acceleration", health.accelerometer.mean_length},
+                                 {"mean_angular_speed", health.gyroscope.mean_length},
+                                 {"rest_s", health.rest_s},
+                                 {"gyroscope_noise", nullptr},
+                                 {"accelerometer_noise", nullptr},
                                  {"out_of_order", stream.num_out_of_order},
-                                 {"doubles", stream.num_doubles}};
+                                 {"doubles", stream.num_doubles},
+                                 {"notes", stream.notes}};
+  if (health.noise) {
+    json["gyroscope_noise"] = health.noise->gyroscope;
+    json["accelerometer_noise"] = health.noise->accelerometer;
+  }
   json["gaps"] = nlohmann::ordered_json::array();
-  for (const ImuGap& gap : statistics.gaps) {
+  for (const ImuGap& gap : health.gaps) {
     json["gaps"].push_back(
         {{"start_s", seconds(gap.start_ns)}, {"duration_s", seconds(gap.duration_ns)}});
   }
-  json["notes"] = stream.notes;
   return json;
 }
 

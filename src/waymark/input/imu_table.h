@@ -3,14 +3,24 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <string_view>
 #include <vector>
 
-#include "waymark/input/imu_merge.h"
 #include "waymark/input/imu_stream.h"
 
 namespace waymark {
+
+/// Which of the sensors of an IMU.
+enum class ImuSensor { kGyroscope, kAccelerometer };
+
+/// Which sensor a name of columns or of a file is of, "w_RS_S_", "gF", "VID_1_gyro"; nothing:
+/// another, or both.
+std::optional<ImuSensor> sensor_of_name(std::string_view name);
+
+/// A text in lower case letters, of ASCII.
+std::string lower_case(std::string_view text);
 
 /// A table of inertial data, in SI units and in the order of its rows.
 struct ImuTable {
@@ -19,11 +29,11 @@ struct ImuTable {
   std::vector<std::string> notes;            ///< Units as understood, for people.
 };
 
-/// Parses a table with a row per moment, or per sensor and moment; with or without a header. Units
-/// are those of the header, of times else those with 10 to 5000 rows a second, of turns else rad/s
-/// unless they are too fast for that; whether accelerations are in m/s^2 or g tells their middle
-/// length, gravity's. A last row that is cut off is left out. name: of the file, for errors and for
-/// what plain x, y and z are of. Throws InputError.
+/// Parses a table with a row per moment, with or without a header. Times are in the unit with 10 to
+/// 5000 rows a second; turns in that of the header, else rad/s unless they are too fast for that;
+/// whether accelerations are in m/s^2 or g tells their middle length, gravity's. A last row that is
+/// cut off is left out. name: of the file, for errors and for what plain x, y and z are of. Throws
+/// InputError.
 ImuTable parse_imu_table(std::string_view text, const std::string& name);
 
 /// Reads a table of an IMU; one of a single sensor with that of the other beside it, which has the
