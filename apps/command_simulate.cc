@@ -132,7 +132,7 @@ struct SimulateOptions {
   std::vector<double> warped_px;  ///< Along and across the epipolar lines; empty: none.
   std::vector<double> gain1;      ///< Of camera 1, in the first frame and the last; empty: 1.
   std::vector<std::string> told;  ///< KEY=VALUE each.
-  std::vector<std::string> imu;   ///< Name or file, then KEY=VALUE each; empty: none.
+  std::vector<std::string> imu;   ///< Name, then KEY=VALUE each; empty: none.
   std::vector<int> black;         ///< First frame and number of frames, by turns.
   bool is_list = false;
   bool is_quiet = false;
@@ -310,14 +310,14 @@ void add_imu_options(CLI::App& simulation, SimulateOptions& options) {
   reads(simulation
             .add_option("--imu",
                         options.imu,
-                        "NAME|FILE[,KEY=VALUE,...]: samples of an inertial measurement unit, by "
-                        "name, see --list, or a file of Kalibr [none]")
+                        "NAME[,KEY=VALUE,...]: samples of an inertial measurement unit, see "
+                        "--list [none]")
             ->delimiter(','));
   simulation
       .add_option("--told",
                   options.told,
                   "KEY=VALUE,...: write a calibration that is off; factors focal, distortion, "
-                  "baseline, depth, imu_noise; centre in px; turn_x, turn_y, turn_z of camera 1 in "
+                  "baseline, depth; centre in px; turn_x, turn_y, turn_z of camera 1 in "
                   "mrad; imu_turn in degrees, imu_lever in cm, imu_shift in ms; imu=none [the "
                   "true one]")
       ->delimiter(',');

@@ -26,7 +26,6 @@ double* number_of(CalibrationError& error, std::string_view key) {
   if (key == "imu_turn") return &error.imu_turn_deg;
   if (key == "imu_lever") return &error.imu_lever_cm;
   if (key == "imu_shift") return &error.imu_shift_ms;
-  if (key == "imu_noise") return &error.imu_noise;
   return nullptr;
 }
 
@@ -62,8 +61,8 @@ CalibrationError parse_calibration_error(const std::vector<std::string>& assignm
     if (number == nullptr || !value) {
       throw InputError(kWhere,
                        fmt::format("is {}, expected focal, centre, distortion, turn_x, turn_y, "
-                                   "turn_z, baseline, depth, imu_turn, imu_lever, imu_shift or "
-                                   "imu_noise, '=' and a number, or imu=none",
+                                   "turn_z, baseline, depth, imu_turn, imu_lever or imu_shift, "
+                                   "'=' and a number, or imu=none",
                                    quote_for_message(assignment)));
     }
     *number = *value;
@@ -91,12 +90,11 @@ CameraChain told_chain(CameraChain truth, const CalibrationError& error) {
 }
 
 ImuCalibration told_imu(ImuCalibration truth, const CalibrationError& error) {
-  if (!truth.imu_from_rig || !truth.time_shift_s || !truth.noise) {
-    const bool is_right = error.is_imu_told && error.imu_turn_deg == 0.0 &&
-                          error.imu_lever_cm == 0.0 && error.imu_shift_ms == 0.0 &&
-                          error.imu_noise == 1.0;
-    if (!is_right) throw InputError(kWhere, "there is no IMU, expected nothing of one (--imu)");
-    return truth;
+  const bool is_right = error.is_imu_told && error.imu_turn_deg == 0.0 &&
+                        error.imu_lever_cm == 0.0 && error.imu_shift_ms == 0.0;
+  if (is_right) return truth;
+  if (!truth.imu_from_rig || !truth.time_shift_s) {
+    throw InputError(kWhere, "there is no IMU, expected nothing of one (--imu)");
   }
   if (!error.is_imu_told) return {};
   const Eigen::Vector3d diagonal = Eigen::Vector3d::Ones().normalized();
@@ -104,12 +102,6 @@ ImuCalibration told_imu(ImuCalibration truth, const CalibrationError& error) {
   const Rigid3 told_from_true(so3_exp(turn_rad * diagonal), 1e-2 * error.imu_lever_cm * diagonal);
   truth.imu_from_rig = told_from_true * *truth.imu_from_rig;
   *truth.time_shift_s += 1e-3 * error.imu_shift_ms;
-  for (double* noise : {&truth.noise->gyroscope,
-                        &truth.noise->accelerometer,
-                        &truth.noise->gyroscope_walk,
-                        &truth.noise->accelerometer_walk}) {
-    *noise *= error.imu_noise;
-  }
   return truth;
 }
 

@@ -26,12 +26,11 @@ struct CalibrationError {
   double imu_turn_deg = 0.0;
   double imu_lever_cm = 0.0;
   double imu_shift_ms = 0.0;  ///< Added to the time shift of the IMU.
-  double imu_noise = 1.0;     ///< Factor of its densities and walks.
   bool is_imu_told = true;    ///< Otherwise there is nothing but samples.
 };
 
 /// Reads "KEY=VALUE" each: focal, centre, distortion, turn_x, turn_y, turn_z, baseline, depth,
-/// imu_turn, imu_lever, imu_shift, imu_noise; and "imu=none". Throws InputError.
+/// imu_turn, imu_lever, imu_shift; and "imu=none". Throws InputError.
 CalibrationError parse_calibration_error(const std::vector<std::string>& assignments);
 
 /// The calibration that is told in place of the true one. Intrinsics are taken to end with fu fv pu

@@ -144,19 +144,13 @@ class Writer {
     make_output_folder(sensor);
     write_file_atomically(sensor / (is_csv ? "data.csv" : "imu0.csv"), format_imu_samples(samples));
     write_file_atomically(folder_ / "imu0_truth.csv", format_imu_truth(samples));
-    const double rate_hz = spec_.imu->rate_hz;
-    if (layout_ == Layout::kEuroc && told_imu_.imu_from_rig) {
-      write_file_atomically(sensor / "sensor.yaml", format_imu_sensor(told_imu_, rate_hz));
-    }
     if (!told_imu_.noise) return;
-    if (spec_.told.imu_noise != 1.0) {
-      write_file_atomically(folder_ / "imu_true.yaml", format_imu_noise(*true_imu_.noise, rate_hz));
-    }
-    const std::string noise = format_imu_noise(*told_imu_.noise, rate_hz);
+    const std::string noise = format_imu_noise(*told_imu_.noise, spec_.imu->rate_hz);
     write_file_atomically(folder_ / "imu.yaml", noise);
-    if (layout_ != Layout::kTumVi) return;
-    make_output_folder(folder_ / "dso");
-    write_file_atomically(folder_ / "dso" / "imu_config.yaml", noise);
+    if (layout_ == Layout::kTumVi) write_file_atomically(folder_ / "dso/imu_config.yaml", noise);
+    if (layout_ != Layout::kEuroc) return;
+    write_file_atomically(sensor / "sensor.yaml",
+                          format_imu_mounting(*told_imu_.imu_from_rig) + noise);
   }
 
  private:

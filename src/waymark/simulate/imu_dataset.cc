@@ -30,16 +30,6 @@ std::string format_mounting(const ChainCamera& camera, const ImuCalibration& tol
   return text;
 }
 
-std::string format_densities(const ImuNoise& noise) {
-  return fmt::format(
-      "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
-      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n",
-      noise.gyroscope,
-      noise.gyroscope_walk,
-      noise.accelerometer,
-      noise.accelerometer_walk);
-}
-
 }  // namespace
 
 std::string format_imu_samples(std::span<const RecordedImuSample> samples) {
@@ -76,20 +66,22 @@ std::string format_imu_truth(std::span<const RecordedImuSample> samples) {
   return text;
 }
 
-std::string format_imu_sensor(const ImuCalibration& told, double rate_hz) {
-  std::string text = "sensor_type: imu\n";
-  if (told.imu_from_rig) {
-    const Eigen::Matrix4d body_from_imu =
-        told.imu_from_rig->inverse().matrix().unaryExpr(&unsigned_zero);
-    text += fmt::format("T_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n",
-                        fmt::join(body_from_imu.reshaped<Eigen::RowMajor>(), ", "));
-  }
-  text += fmt::format("rate_hz: {}\n", rate_hz);
-  return told.noise ? text + format_densities(*told.noise) : text;
+std::string format_imu_mounting(const Rigid3& imu_from_rig) {
+  const Eigen::Matrix4d body_from_imu = imu_from_rig.inverse().matrix().unaryExpr(&unsigned_zero);
+  return fmt::format("sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n",
+                     fmt::join(body_from_imu.reshaped<Eigen::RowMajor>(), ", "));
 }
 
 std::string format_imu_noise(const ImuNoise& noise, double rate_hz) {
-  return format_densities(noise) + fmt::format("rostopic: /imu0\nupdate_rate: {}\n", rate_hz);
+  return fmt::format(
+      "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
+      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n"
+      "rostopic: /imu0\nupdate_rate: {}\n",
+      noise.gyroscope,
+      noise.gyroscope_walk,
+      noise.accelerometer,
+      noise.accelerometer_walk,
+      rate_hz);
 }
 
 std::string format_camchain_imu(const CameraChain& chain, const ImuCalibration& told) {

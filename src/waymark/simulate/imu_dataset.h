@@ -19,8 +19,8 @@ std::string format_imu_samples(std::span<const RecordedImuSample> samples);
 /// biases in the frame of the IMU.
 std::string format_imu_truth(std::span<const RecordedImuSample> samples);
 
-/// EuRoC's imu0/sensor.yaml, whose body is the rig, with what is told.
-std::string format_imu_sensor(const ImuCalibration& told, double rate_hz);
+/// The beginning of EuRoC's imu0/sensor.yaml, whose body is the rig; the rest is that of imu.yaml.
+std::string format_imu_mounting(const Rigid3& imu_from_rig);
 
 /// Kalibr's imu.yaml.
 std::string format_imu_noise(const ImuNoise& noise, double rate_hz);

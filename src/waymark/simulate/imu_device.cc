@@ -13,13 +13,12 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/config_value.h"
-#include "waymark/simulate/motion.h"
+#include "waymark/base/text.h"
 
 namespace waymark {
 namespace {
 
 constexpr double kRadPerMountDeg = std::numbers::pi / 180.0;
-constexpr double kOneG = kStandardGravity;
 constexpr const char* kImuOption = "--imu";
 
 /// Burri et al. 2016 (sensor.yaml) for noise and walks; the rest from the data sheet of the
@@ -28,7 +27,7 @@ constexpr const char* kImuOption = "--imu";
 ImuDevice mems() {
   ImuDevice imu;
   imu.gyroscope = {1.6968e-4, 1.9393e-5, 0.5 * kRadPerMountDeg, 0.003, 1000.0 * kRadPerMountDeg};
-  imu.accelerometer = {2.0e-3, 3.0e-3, 0.02 * kOneG, 0.003, 18.0 * kOneG};
+  imu.accelerometer = {2.0e-3, 3.0e-3, 0.02 * kStandardGravity, 0.003, 18.0 * kStandardGravity};
   return imu;
 }
 
@@ -39,7 +38,11 @@ ImuDevice phone() {
   ImuDevice imu;
   imu.gyroscope = {
       0.007 * kRadPerMountDeg, 2.2e-6, 1.0 * kRadPerMountDeg, 0.005, 2000.0 * kRadPerMountDeg};
-  imu.accelerometer = {180e-6 * kOneG, 8.6e-5, 0.04 / 3.0 * kOneG, 0.005, 8.0 * kOneG};
+  imu.accelerometer = {180e-6 * kStandardGravity,
+                       8.6e-5,
+                       0.04 / 3.0 * kStandardGravity,
+                       0.005,
+                       8.0 * kStandardGravity};
   return imu;
 }
 
@@ -50,7 +53,11 @@ ImuDevice consumer() {
   ImuDevice imu;
   imu.gyroscope = {
       0.005 * kRadPerMountDeg, 2.2e-5, 20.0 / 3.0 * kRadPerMountDeg, 0.01, 500.0 * kRadPerMountDeg};
-  imu.accelerometer = {400e-6 * kOneG, 8.6e-4, 0.05 / 3.0 * kOneG, 0.01, 4.0 * kOneG};
+  imu.accelerometer = {400e-6 * kStandardGravity,
+                       8.6e-4,
+                       0.05 / 3.0 * kStandardGravity,
+                       0.01,
+                       4.0 * kStandardGravity};
   return imu;
 }
 
@@ -64,7 +71,7 @@ constexpr std::array<NamedImu, 4> kImus = {{{"perfect", [] { return ImuDevice{};
                                             {"phone", phone},
                                             {"consumer", consumer}}};
 
-/// A number of a device, by its name in files and in the option.
+/// A number of a device, by its name in the option.
 struct ImuKey {
   std::string name;
   double* number;
@@ -106,25 +113,6 @@ void set_number(const ConfigNode& value, const std::string& name, ImuDevice& imu
   fail_unknown_key(value, name, names);
 }
 
-ImuDevice read_imu_file(const std::string& file) {
-  const ConfigNode config = parse_config(ConfigSource::from_file(file));
-  const ConfigNode* section = config.find("imu0");
-  const ConfigNode& node = section == nullptr ? config : *section;
-  constexpr std::array<std::string_view, 4> kIgnored = {
-      "rostopic", "model", "T_i_b", "time_offset"};
-  ImuDevice imu;
-  for (std::size_t i = 0; i < node.keys.size(); ++i) {
-    if (std::ranges::find(kIgnored, node.keys[i]) != kIgnored.end()) continue;
-    set_number(node.items[i], node.keys[i], imu);
-  }
-  return imu;
-}
-
-ImuDevice named_imu(const std::string& name) {
-  const auto found = std::ranges::find(kImus, name, &NamedImu::name);
-  return found == kImus.end() ? read_imu_file(name) : found->make();
-}
-
 }  // namespace
 
 ImuCalibration ImuDevice::calibration() const {
@@ -143,12 +131,15 @@ std::vector<std::string> imu_names() {
 }
 
 ImuDevice parse_imu(const std::vector<std::string>& words) {
-  if (words.empty() || words[0].find('=') != std::string::npos) {
+  const auto found =
+      words.empty() ? kImus.end() : std::ranges::find(kImus, words[0], &NamedImu::name);
+  if (found == kImus.end()) {
     throw InputError(kImuOption,
-                     fmt::format("begins with no name, expected a file or one of {}",
+                     fmt::format("begins with {}, expected one of {}",
+                                 quote_for_message(words.empty() ? "" : words[0]),
                                  fmt::join(imu_names(), ", ")));
   }
-  ImuDevice imu = named_imu(words[0]);
+  ImuDevice imu = found->make();
   for (std::size_t i = 1; i < words.size(); ++i) {
     const std::size_t equals = words[i].find('=');
     ConfigNode value;

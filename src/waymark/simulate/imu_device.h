@@ -26,8 +26,7 @@ struct ImuDevice {
   double rate_hz = 200.0;  ///< Samples per second.
   ImuAxes gyroscope;       ///< rad/s.
   ImuAxes accelerometer;   ///< m/s^2.
-  /// Standard deviation of what rotors add to the acceleration along each axis, m/s^2; see
-  /// RotorVibration.
+  /// Standard deviation of what rotors add to the acceleration along each axis, m/s^2.
   double vibration = 0.0;
   /// By this rotation vector the IMU is turned from the axes of the rig (right, down, ahead).
   Eigen::Vector3d turn_rad = Eigen::Vector3d::Zero();
@@ -45,11 +44,11 @@ struct ImuDevice {
 ///   consumer   MPU-6050
 std::vector<std::string> imu_names();
 
-/// Reads a name, or a file in the format of Kalibr's imu.yaml (SI units), and then KEY=VALUE each,
-/// which replace what that says. Keys are Kalibr's (update_rate, gyroscope_noise_density,
-/// gyroscope_random_walk, and the same of accelerometer_) and, in either place, gyroscope_bias,
-/// gyroscope_scale, gyroscope_range, the same of accelerometer_, vibration; turn_x, turn_y, turn_z
-/// in degrees; lever_x, lever_y, lever_z in cm; shift in ms. Throws InputError.
+/// Reads a name and then KEY=VALUE each, which replace what that says. Keys are Kalibr's
+/// (update_rate, gyroscope_noise_density, gyroscope_random_walk, and the same of accelerometer_)
+/// and gyroscope_bias, gyroscope_scale, gyroscope_range, the same of accelerometer_, vibration;
+/// turn_x, turn_y, turn_z in degrees; lever_x, lever_y, lever_z in cm; shift in ms. Throws
+/// InputError.
 ImuDevice parse_imu(const std::vector<std::string>& words);
 
 }  // namespace waymark

@@ -3,10 +3,10 @@
 #include "waymark/simulate/imu_recording.h"
 
 #include <cmath>
+#include <numbers>
 
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
-#include "waymark/simulate/rotor_vibration.h"
 
 namespace waymark {
 namespace {
@@ -16,6 +16,7 @@ using Eigen::Vector3d;
 /// Beyond those of the frames.
 constexpr std::uint64_t kGyroscopeStream = std::uint64_t{1} << 40;
 constexpr std::uint64_t kAccelerometerStream = std::uint64_t{1} << 41;
+constexpr std::uint64_t kVibrationStream = std::uint64_t{1} << 42;
 
 /// Three axes with their errors (the model of Kalibr's documentation, and scales): a measurement is
 /// scale * truth + bias + white noise, clipped, and the bias walks.
@@ -52,6 +53,46 @@ class InertialTriad {
   Vector3d scale_;
 };
 
+/// What an IMU feels of four rotors and of the frame that they shake: each one's frequency, and
+/// twice and three times of it. The samples of a slow IMU show it as lower frequencies, as those of
+/// one without a filter do.
+class RotorVibration {
+ public:
+  /// How much a frame turns for what it shakes: a gyroscope feels 0.03 rad/s for each m/s^2.
+  static constexpr double kTurnPerShake = 0.03;
+
+  RotorVibration(double acceleration, std::uint64_t seed) {
+    Rng rng(seed, kVibrationStream);
+    double power = 0.0;  // Of an axis: a sine's is half of its amplitude's square.
+    for (int rotor = 0; rotor < 4; ++rotor) {
+      const double rate = 2.0 * std::numbers::pi * rng.uniform(70.0, 110.0);
+      for (int harmonic = 1; harmonic <= 3; ++harmonic) {
+        const double x = rng.normal();
+        const double y = rng.normal();
+        const Vector3d push = Vector3d(x, y, rng.normal()) / (harmonic * harmonic);
+        power += push.squaredNorm() / 6.0;
+        tones_.push_back({harmonic * rate, rng.uniform(0.0, 6.0), push});
+      }
+    }
+    for (Tone& tone : tones_) tone.push *= acceleration / std::sqrt(power);
+  }
+
+  /// m/s^2.
+  Vector3d at(double seconds) const {
+    Vector3d sum = Vector3d::Zero();
+    for (const Tone& tone : tones_) sum += std::sin(tone.rate * seconds + tone.phase) * tone.push;
+    return sum;
+  }
+
+ private:
+  struct Tone {
+    double rate;   ///< rad/s.
+    double phase;  ///< rad.
+    Vector3d push;
+  };
+  std::vector<Tone> tones_;
+};
+
 /// What a perfect IMU measures; without time stamp.
 ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig) {
   const Vector3d lever = state.world_from_rig.rotation * imu_from_rig.origin_in_source();
@@ -78,13 +119,13 @@ std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
   const Rigid3 rig_from_imu = imu_from_rig.inverse();
   InertialTriad gyroscope(imu.gyroscope, imu.rate_hz, seed, kGyroscopeStream);
   InertialTriad accelerometer(imu.accelerometer, imu.rate_hz, seed, kAccelerometerStream);
-  RotorVibration vibration(imu.vibration, seed);
+  const RotorVibration vibration(imu.vibration, seed);
   std::vector<RecordedImuSample> recorded;
   const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kImuLeadS));
   for (std::int64_t i = -std::llround(imu.rate_hz * kImuLeadS); i <= last; ++i) {
     const double seconds = static_cast<double>(i) / imu.rate_hz;
     const MotionState state = motion.state(seconds);
-    const RotorVibration::Shake shake = vibration.next(seconds);
+    const Vector3d shake = vibration.at(seconds);
     RecordedImuSample now;
     now.world_from_imu = state.world_from_rig * rig_from_imu;
     const Vector3d lever = state.world_from_rig.rotation * rig_from_imu.translation;
@@ -94,8 +135,8 @@ std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
     now.sample = exact_imu_sample(state, imu_from_rig);
     now.sample.timestamp_ns = start_ns + std::llround(1e9 * (seconds + imu.time_shift_s));
     now.sample.angular_velocity =
-        gyroscope.measure(now.sample.angular_velocity + shake.angular_velocity);
-    now.sample.acceleration = accelerometer.measure(now.sample.acceleration + shake.acceleration);
+        gyroscope.measure(now.sample.angular_velocity + RotorVibration::kTurnPerShake * shake);
+    now.sample.acceleration = accelerometer.measure(now.sample.acceleration + shake);
     recorded.push_back(now);
     gyroscope.step();
     accelerometer.step();

@@ -207,6 +207,25 @@ TEST(ImuRecording, ClipsAtItsRangeAndScalesItsAxes) {
   }
 }
 
+TEST(ImuRecording, VibratesAsStronglyAsItSays) {
+  const Motion still = make_motion("room", "still", 20.0);
+  Vector3d sum = Vector3d::Zero();
+  double pushes = 0.0;
+  double turns = 0.0;
+  const Recorded all = record_from_start(parse_imu({"perfect", "vibration=4"}), still);
+  const Recorded calm = record_from_start(ImuDevice{}, still);
+  const auto count = static_cast<double>(all.size());
+  for (std::size_t i = 0; i < all.size(); ++i) {
+    const Vector3d shake = all[i].sample.acceleration - calm[i].sample.acceleration;
+    sum += shake / count;
+    pushes += shake.squaredNorm() / 3.0 / count;
+    turns += all[i].sample.angular_velocity.squaredNorm() / 3.0 / count;
+  }
+  EXPECT_NEAR(std::sqrt(pushes), 4.0, 0.15);
+  EXPECT_NEAR(std::sqrt(turns), 0.12, 0.01);
+  EXPECT_LT(sum.norm(), 0.05);
+}
+
 TEST(ImuRecording, IsTheSameForTheSameSeed) {
   const Motion motion = make_motion("room", "loop", 5.0);
   ImuDevice imu = parse_imu({"consumer", "vibration=2"});

@@ -12,9 +12,6 @@
 
 namespace waymark {
 
-/// Standard acceleration of free fall, m/s^2 (ISO 80000-3), along -z of the world.
-inline constexpr double kStandardGravity = 9.80665;
-
 /// Where the rig is and looks: yaw 0 looks along +x, 90 along +y; pitch up and roll clockwise are
 /// positive. The world's z axis points up.
 struct MotionKey {
@@ -54,12 +51,12 @@ class Motion {
 
   /// Time from the first pose to the last.
   double duration_s() const { return duration_s_; }
-  /// Pose at a time of [0, duration]; times outside are moved to the nearer end.
+  /// Pose at a time; outside of [0, duration] it goes on at the rates of the nearer end, as what is
+  /// measured before the first image and after the last.
   Rigid3 world_from_rig(double seconds) const;
-  /// The same as position and angles; or their derivative by time, order 1 or 2, in 1/s^order.
-  MotionKey key(double seconds, int order = 0) const;
-  /// The pose and its exact derivatives, which are continuous. Beyond [0, duration] it goes on at
-  /// the rates of the nearer end, as what is measured before the first image and after the last.
+  /// The same as position and angles; times outside are moved to the nearer end.
+  MotionKey key(double seconds) const;
+  /// The pose and its derivatives, by differences in time.
   MotionState state(double seconds) const;
 
  private:
@@ -70,7 +67,7 @@ class Motion {
     double phase_rad;
   };
 
-  MotionKey spline(double seconds, int order) const;
+  MotionKey spline(double seconds) const;
 
   std::vector<MotionKey> keys_;
   double duration_s_;

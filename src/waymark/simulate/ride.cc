@@ -6,6 +6,8 @@
 #include <cmath>
 #include <numbers>
 
+#include "waymark/imu/imu.h"
+
 namespace waymark {
 namespace {
 
@@ -51,7 +53,8 @@ void look_ahead(const Motion& way,
                 const std::vector<double>& shares,
                 std::vector<MotionKey>& keys) {
   for (std::size_t i = 0; i < keys.size(); ++i) {
-    const Vector3d direction = way.key(shares[i] * way.duration_s(), 1).position;
+    const double seconds = shares[i] * way.duration_s();
+    const Vector3d direction = way.key(seconds + 1e-3).position - way.key(seconds - 1e-3).position;
     const double heading_deg = kDegPerRadian * std::atan2(direction.y(), direction.x());
     const double before_deg = i == 0 ? heading_deg : keys[i - 1].yaw_deg;
     keys[i].yaw_deg = before_deg + std::remainder(heading_deg - before_deg, 360.0);
