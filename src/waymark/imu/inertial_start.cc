@@ -34,6 +34,35 @@ PreintegrationChain cut_chain(const StartProblem& problem,
   return chain;
 }
 
+/// Where refinement begins: gravity is what the mean force holds up, velocities are those of the
+/// poses at the scale believed.
+InertialUnknowns first_guess(const StartProblem& problem,
+                             const PreintegrationChain& chain,
+                             const RotationStart& rotation) {
+  InertialUnknowns unknowns;
+  InertialSetup& setup = unknowns.setup;
+  setup.log_scale = problem.options.log_scale;
+  setup.imu_from_rig = {rotation.imu_from_rig,
+                        -(rotation.imu_from_rig * problem.imu_from_rig().origin_in_source())};
+  Eigen::Vector3d force = Eigen::Vector3d::Zero();
+  const std::span<const VisionPose> poses = problem.poses;
+  for (std::size_t i = 0; i < poses.size(); ++i) {
+    InertialState& state = unknowns.states.emplace_back();
+    state.rig_from_world = poses[i].rig_from_world;
+    state.biases.gyroscope = rotation.gyroscope_bias;
+    const VisionPose& before = poses[i == 0 ? 0 : i - 1];
+    const VisionPose& after = poses[std::min(i + 1, poses.size() - 1)];
+    const auto between_ns = static_cast<double>(after.timestamp_ns - before.timestamp_ns);
+    state.velocity =
+        std::exp(setup.log_scale) * 1e9 / between_ns *
+        (after.rig_from_world.origin_in_source() - before.rig_from_world.origin_in_source());
+    if (i == chain.intervals.size() || !chain.intervals[i]) continue;
+    force += world_from_imu(state, setup).rotation * chain.intervals[i]->delta().velocity;
+  }
+  setup.gravity = -problem.options.gravity * force.normalized();
+  return unknowns;
+}
+
 /// What the squared error is in the mean: measured numbers and beliefs without what is fitted.
 double degrees_of_freedom(const PreintegrationChain& chain) {
   const double num_states = static_cast<double>(chain.intervals.size() + 1);
@@ -109,7 +138,7 @@ std::optional<InertialStart> start_inertial(const ImuSamples& samples,
   PreintegrationChain chain =
       cut_chain(problem, rotation->time_shift_s, std::vector(poses.size(), still));
   InertialRefinement refined =
-      refine_with_cuts(problem, linear_start(problem, chain, *rotation), chain);
+      refine_with_cuts(problem, first_guess(problem, chain, *rotation), chain);
   if (std::sqrt(refined.covariance(2, 2)) > kWeakScale) {
     const double squared_error = refined.squared_error;
     refined = refine_at_believed_scale(problem, chain, std::move(refined.unknowns));

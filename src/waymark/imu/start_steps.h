@@ -57,15 +57,6 @@ struct InertialUnknowns {
   InertialSetup setup;
 };
 
-/// Scale, gravity, velocities, lever arm and accelerometer bias, where the rotation imu_from_rig
-/// and the gyroscope bias (of the preintegrations) are known: all linear in how the IMU moved
-/// between poses (Martinelli 2014; Mur-Artal and Tardos 2017, section IV), by least
-/// squares with priors. The size of gravity is a condition linearized at the direction found before
-/// it. A scale that is not told is near the one of the options.
-InertialUnknowns linear_start(const StartProblem& problem,
-                              const PreintegrationChain& chain,
-                              const RotationStart& rotation);
-
 /// The most likely unknowns, how sure they are and how well they fit.
 struct InertialRefinement {
   InertialUnknowns unknowns;

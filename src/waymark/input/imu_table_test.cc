@@ -91,12 +91,9 @@ TEST(ImuTable, ReadsTablesOfPhones) {
 }
 
 TEST(ImuTable, ReadsRowsOfOneSensorEach) {
-  std::string blank = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z
-";
+  std::string blank = "time,gyro_x,gyro_y,gyro_z,acc_x,acc_y,acc_z\n";
   for (int i = 0; i < 10; ++i) {
-    blank += fmt::format("{0},1,2,3,,,
-{0},,,,0,0,9.80665
-", 0.005 * i);
+    blank += fmt::format("{0},1,2,3,,,\n{0},,,,0,0,9.80665\n", 0.005 * i);
   }
   expect_both(blank, 0);
 }

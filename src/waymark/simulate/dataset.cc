@@ -147,7 +147,10 @@ class Writer {
     if (!told_imu_.noise) return;
     const std::string noise = format_imu_noise(*told_imu_.noise, spec_.imu->rate_hz);
     write_file_atomically(folder_ / "imu.yaml", noise);
-    if (layout_ == Layout::kTumVi) write_file_atomically(folder_ / "dso/imu_config.yaml", noise);
+    if (layout_ == Layout::kTumVi) {
+      make_output_folder(folder_ / "dso");
+      write_file_atomically(folder_ / "dso" / "imu_config.yaml", noise);
+    }
     if (layout_ != Layout::kEuroc) return;
     write_file_atomically(sensor / "sensor.yaml",
                           format_imu_mounting(*told_imu_.imu_from_rig) + noise);
