@@ -1,8 +1,8 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 //
-// The readers of settings, calibrations and lists of images. The first byte of the input, a digit,
-// says which.
+// The readers of settings, calibrations, lists of images and inertial data. The first byte of the
+// input, a digit, says which.
 #include <array>
 #include <cstddef>
 #include <cstdint>
@@ -16,6 +16,7 @@
 #include "waymark/input/config_file.h"
 #include "waymark/input/foreign_calibration.h"
 #include "waymark/input/image_times.h"
+#include "waymark/input/imu_readers.h"
 
 namespace {
 
@@ -39,13 +40,35 @@ CameraChain read_list(const ConfigSource& source) {
   return {};
 }
 
+void check(const waymark::ImuStream& stream) {
+  for (std::size_t i = 1; i < stream.samples.size(); ++i) {
+    WAYMARK_CHECK(stream.samples[i - 1].timestamp_ns < stream.samples[i].timestamp_ns);
+  }
+  waymark::format_imu(stream, {0, 1'000'000'000});
+}
+
+CameraChain read_imu_table(const ConfigSource& source) {
+  const waymark::ImuTable table = waymark::parse_imu_table(source.text, "gyro.csv");
+  check(waymark::merge_imu(table.gyroscope, table.accelerometer, source.name));
+  return {};
+}
+
+CameraChain read_telemetry(const ConfigSource& source) {
+  const std::array<waymark::TelemetryPacket, 2> packets = {
+      {{0.0, 1.0, source.text}, {1.0, 0.5, source.text}}};
+  if (const auto stream = waymark::imu_of_gopro(packets, source.name)) check(*stream);
+  return {};
+}
+
 constexpr std::array kReaders = {read_own,
                                  waymark::read_opencv_calibration,
                                  waymark::read_ros_calibration,
                                  waymark::read_colmap_calibration,
                                  waymark::read_nerfstudio_calibration,
                                  read_any,
-                                 read_list};
+                                 read_list,
+                                 read_imu_table,
+                                 read_telemetry};
 
 }  // namespace
 

@@ -5,122 +5,81 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
-#include <utility>
 
 #include "waymark/base/median.h"
 
 namespace waymark {
 namespace {
 
-constexpr double kNarrowTurnRange = 2.0;    ///< rad/s.
-constexpr double kNarrowForceRange = 15.0;  ///< m/s^2.
-/// Both ends of a range differ by a bit, and conversions of units round.
-constexpr double kAtEnd = 0.9995;
-
-/// Stretches of one second are at rest if they are as still as any consumer IMU on a table, do not
-/// turn by more than a bias, and weigh about what they should, and no more than so much less still
-/// than the stillest of them.
-const Eigen::Array2d kStill(0.02, 0.15);  ///< rad/s and m/s^2.
-constexpr double kBiasTurn = 0.1;         ///< rad/s.
-constexpr double kBiasForce = 0.5;        ///< m/s^2.
-constexpr double kStillest = 1.5;
-constexpr std::size_t kMinStretches = 3;
-constexpr double kMaxLag = 0.1;  ///< s.
+/// A second is at rest if it is as still as any consumer IMU on a table, does not turn by more than
+/// a bias, and weighs about what it should.
+constexpr double kStillTurn = 0.02;   ///< rad/s.
+constexpr double kStillForce = 0.15;  ///< m/s^2.
+constexpr double kBiasTurn = 0.1;     ///< rad/s.
+constexpr double kBiasForce = 0.5;    ///< m/s^2.
+constexpr std::size_t kMinRests = 3;
+constexpr std::size_t kPartsOfRest = 10;  ///< Of which the Allan deviation takes means.
 /// Output that never changes has no noise, which nothing would outweigh.
 constexpr double kLeastShare = 0.1;  ///< Of the default.
 
-SensorHealth sensor_health(std::span<const ImuSample> samples,
-                           Eigen::Vector3d ImuSample::*sensor,
-                           double narrow_range) {
-  SensorHealth health;
-  const auto num_samples = static_cast<double>(samples.size());
-  double largest = 0.0;
-  health.is_constant = true;
+SensorHealth sensor_health(std::span<const ImuSample> samples, Eigen::Vector3d ImuSample::*sensor) {
+  SensorHealth health{.is_constant = true};
   for (const ImuSample& sample : samples) {
-    health.mean_length += (sample.*sensor).norm() / num_samples;
-    largest = std::max(largest, (sample.*sensor).cwiseAbs().maxCoeff());
+    health.mean_length += (sample.*sensor).norm() / static_cast<double>(samples.size());
     if (sample.*sensor != samples.front().*sensor) health.is_constant = false;
-  }
-  if (health.is_constant || largest < narrow_range) return health;
-  bool did_stay = false;
-  for (std::size_t i = 0; i < samples.size(); ++i) {
-    const Eigen::Array3d value = samples[i].*sensor;
-    const auto is_at_end = value.abs() >= kAtEnd * largest;
-    const bool stays =
-        i + 1 < samples.size() && (is_at_end && value == (samples[i + 1].*sensor).array()).any();
-    if (stays || did_stay) health.saturated_share += 1.0 / num_samples;
-    did_stay = stays;
   }
   return health;
 }
 
-/// Angular velocities and accelerations of a second at rest.
-struct RestStretch {
-  Eigen::Matrix<double, 6, Eigen::Dynamic> values;
-  Eigen::Array2d sigma;  ///< Of both sensors, rad/s and m/s^2.
-};
-
-/// Mean squares of both sensors.
-Eigen::Array2d per_sensor(const Eigen::Matrix<double, 6, 1>& squares) {
-  return {squares.head<3>().mean(), squares.tail<3>().mean()};
+Eigen::Vector3d mean_of(std::span<const ImuSample> samples, Eigen::Vector3d ImuSample::*sensor) {
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (const ImuSample& sample : samples) sum += sample.*sensor;
+  return sum / static_cast<double>(samples.size());
 }
 
-std::vector<RestStretch> rest_stretches(std::span<const ImuSample> samples, double rate_hz) {
-  std::vector<RestStretch> stretches;
-  Eigen::Array2d stillest = kStill;
-  const auto size = static_cast<std::size_t>(std::max(2L, std::lround(rate_hz)));
-  for (std::size_t first = 0; first + size <= samples.size(); first += size) {
-    const std::span<const ImuSample> part = samples.subspan(first, size);
-    if (part.back().timestamp_ns - part.front().timestamp_ns > 1'050'000'000) continue;  // A gap.
-    RestStretch stretch;
-    stretch.values.resize(6, static_cast<Eigen::Index>(size));
-    for (std::size_t i = 0; i < size; ++i) {
-      stretch.values.col(static_cast<Eigen::Index>(i)) << part[i].angular_velocity,
-          part[i].acceleration;
-    }
-    const Eigen::Matrix<double, 6, 1> mean = stretch.values.rowwise().mean();
-    stretch.sigma =
-        per_sensor((stretch.values.colwise() - mean).cwiseAbs2().rowwise().mean()).sqrt();
-    if ((stretch.sigma > kStill).any() || mean.head<3>().norm() > kBiasTurn ||
-        std::abs(mean.tail<3>().norm() - kStandardGravity) > kBiasForce) {
-      continue;
-    }
-    stillest = stillest.min(stretch.sigma);
-    stretches.push_back(std::move(stretch));
+/// The Allan variance per axis of a sensor in a second; nothing where it is not still. mean: of the
+/// second.
+std::optional<double> rest_variance(std::span<const ImuSample> second,
+                                    Eigen::Vector3d ImuSample::*sensor,
+                                    const Eigen::Vector3d& mean,
+                                    double still) {
+  double variance = 0.0;
+  for (const ImuSample& sample : second) variance += (sample.*sensor - mean).squaredNorm() / 3.0;
+  if (variance > still * still * static_cast<double>(second.size())) return std::nullopt;
+  const std::size_t size = second.size() / kPartsOfRest;
+  double sum = 0.0;
+  for (std::size_t i = 1; i < kPartsOfRest; ++i) {
+    sum += (mean_of(second.subspan(i * size, size), sensor) -
+            mean_of(second.subspan((i - 1) * size, size), sensor))
+               .squaredNorm();
   }
-  std::erase_if(stretches, [&](const RestStretch& stretch) {
-    return (stretch.sigma > kStillest * stillest).any();
-  });
-  return stretches;
-}
-
-/// Allan variances of means of so many samples, for both sensors.
-Eigen::Array2d allan_variances(std::span<const RestStretch> stretches, Eigen::Index count) {
-  Eigen::Array2d sum = Eigen::Array2d::Zero();
-  double number = 0.0;
-  for (const RestStretch& stretch : stretches) {
-    for (Eigen::Index at = 0; at + 2 * count <= stretch.values.cols(); at += count) {
-      sum += 0.5 * per_sensor((stretch.values.middleCols(at + count, count).rowwise().mean() -
-                               stretch.values.middleCols(at, count).rowwise().mean())
-                                  .cwiseAbs2());
-      number += 1.0;
-    }
-  }
-  return sum / number;
+  return sum / 3.0 / 2.0 / static_cast<double>(kPartsOfRest - 1);
 }
 
 void measure_rest(std::span<const ImuSample> samples, ImuHealth& health) {
-  const std::vector<RestStretch> stretches = rest_stretches(samples, health.rate_hz);
-  health.rest_s = static_cast<double>(stretches.size());
-  if (stretches.size() < kMinStretches) return;
-  Eigen::Array2d squared_density = Eigen::Array2d::Zero();
-  for (Eigen::Index count = 1; static_cast<double>(count) <= kMaxLag * health.rate_hz; count *= 2) {
-    const double lag = static_cast<double>(count) / health.rate_hz;
-    squared_density = squared_density.max(lag * allan_variances(stretches, count));
+  const auto size = static_cast<std::size_t>(health.rate_hz + 0.5);
+  if (size < kPartsOfRest) return;
+  std::vector<double> turns, forces;
+  for (std::size_t first = 0; first + size <= samples.size(); first += size) {
+    const std::span<const ImuSample> second = samples.subspan(first, size);
+    constexpr std::int64_t kMostNs = 1'050'000'000;
+    if (second.back().timestamp_ns - second.front().timestamp_ns > kMostNs) continue;  // A gap.
+    const Eigen::Vector3d turn = mean_of(second, &ImuSample::angular_velocity);
+    const Eigen::Vector3d force = mean_of(second, &ImuSample::acceleration);
+    if (turn.norm() > kBiasTurn || std::abs(force.norm() - kStandardGravity) > kBiasForce) continue;
+    const auto of_turn = rest_variance(second, &ImuSample::angular_velocity, turn, kStillTurn);
+    const auto of_force = rest_variance(second, &ImuSample::acceleration, force, kStillForce);
+    if (!of_turn || !of_force) continue;
+    turns.push_back(*of_turn);
+    forces.push_back(*of_force);
   }
+  health.rest_s = static_cast<double>(turns.size());
+  if (turns.size() < kMinRests) return;
+  const double lag_s = static_cast<double>(size / kPartsOfRest) / health.rate_hz;
   ImuNoise noise = default_imu_noise();
-  noise.gyroscope = std::max(std::sqrt(squared_density[0]), kLeastShare * noise.gyroscope);
-  noise.accelerometer = std::max(std::sqrt(squared_density[1]), kLeastShare * noise.accelerometer);
+  noise.gyroscope = std::max(std::sqrt(lag_s * median(turns)), kLeastShare * noise.gyroscope);
+  noise.accelerometer =
+      std::max(std::sqrt(lag_s * median(forces)), kLeastShare * noise.accelerometer);
   health.noise = noise;
 }
 
@@ -143,8 +102,8 @@ ImuHealth imu_health(std::span<const ImuSample> samples) {
     if (static_cast<double>(steps_ns[i]) <= 2.5 * usual_ns) continue;
     health.gaps.push_back({samples[i].timestamp_ns, steps_ns[i]});
   }
-  health.gyroscope = sensor_health(samples, &ImuSample::angular_velocity, kNarrowTurnRange);
-  health.accelerometer = sensor_health(samples, &ImuSample::acceleration, kNarrowForceRange);
+  health.gyroscope = sensor_health(samples, &ImuSample::angular_velocity);
+  health.accelerometer = sensor_health(samples, &ImuSample::acceleration);
   measure_rest(samples, health);
   return health;
 }

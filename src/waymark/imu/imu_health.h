@@ -21,8 +21,6 @@ struct ImuGap {
 struct SensorHealth {
   double mean_length = 0.0;  ///< rad/s, or m/s^2.
   bool is_constant = false;  ///< All values are the same to the bit: it is not connected.
-  /// Of samples at the end of the range, beyond which nothing is told.
-  double saturated_share = 0.0;
 };
 
 /// What samples look like, whatever moved.
@@ -33,15 +31,13 @@ struct ImuHealth {
   SensorHealth gyroscope;
   SensorHealth accelerometer;
   double rest_s = 0.0;  ///< How long the IMU lay still, in pieces of a second.
-  /// White noise while it lay still, by Allan deviations at lags of up to 0.1 s (IEEE Std 952-1997,
-  /// annex C): the largest, since filters hide noise at the shortest. Walks are those by default.
-  /// Nothing without three seconds of rest.
+  /// White noise while it lay still, by the Allan deviation (IEEE Std 952-1997, annex C) at a lag
+  /// of 0.1 s, since filters hide noise at shorter ones. Walks are those by default. Nothing
+  /// without three seconds of rest.
   std::optional<ImuNoise> noise;
 };
 
-/// samples: of ascending times. A value is at the end of the range if it is the largest of all axes
-/// and stays there for two samples or more. That is asked of ranges from 2 rad/s and 15 m/s^2 on
-/// only, which are narrower than any in use: below it, a still sensor with few bits looks the same.
+/// samples: of ascending times.
 ImuHealth imu_health(std::span<const ImuSample> samples);
 
 /// For an IMU that nothing is known of: twice the white noise of one as in phones and cheap cameras

@@ -32,8 +32,7 @@ TEST(ImuHealth, OfGoodSamplesIsGood) {
   EXPECT_NEAR(health.rate_hz, 200.0, 1e-6);
   EXPECT_FALSE(health.gyroscope.is_constant);
   EXPECT_FALSE(health.accelerometer.is_constant);
-  EXPECT_EQ(health.gyroscope.saturated_share, 0.0);
-  EXPECT_EQ(health.accelerometer.saturated_share, 0.0);
+  EXPECT_TRUE(health.gaps.empty());
 }
 
 TEST(ImuHealth, FindsAConstantSensor) {
@@ -44,27 +43,14 @@ TEST(ImuHealth, FindsAConstantSensor) {
   EXPECT_FALSE(health.gyroscope.is_constant);
 }
 
-TEST(ImuHealth, MeasuresTheShareOfSaturatedSamples) {
+TEST(ImuHealth, FindsGaps) {
   std::vector<ImuSample> samples = moving_samples();
-  const double range = 250.0 * M_PI / 180.0;
-  std::size_t count = 0;
-  for (ImuSample& sample : samples) {
-    sample.angular_velocity *= 5.0;
-    if (sample.angular_velocity.cwiseAbs().maxCoeff() >= range) ++count;
-    sample.angular_velocity = sample.angular_velocity.cwiseMax(-range).cwiseMin(range);
-  }
-  ASSERT_GT(count, 20u);
-  const double share = static_cast<double>(count) / static_cast<double>(samples.size());
-  EXPECT_NEAR(imu_health(samples).gyroscope.saturated_share, share, 0.2 * share);
-}
-
-TEST(ImuHealth, AStillSensorOfFewBitsIsNotSaturated) {
-  std::vector<ImuSample> samples = moving_samples();
-  Rng rng(2, 0);
-  for (ImuSample& sample : samples) {
-    sample.acceleration = {0.0, 0.0, rng.uniform() < 0.5 ? 9.77 : 9.81};
-  }
-  EXPECT_EQ(imu_health(samples).accelerometer.saturated_share, 0.0);
+  samples.erase(samples.begin() + 1000, samples.begin() + 1010);
+  const ImuHealth health = imu_health(samples);
+  ASSERT_EQ(health.gaps.size(), 1U);
+  EXPECT_EQ(health.gaps[0].start_ns, samples[999].timestamp_ns);
+  EXPECT_EQ(health.gaps[0].duration_ns, 55'000'000);
+  EXPECT_EQ(health.rest_s, 0.0);
   EXPECT_EQ(imu_health({}).rate_hz, 0.0);
 }
 

@@ -37,9 +37,9 @@ std::optional<InertialEstimate> predict(const InertialEstimate& first,
                                         const ImuNoise& noise,
                                         const InertialSetup& setup) {
   WAYMARK_CHECK(setup.time_shift_change_s == 0.0);
-  ImuSpan span = samples.between(begin_ns, end_ns);
-  if (span.coverage != ImuCoverage::kWhole) return std::nullopt;
-  const Preintegration measured(std::move(span.samples), noise, first.state.biases);
+  std::vector<ImuSample> between = samples.between(begin_ns, end_ns);
+  if (between.empty()) return std::nullopt;
+  const Preintegration measured(std::move(between), noise, first.state.biases);
   InertialEstimate second;
   second.state = state_after(first.state, measured, setup);
   // The whitened residual of both has unit covariance: by_first * e_1 + by_second * e_2 = n.

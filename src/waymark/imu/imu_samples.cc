@@ -79,22 +79,16 @@ std::optional<ImuSample> ImuSamples::at(std::int64_t timestamp_ns) const {
   return interpolate(first_from(timestamp_ns), timestamp_ns);
 }
 
-ImuSpan ImuSamples::between(std::int64_t begin_ns, std::int64_t end_ns) const {
+std::vector<ImuSample> ImuSamples::between(std::int64_t begin_ns, std::int64_t end_ns) const {
   WAYMARK_CHECK(begin_ns < end_ns);
-  ImuSpan span;
-  span.coverage = coverage(begin_ns, end_ns);
-  if (span.coverage != ImuCoverage::kWhole) return span;
+  if (coverage(begin_ns, end_ns) != ImuCoverage::kWhole) return {};
   const std::size_t first = first_from(begin_ns);
   const std::size_t last = first_from(end_ns);
-  span.samples.reserve(last - first + 2);
-  if (samples_[first].timestamp_ns != begin_ns) {
-    span.samples.push_back(interpolate(first, begin_ns));
-  }
-  span.samples.insert(span.samples.end(),
-                      samples_.begin() + static_cast<std::ptrdiff_t>(first),
-                      samples_.begin() + static_cast<std::ptrdiff_t>(last));
-  span.samples.push_back(interpolate(last, end_ns));
-  return span;
+  std::vector<ImuSample> samples = {interpolate(first, begin_ns)};
+  const std::size_t next = samples_[first].timestamp_ns == begin_ns ? first + 1 : first;
+  samples.insert(samples.end(), samples_.begin() + next, samples_.begin() + last);
+  samples.push_back(interpolate(last, end_ns));
+  return samples;
 }
 
 void ImuSamples::drop_before(std::int64_t timestamp_ns) {

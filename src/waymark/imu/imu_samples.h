@@ -19,12 +19,6 @@ enum class ImuCoverage {
   kGap,      ///< Samples are missing in it.
 };
 
-/// The samples from one time to another, with one interpolated at either end.
-struct ImuSpan {
-  ImuCoverage coverage = ImuCoverage::kOutside;
-  std::vector<ImuSample> samples;  ///< At least two, of ascending times, if the coverage is whole.
-};
-
 /// A stream of samples in the order of time. Nothing is told across a gap, which is longer than
 /// five median periods.
 class ImuSamples {
@@ -35,15 +29,14 @@ class ImuSamples {
   std::size_t num_rejected() const { return num_rejected_; }
 
   std::span<const ImuSample> all() const { return samples_; }
-  /// Median time from a sample to the next, by the last hundred or so; 0 before there are two.
-  std::int64_t period_ns() const { return period_ns_; }
 
   /// Whether samples tell all from begin_ns to end_ns (not before begin_ns).
   ImuCoverage coverage(std::int64_t begin_ns, std::int64_t end_ns) const;
   /// Linear between the neighbours; nothing outside of the samples and in gaps.
   std::optional<ImuSample> at(std::int64_t timestamp_ns) const;
-  /// Samples from begin_ns to end_ns (> begin_ns), and none if they do not tell all of it.
-  ImuSpan between(std::int64_t begin_ns, std::int64_t end_ns) const;
+  /// Samples from begin_ns to end_ns (> begin_ns), with one interpolated at either end: at least
+  /// two, or none if they do not tell all of it.
+  std::vector<ImuSample> between(std::int64_t begin_ns, std::int64_t end_ns) const;
 
   /// Forgets what is not needed to interpolate at this time or later.
   void drop_before(std::int64_t timestamp_ns);
@@ -55,7 +48,7 @@ class ImuSamples {
   void update_period();
 
   std::vector<ImuSample> samples_;
-  std::int64_t period_ns_ = 0;
+  std::int64_t period_ns_ = 0;  ///< Median of the last hundred or so.
   std::size_t num_rejected_ = 0;
   std::size_t num_since_period_ = 0;
 };

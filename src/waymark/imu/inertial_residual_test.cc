@@ -39,7 +39,7 @@ struct Scene {
     const ImuSamples samples = testing::simulated_samples(
         motion, begin_s - 0.1, end_s + 0.1, rate_hz, {}, biases, setup.gravity, rng);
     return {
-        samples.between(nanoseconds(begin_s), nanoseconds(end_s)).samples, kResidualNoise, biases};
+        samples.between(nanoseconds(begin_s), nanoseconds(end_s)), kResidualNoise, biases};
   }
 };
 

@@ -25,11 +25,10 @@ PreintegrationChain cut_chain(const StartProblem& problem,
   PreintegrationChain chain{time_shift_s, {}};
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * time_shift_s));
   for (std::size_t i = 0; i + 1 < problem.poses.size(); ++i) {
-    ImuSpan span = problem.samples.between(problem.poses[i].timestamp_ns + shift_ns,
-                                           problem.poses[i + 1].timestamp_ns + shift_ns);
-    chain.intervals.emplace_back();
-    if (span.coverage != ImuCoverage::kWhole) continue;
-    chain.intervals.back().emplace(std::move(span.samples), problem.noise, states[i].biases);
+    std::vector<ImuSample> samples = problem.samples.between(
+        problem.poses[i].timestamp_ns + shift_ns, problem.poses[i + 1].timestamp_ns + shift_ns);
+    auto& interval = chain.intervals.emplace_back();
+    if (!samples.empty()) interval.emplace(std::move(samples), problem.noise, states[i].biases);
   }
   return chain;
 }

@@ -61,7 +61,7 @@ struct InertialStart {
 /// Finds gravity, scale, velocities, biases, and what is not told of the calibration, from poses in
 /// the order of time (a few dozen, .1 to 1 s apart) and the samples around them. No motion is asked
 /// for: what it does not tell has a large standard deviation; a scale that is not told to 10 % is
-/// the one believed before, as sure as that. Three steps: rotation_start, linear_start,
+/// the one believed before, as sure as that. Two steps: rotation_start,
 /// refine_inertial_start. Nothing if no two neighbouring poses have all samples
 /// between.
 std::optional<InertialStart> start_inertial(const ImuSamples& samples,

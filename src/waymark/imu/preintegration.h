@@ -48,11 +48,10 @@ class Preintegration {
 
   /// 9x6: (rotation, velocity, position) by (gyroscope bias, accelerometer bias).
   const Eigen::Matrix<double, 9, 6>& by_biases() const { return by_biases_; }
-  /// Of the errors from noise and from biases that move in between.
-  Matrix9d covariance() const { return covariance_.topLeftCorner<9, 9>(); }
-  /// Of the same and of how far both biases move (their random walks), which go together.
-  const Matrix15d& covariance_with_walk() const { return covariance_; }
-  /// Lower triangular L with L^T L the inverse of covariance_with_walk().
+  /// Of the errors from noise and from biases that move in between, and of how far both biases move
+  /// (their random walks), which go together.
+  const Matrix15d& covariance() const { return covariance_; }
+  /// Lower triangular L with L^T L the inverse of covariance().
   const Matrix15d& square_root_information() const { return square_root_information_; }
 
  private:

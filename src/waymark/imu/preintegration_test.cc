@@ -148,12 +148,10 @@ TEST(Preintegration, RootOfInformationIsThatOfTheCovariance) {
   for (const int count : {1, 2, 50}) {  // Even a single step has a covariance of full rank.
     const Preintegration integrated(true_samples(motion, 0.0, 0.005 * count, count), kNoise, {});
     const Matrix15d& root = integrated.square_root_information();
-    const Matrix15d whitened = root * integrated.covariance_with_walk() * root.transpose();
+    const Matrix15d whitened = root * integrated.covariance() * root.transpose();
     EXPECT_LT((whitened - Matrix15d::Identity()).norm(), 1e-6);
-    EXPECT_EQ(Matrix9d(integrated.covariance()),
-              Matrix9d(integrated.covariance_with_walk().topLeftCorner<9, 9>()));
     const double seconds = integrated.duration_s();
-    EXPECT_NEAR(integrated.covariance_with_walk()(9, 9), 1e-6 * seconds, 1e-15);
+    EXPECT_NEAR(integrated.covariance()(9, 9), 1e-6 * seconds, 1e-15);
     EXPECT_NEAR(
         integrated.covariance()(0, 0), 1e-6 * seconds, 4e-7 * seconds * seconds * seconds + 1e-15);
   }

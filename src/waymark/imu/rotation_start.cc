@@ -1,10 +1,10 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
 #include <limits>
 
-#include "waymark/geometry/alignment.h"
 #include "waymark/geometry/robust_loss.h"
 #include "waymark/imu/start_steps.h"
 
@@ -49,11 +49,11 @@ class OrientationTrack {
   std::vector<Eigen::Quaterniond> orientations_;
 };
 
-/// Mean angular velocities between neighbouring poses, each in its own frame, rad/s.
+/// Mean angular velocities between neighbouring poses, each in its own frame, rad/s; a column each.
 struct TurnRates {
-  std::vector<Eigen::Vector3d> of_rig;
-  std::vector<Eigen::Vector3d> of_imu;
-  std::vector<double> information;  ///< Of the difference, s^2/rad^2.
+  Eigen::Matrix3Xd of_rig;
+  Eigen::Matrix3Xd of_imu;
+  Eigen::VectorXd information;  ///< Of the difference, s^2/rad^2.
 };
 
 struct TurnFit {
@@ -63,7 +63,9 @@ struct TurnFit {
 };
 
 TurnRates turn_rates(const StartProblem& problem, const OrientationTrack& track, double shift) {
-  TurnRates rates;
+  const auto most = static_cast<Eigen::Index>(problem.poses.size());
+  TurnRates rates{Eigen::Matrix3Xd(3, most), Eigen::Matrix3Xd(3, most), Eigen::VectorXd(most)};
+  Eigen::Index count = 0;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * shift));
   for (std::size_t i = 1; i < problem.poses.size(); ++i) {
     const VisionPose& first = problem.poses[i - 1];
@@ -72,39 +74,31 @@ TurnRates turn_rates(const StartProblem& problem, const OrientationTrack& track,
     const std::int64_t end = second.timestamp_ns + shift_ns;
     if (problem.samples.coverage(begin, end) != ImuCoverage::kWhole) continue;
     const double dt = 1e-9 * static_cast<double>(end - begin);
-    const auto imu = track.at(problem.samples, begin).conjugate() * track.at(problem.samples, end);
-    const auto rig = first.rig_from_world.rotation * second.rig_from_world.rotation.conjugate();
-    rates.of_imu.push_back(so3_log(imu) / dt);
-    rates.of_rig.push_back(so3_log(rig) / dt);
+    rates.of_imu.col(count) =
+        so3_log(track.at(problem.samples, begin).conjugate() * track.at(problem.samples, end)) / dt;
+    rates.of_rig.col(count) =
+        so3_log(first.rig_from_world.rotation * second.rig_from_world.rotation.conjugate()) / dt;
     const double gyroscope = problem.noise.gyroscope;
     const double pose = problem.options.pose_rotation_sigma;
-    rates.information.push_back(dt * dt / (2.0 * pose * pose + dt * gyroscope * gyroscope));
+    rates.information[count++] = dt * dt / (2.0 * pose * pose + dt * gyroscope * gyroscope);
   }
-  return rates;
+  return {
+      rates.of_rig.leftCols(count), rates.of_imu.leftCols(count), rates.information.head(count)};
 }
 
 /// The rotation that aligns the rates without their means; where these do not tell it, it is the
-/// one of those that explain them that turns least.
-Eigen::Matrix3d align_rates(const TurnRates& rates, std::span<const double> weights) {
-  double sum = 0.0;
-  Eigen::Vector3d mean_rig = Eigen::Vector3d::Zero(), mean_imu = Eigen::Vector3d::Zero();
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    sum += weights[i];
-    mean_rig += weights[i] * rates.of_rig[i];
-    mean_imu += weights[i] * rates.of_imu[i];
-  }
-  std::vector<Eigen::Vector3d> rig, imu;
-  std::vector<double> all(weights.begin(), weights.end());
-  for (std::size_t i = 0; i < weights.size(); ++i) {
-    rig.push_back(rates.of_rig[i] - mean_rig / sum);
-    imu.push_back(rates.of_imu[i] - mean_imu / sum);
-  }
-  for (int i = 0; i < 3; ++i) {  // A rotation of 1 rad costs as much as one standard deviation.
-    rig.push_back(Eigen::Vector3d::Unit(i));
-    imu.push_back(Eigen::Vector3d::Unit(i));
-    all.push_back(1.0);
-  }
-  return align_directions(rig, imu, all).value_or(Eigen::Matrix3d::Identity());
+/// one of those that explain them that turns least: 1 rad costs as much as one standard deviation.
+Eigen::Matrix3d align_rates(const TurnRates& rates, const Eigen::VectorXd& weights) {
+  const Eigen::Vector3d mean_rig = rates.of_rig * weights / weights.sum();
+  const Eigen::Vector3d mean_imu = rates.of_imu * weights / weights.sum();
+  const Eigen::Matrix3d product = (rates.of_imu.colwise() - mean_imu) * weights.asDiagonal() *
+                                      (rates.of_rig.colwise() - mean_rig).transpose() +
+                                  Eigen::Matrix3d::Identity();
+  if (!product.allFinite()) return Eigen::Matrix3d::Identity();
+  const Eigen::JacobiSVD<Eigen::Matrix3d> svd(product, Eigen::ComputeFullU | Eigen::ComputeFullV);
+  Eigen::Matrix3d u = svd.matrixU();
+  if ((u * svd.matrixV()).determinant() < 0.0) u.col(2) *= -1.0;
+  return u * svd.matrixV().transpose();
 }
 
 /// known_bias is in the rates already; the fit's is what is left of it.
@@ -112,29 +106,26 @@ TurnFit fit_turns(const StartProblem& problem,
                   const TurnRates& rates,
                   const Eigen::Vector3d& known_bias) {
   TurnFit fit;
-  if (rates.of_rig.empty()) return fit;
+  const Eigen::Index count = rates.information.size();
+  if (count == 0) return fit;
   const auto& told = problem.calibration.imu_from_rig;
   const double prior = std::pow(problem.options.gyroscope_bias_sigma, -2.0);
-  std::vector<double> weights = rates.information;
+  Eigen::VectorXd weights = rates.information;
   for (int round = 0; round < kReweightings; ++round) {
     fit.imu_from_rig = told ? told->rotation_matrix() : align_rates(rates, weights);
-    double sum = prior;
-    fit.bias = -prior * known_bias;
-    for (std::size_t i = 0; i < weights.size(); ++i) {
-      sum += weights[i];
-      fit.bias += weights[i] * (rates.of_imu[i] - fit.imu_from_rig * rates.of_rig[i]);
-    }
-    fit.bias /= sum;
+    const Eigen::Matrix3Xd differences = rates.of_imu - fit.imu_from_rig * rates.of_rig;
+    fit.bias = (differences * weights - prior * known_bias) / (weights.sum() + prior);
     fit.cost = 0.0;
-    for (std::size_t i = 0; i < weights.size(); ++i) {
-      const Eigen::Vector3d error = rates.of_imu[i] - fit.imu_from_rig * rates.of_rig[i] - fit.bias;
-      const RobustValue robust = huber(rates.information[i] * error.squaredNorm(), kHuberTurn);
+    for (Eigen::Index i = 0; i < count; ++i) {
+      const double information = rates.information[i];
+      const RobustValue robust =
+          huber(information * (differences.col(i) - fit.bias).squaredNorm(), kHuberTurn);
       fit.cost += robust.loss;
-      weights[i] = robust.weight * rates.information[i];
+      weights[i] = robust.weight * information;
     }
   }
   // Poses at the ends may have no samples with some shifts.
-  fit.cost *= static_cast<double>(problem.poses.size() - 1) / static_cast<double>(weights.size());
+  fit.cost *= static_cast<double>(problem.poses.size() - 1) / static_cast<double>(count);
   return fit;
 }
 

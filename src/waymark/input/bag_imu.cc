@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/bag_imu.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -10,6 +8,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

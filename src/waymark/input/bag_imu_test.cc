@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/bag_imu.h"
-
 #include <gmock/gmock.h>
 
 #include "waymark/bag/testing/bag_writer.h"
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

@@ -12,11 +12,10 @@
 #include "waymark/input/bag_calibration.h"
 #include "waymark/input/bag_frames.h"
 #include "waymark/input/bag_image.h"
-#include "waymark/input/bag_imu.h"
 #include "waymark/input/bag_topics.h"
 #include "waymark/input/bag_video.h"
 #include "waymark/input/datasets.h"
-#include "waymark/input/imu_choice.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
 

@@ -10,7 +10,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/input/foreign_calibration.h"
-#include "waymark/input/imu_calibration.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {
@@ -63,7 +63,8 @@ std::vector<ConfigSource> read_config_files(std::span<const std::filesystem::pat
     const auto chain =
         is_pair ? read_ros_pair(*ros, source) : read_foreign_cameras(source, read_slam_settings);
     if (!chain) {
-      if (is_imu_document(parse_config(source))) source.key = "imu0";
+      // Kalibr's imu.yaml.
+      if (parse_config(source).find("gyroscope_noise_density")) source.key = "imu0";
       sources.push_back(std::move(source));
       continue;
     }

@@ -12,7 +12,6 @@
 #include <vector>
 
 #include "waymark/base/config.h"
-#include "waymark/input/imu_stream.h"
 #include "waymark/input/input.h"
 #include "waymark/input/listing.h"
 
@@ -47,11 +46,6 @@ Listing list_euroc(const std::filesystem::path& folder, const InputOptions& opti
 
 /// Whether the folder is or holds a mav0 with a camera.
 bool is_euroc(const std::filesystem::path& folder);
-
-/// The inertial data of such a data set: mav0/imu0/data.csv, with what sensor.yaml beside it and of
-/// camera 0, or dso/camchain.yaml and dso/imu_config.yaml, say; nothing where there are none.
-/// Throws InputError.
-std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder);
 
 /// What turns a pose of the sensor of mav0/SENSOR/data.csv (ground truth is of the body) into one
 /// of camera 0, from the sensor.yaml files of both; identity without that of camera 0.

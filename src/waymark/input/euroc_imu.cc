@@ -5,8 +5,7 @@
 #include "waymark/base/config.h"
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
-#include "waymark/input/imu_calibration.h"
-#include "waymark/input/imu_table.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 
@@ -29,8 +28,7 @@ std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder) {
   // Of TUM-VI.
   const std::filesystem::path dso = (mav0 / ".." / "dso").lexically_normal();
   if (std::filesystem::exists(dso / "camchain.yaml")) {
-    fill_in(stream.calibration,
-            read_imu_calibration(config_of(dso / "camchain.yaml"), stream.notes));
+    fill_in(stream.calibration, read_imu_calibration(config_of(dso / "camchain.yaml")));
   }
   if (!stream.calibration.noise && std::filesystem::exists(dso / "imu_config.yaml")) {
     stream.calibration.noise = read_imu_noise(config_of(dso / "imu_config.yaml"), "the IMU");

@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/gopro_imu.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/LU>
@@ -12,7 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/gpmf.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/listing.h"
 
 namespace waymark {
@@ -152,29 +150,26 @@ std::optional<ImuStream> imu_of_gopro(std::span<const TelemetryPacket> packets,
 }
 
 std::optional<ImuStream> imu_of_videos(const std::vector<std::filesystem::path>& files) {
-  std::optional<ImuStream> whole;
+  std::vector<TelemetryPacket> packets;
+  std::string source;
   double start_s = 0.0;
   for (const std::filesystem::path& path : files) {
     if (is_address(path)) return std::nullopt;
+    std::vector<TelemetryPacket> part = read_telemetry(path);
+    if (part.empty()) return std::nullopt;
+    for (TelemetryPacket& packet : part) {
+      packet.time_s += start_s;
+      packets.push_back(std::move(packet));
+    }
     const VideoFile file(path);
-    if (!file.has_telemetry()) return std::nullopt;
-    std::optional<ImuStream> part = imu_of_gopro(read_telemetry(path), path.string());
-    if (!part) return std::nullopt;
-    for (ImuSample& sample : part->samples) sample.timestamp_ns += std::llround(1e9 * start_s);
     // Bounded, as the container may state anything.
     constexpr double kMaxFileSeconds = 1e6;
     if (file.rate_hz() > 0.0) {
       start_s += std::min(kMaxFileSeconds, file.num_frames() / file.rate_hz());
     }
-    if (!whole) {
-      whole = std::move(part);
-      continue;
-    }
-    whole->samples.insert(whole->samples.end(), part->samples.begin(), part->samples.end());
-    whole->source += " and " + part->source;
+    source += (source.empty() ? "" : " and ") + path.string();
   }
-  if (whole) sort_samples(*whole);
-  return whole;
+  return imu_of_gopro(packets, source);
 }
 
 }  // namespace waymark

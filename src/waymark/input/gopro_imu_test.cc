@@ -1,14 +1,12 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/gopro_imu.h"
-
 #include <gmock/gmock.h>
 
 #include <cstdlib>
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/imu/imu_health.h"
-#include "waymark/input/gpmf.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/testing/gpmf_writer.h"
 
 namespace waymark {

@@ -3,10 +3,10 @@
 //
 // Key, length, value: four letters, a type, the bytes of a sample, the number of samples (16 bits,
 // most significant byte first as all numbers), and these, filled up to whole 4 bytes.
-#include "waymark/input/gpmf.h"
-
 #include <algorithm>
 #include <bit>
+
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

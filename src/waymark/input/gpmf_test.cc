@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/gpmf.h"
-
 #include <gmock/gmock.h>
 
 #include <algorithm>
@@ -9,6 +7,7 @@
 #include <filesystem>
 
 #include "waymark/base/text.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/testing/gpmf_writer.h"
 
 namespace waymark {

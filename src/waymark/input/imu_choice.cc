@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/imu_choice.h"
-
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
@@ -12,8 +10,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/imu_calibration.h"
-#include "waymark/input/imu_table.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 
@@ -34,7 +31,7 @@ void take_imu(const InputOptions& options,
   if (!stream) return;
   ImuCalibration calibration = options.imu_calibration;
   fill_in(calibration, stream->calibration);
-  stream->calibration = std::move(calibration);
+  stream->calibration = calibration;
   // No recording is that long.
   constexpr std::int64_t kDayNs = 86'400'000'000'000;
   const std::int64_t first_ns = stream->samples.front().timestamp_ns;

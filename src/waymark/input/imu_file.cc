@@ -8,7 +8,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
-#include "waymark/input/imu_table.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/input/imu_choice.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/imu_stream.h"
 #include "waymark/input/input.h"
 #include "waymark/input/testing/images.h"

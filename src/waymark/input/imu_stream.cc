@@ -11,24 +11,12 @@
 #include "waymark/base/text.h"
 #include "waymark/imu/imu_health.h"
 #include "waymark/imu/imu_samples.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {
 
-constexpr std::size_t kMaxImuGapsShown = 5;
-
 double in_seconds(std::int64_t duration_ns) { return 1e-9 * static_cast<double>(duration_ns); }
-
-std::string format_imu_gaps(const std::vector<ImuGap>& gaps) {
-  std::string text = gaps.empty() ? "  gaps: none\n" : fmt::format("  gaps: {}\n", gaps.size());
-  for (std::size_t i = 0; i < std::min(gaps.size(), kMaxImuGapsShown); ++i) {
-    text += fmt::format("    {:.3f} s at {} s\n",
-                        in_seconds(gaps[i].duration_ns),
-                        format_seconds(gaps[i].start_ns));
-  }
-  if (gaps.size() > kMaxImuGapsShown) text += "    ...\n";
-  return text;
-}
 
 /// How the samples lie to the images.
 std::string describe_overlap(const ImuStream& stream,
@@ -71,6 +59,24 @@ std::string format_imu_calibration(const ImuCalibration& calibration) {
   return text;
 }
 
+/// Sorts the samples by time, leaves double times out, and counts both.
+void sort_samples(ImuStream& stream) {
+  std::vector<ImuSample>& samples = stream.samples;
+  std::int64_t latest_ns = INT64_MIN;
+  for (const ImuSample& sample : samples) {
+    stream.num_out_of_order += sample.timestamp_ns < latest_ns;
+    latest_ns = std::max(latest_ns, sample.timestamp_ns);
+  }
+  std::ranges::stable_sort(samples, {}, &ImuSample::timestamp_ns);
+  const auto doubles = std::ranges::unique(samples, {}, &ImuSample::timestamp_ns);
+  stream.num_doubles += doubles.size();
+  samples.erase(doubles.begin(), doubles.end());
+  if (samples.size() >= 2) return;
+  throw InputError(stream.source,
+                   fmt::format("has {} of inertial data, expected at least 2 at different times",
+                               count_of(samples.size(), "sample")));
+}
+
 }  // namespace
 
 ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
@@ -95,25 +101,6 @@ ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
   return stream;
 }
 
-void sort_samples(ImuStream& stream) {
-  std::vector<ImuSample>& samples = stream.samples;
-  std::int64_t latest_ns = INT64_MIN;
-  for (const ImuSample& sample : samples) {
-    stream.num_out_of_order += sample.timestamp_ns < latest_ns;
-    latest_ns = std::max(latest_ns, sample.timestamp_ns);
-  }
-  std::ranges::stable_sort(samples, {}, &ImuSample::timestamp_ns);
-  const auto end = std::unique(samples.begin(), samples.end(), [](const auto& a, const auto& b) {
-    return a.timestamp_ns == b.timestamp_ns;
-  });
-  stream.num_doubles += static_cast<std::size_t>(samples.end() - end);
-  samples.erase(end, samples.end());
-  if (samples.size() >= 2) return;
-  throw InputError(stream.source,
-                   fmt::format("has {} of inertial data, expected at least 2 at different times",
-                               count_of(samples.size(), "sample")));
-}
-
 std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>& image_times_ns) {
   const ImuHealth health = imu_health(stream.samples);
   std::string text = fmt::format("inertial data: {}\n", stream.source);
@@ -133,22 +120,19 @@ std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>&
                         count_of(stream.num_doubles, "sample"));
   }
   text += describe_overlap(stream, image_times_ns);
-  text += format_imu_gaps(health.gaps);
+  text += fmt::format("  gaps: {}\n", health.gaps.size());
+  if (!health.gaps.empty()) {
+    const ImuGap longest = *std::ranges::max_element(health.gaps, {}, &ImuGap::duration_ns);
+    text += fmt::format("    the longest of {:.3f} s at {} s\n",
+                        in_seconds(longest.duration_ns),
+                        format_seconds(longest.start_ns));
+  }
   text += fmt::format(
-      "  mean length of the acceleration {:.3f} m/s^2, of the angular velocity "
-      "{:.3f} rad/s\n",
+      "  mean length of the acceleration {:.3f} m/s^2, of the angular velocity {:.3f} rad/s\n",
       health.accelerometer.mean_length,
       health.gyroscope.mean_length);
-  const auto add_fault = [&](const char* name, const SensorHealth& sensor) {
-    if (sensor.is_constant) {
-      text += fmt::format("  note: the {} always shows the same: it does not work\n", name);
-    } else if (sensor.saturated_share > 0.0) {
-      const double percent = 100.0 * sensor.saturated_share;
-      text += fmt::format("  note: {:.2g} % of the {} at the end of its range\n", percent, name);
-    }
-  };
-  add_fault("gyroscope", health.gyroscope);
-  add_fault("accelerometer", health.accelerometer);
+  if (health.gyroscope.is_constant) text += "  note: the gyroscope always shows the same\n";
+  if (health.accelerometer.is_constant) text += "  note: the accelerometer always shows the same\n";
   if (health.noise) {
     text += fmt::format("  at rest for {:.0f} s: {}\n", health.rest_s, format_noise(*health.noise));
   }

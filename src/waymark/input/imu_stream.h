@@ -29,26 +29,6 @@ struct ImuStream {
   std::size_t num_doubles = 0;  ///< Samples left out as there is another of their time.
 };
 
-/// More samples are refused: more than two hours at 1 kHz.
-inline constexpr std::size_t kMaxImuSamples = std::size_t{1} << 23;
-
-/// What one sensor of three axes measured at one moment.
-struct SensorReading {
-  std::int64_t timestamp_ns = 0;
-  Eigen::Vector3d value;  ///< rad/s or m/s^2.
-};
-
-/// A stream at the times of the gyroscope, with the acceleration interpolated linearly between the
-/// readings before and after, but across no gap (see ImuSamples). Throws InputError at `source`
-/// where fewer than two samples are left.
-ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
-                    std::vector<SensorReading> accelerometer,
-                    const std::string& source);
-
-/// Sorts the samples by time, leaves double times out, and counts both. Throws InputError at
-/// `source` where fewer than two are left.
-void sort_samples(ImuStream& stream);
-
 /// What the stream holds, a line each; image_times_ns: of the images beside it, if known.
 std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>& image_times_ns);
 

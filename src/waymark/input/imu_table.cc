@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/input/imu_table.h"
-
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -13,6 +11,7 @@
 #include "waymark/base/median.h"
 #include "waymark/base/text.h"
 #include "waymark/base/time_column.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

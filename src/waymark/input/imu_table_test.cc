@@ -2,13 +2,12 @@
 // SPDX-License-Identifier: Apache-2.0
 //
 // Tables as data sets and recorders of phones write them, cut down to a few rows.
-#include "waymark/input/imu_table.h"
-
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/base/testing/temporary_folder.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

@@ -12,7 +12,7 @@
 #include "waymark/base/text.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
-#include "waymark/input/imu_choice.h"
+#include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {

@@ -11,7 +11,7 @@
 #include "waymark/camera/rotated_camera.h"
 #include "waymark/image/opencv_image.h"
 #include "waymark/input/changed_input.h"
-#include "waymark/input/imu_choice.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/reading.h"
 
 namespace waymark {

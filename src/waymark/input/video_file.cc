@@ -193,8 +193,6 @@ std::optional<std::int64_t> VideoFile::created_s() const {
   return time_us / 1'000'000;
 }
 
-bool VideoFile::has_telemetry() const { return telemetry_stream(*container_) >= 0; }
-
 bool VideoFile::grab() {
   while (!decoder_->receive()) {
     if (has_ended_) return false;

@@ -48,8 +48,6 @@ class VideoFile {
   bool has_times() const;
   /// When the recording began, as the camera noted it, since 1970.
   std::optional<std::int64_t> created_s() const;
-  /// Whether it has telemetry.
-  bool has_telemetry() const;
 
   /// Steps to the next picture, past what is damaged; false at the end.
   bool grab();
@@ -67,7 +65,7 @@ class VideoFile {
   bool has_ended_ = false;
 };
 
-/// The telemetry of a file that has some: at most 256 MiB of it.
+/// The telemetry of a file, at most 256 MiB; nothing where it has none.
 std::vector<TelemetryPacket> read_telemetry(const std::filesystem::path& path);
 
 /// Whether a file holds a video, by what is in it.

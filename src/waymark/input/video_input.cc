@@ -10,8 +10,7 @@
 #include "waymark/camera/rotated_camera.h"
 #include "waymark/input/datasets.h"
 #include "waymark/input/decode.h"
-#include "waymark/input/gopro_imu.h"
-#include "waymark/input/imu_choice.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/listing.h"
 #include "waymark/input/reading.h"
 #include "waymark/input/video_reader.h"
@@ -38,9 +37,7 @@ class VideoInput : public Input {
     start(path);
     describe(files, options, num_frames);
     take_imu(
-        options,
-        [&] { return reader_.file().has_telemetry() ? imu_of_videos(files) : std::nullopt; },
-        info_);
+        options, [&] { return imu_of_videos(files); }, info_);
     turn_imu(info_, turned_deg_ / 90);
   }
 

@@ -32,7 +32,6 @@ double VideoFile::rate_hz() const { return 0.0; }
 double VideoFile::num_frames() const { return 0.0; }
 bool VideoFile::has_times() const { return false; }
 std::optional<std::int64_t> VideoFile::created_s() const { return std::nullopt; }
-bool VideoFile::has_telemetry() const { return false; }
 bool VideoFile::grab() { return false; }
 std::optional<double> VideoFile::time_s() const { return std::nullopt; }
 std::optional<cv::Mat> VideoFile::picture() { return std::nullopt; }

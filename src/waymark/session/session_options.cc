@@ -15,7 +15,7 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/camera/pixel_angles.h"
 #include "waymark/camera/resized_camera.h"
-#include "waymark/input/imu_calibration.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/mapfile/map_file.h"
 
 namespace waymark {
@@ -145,7 +145,7 @@ PreparedInput prepare_input(const SessionOptions& options) {
   InputOptions reading = options.reading;
   reading.enlarges_small = true;
   reading.calibration = read_camchain(config);
-  reading.imu_calibration = read_imu_calibration(config, notes);
+  reading.imu_calibration = read_imu_calibration(config);
   if (options.calibration) reading.calibration = options.calibration;
   prepared.input = open_input(options.input, reading);
 

@@ -15,7 +15,7 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/testing/temporary_folder.h"
-#include "waymark/input/imu_calibration.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/simulate/dataset.h"
 #include "waymark/simulate/named_cameras.h"
 
