@@ -115,8 +115,8 @@ void add_reading_options(CLI::App& command, std::filesystem::path& input, InputO
   reads(command.add_option("--depth", reading.depth, "Depth images of a folder of images [none]"));
   reads(command.add_option("--imu",
                            reading.imu,
-                           "Inertial data: a table or a folder of them, or none, which ignores "
-                           "those of INPUT [those that INPUT carries]"))
+                           "Inertial data: a table, or none, which ignores those of "
+                           "INPUT [those that INPUT carries]"))
       ->type_name("FILE|none");
   command
       .add_option("--fps", reading.fps, "Frames per second where nothing tells their times [30]")

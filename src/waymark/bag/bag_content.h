@@ -11,10 +11,16 @@
 #include <tuple>
 #include <vector>
 
-#include "waymark/bag/ros_encoding.h"
 #include "waymark/bag/ros_messages.h"
 
 namespace waymark {
+
+/// How the messages of a topic are written.
+enum class RosEncoding {
+  kRos1,
+  kCdr,      ///< Of ROS 2.
+  kUnknown,  ///< Not ROS: is counted, not read.
+};
 
 /// A topic of a bag.
 struct BagTopic {

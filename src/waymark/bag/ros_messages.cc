@@ -4,6 +4,7 @@
 
 #include <bit>
 
+#include "waymark/bag/bag_content.h"
 #include "waymark/bag/byte_source.h"
 
 namespace waymark {

@@ -9,9 +9,9 @@
 #include <string_view>
 #include <vector>
 
-#include "waymark/bag/ros_encoding.h"
-
 namespace waymark {
+
+enum class RosEncoding;
 
 // Messages of ROS: as ROS 1 serialises them, and in CDR (the "plain CDR" of OMG's DDS-XTypes, least
 // significant byte first) as ROS 2 does. Sequences are views of the bytes of the message.

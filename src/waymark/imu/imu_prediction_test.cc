@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/imu/imu_prediction.h"
-
 #include <gtest/gtest.h>
 
 #include <Eigen/Cholesky>
 
 #include "waymark/base/rng.h"
+#include "waymark/imu/inertial_residual.h"
 #include "waymark/imu/testing/imu_motion.h"
 
 namespace waymark {

@@ -3,8 +3,11 @@
 #include "waymark/imu/inertial_residual.h"
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <cmath>
+#include <utility>
 
+#include "waymark/base/check.h"
 #include "waymark/geometry/bearing.h"
 
 namespace waymark {
@@ -112,6 +115,23 @@ void add_translation(const Preintegration& preintegration,
   residual.by_first.block<6, 6>(3, 9) -= preintegration.by_biases().bottomRows<6>();
 }
 
+/// Where a delta leads from a state (Forster et al. 2017, eq. 33, solved for the second state).
+InertialState state_after(const InertialState& first,
+                          const Preintegration& preintegration,
+                          const InertialSetup& setup) {
+  const double t = preintegration.duration_s();
+  const InertialDelta delta = preintegration.delta_with(first.biases);
+  const Rigid3 begin = world_from_imu(first, setup);
+  const Rigid3 end((begin.rotation * delta.rotation).normalized(),
+                   begin.translation + t * first.velocity + 0.5 * t * t * setup.gravity +
+                       begin.rotation * delta.position);
+  InertialState second = first;
+  second.velocity += t * setup.gravity + begin.rotation * delta.velocity;
+  second.rig_from_world = (end * setup.imu_from_rig).inverse();
+  second.rig_from_world.translation *= std::exp(-setup.log_scale);
+  return second;
+}
+
 }  // namespace
 
 InertialState InertialState::moved(const Vector15d& tangent) const {
@@ -157,6 +177,27 @@ InertialResidual inertial_residual(const Preintegration& preintegration,
   residual.by_second = whiten * residual.by_second.eval();
   residual.by_setup = whiten * residual.by_setup.eval();
   return residual;
+}
+
+std::optional<InertialEstimate> predict(const InertialEstimate& first,
+                                        const ImuSamples& samples,
+                                        std::int64_t begin_ns,
+                                        std::int64_t end_ns,
+                                        const ImuNoise& noise,
+                                        const InertialSetup& setup) {
+  WAYMARK_CHECK(setup.time_shift_change_s == 0.0);
+  std::vector<ImuSample> between = samples.between(begin_ns, end_ns);
+  if (between.empty()) return std::nullopt;
+  const Preintegration measured(std::move(between), noise, first.state.biases);
+  InertialEstimate second;
+  second.state = state_after(first.state, measured, setup);
+  // The whitened residual of both has unit covariance: by_first * e_1 + by_second * e_2 = n.
+  const InertialResidual residual = inertial_residual(measured, first.state, second.state, setup);
+  const Matrix15d inverse = residual.by_second.inverse();
+  const Matrix15d by_first = inverse * residual.by_first;
+  second.covariance =
+      by_first * first.covariance * by_first.transpose() + inverse * inverse.transpose();
+  return second;
 }
 
 }  // namespace waymark

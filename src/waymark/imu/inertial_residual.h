@@ -3,9 +3,12 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
+#include <optional>
 
 #include "waymark/geometry/rigid3.h"
 #include "waymark/imu/imu.h"
+#include "waymark/imu/imu_samples.h"
 #include "waymark/imu/preintegration.h"
 
 namespace waymark {
@@ -62,5 +65,22 @@ InertialResidual inertial_residual(const Preintegration& preintegration,
                                    const InertialState& first,
                                    const InertialState& second,
                                    const InertialSetup& setup);
+
+/// A state and how sure it is.
+struct InertialEstimate {
+  InertialState state;
+  Matrix15d covariance = Matrix15d::Zero();  ///< Of its tangent vector.
+};
+
+/// Where the rig is at end_ns by what it was at begin_ns (< end_ns, by the clock of the IMU, which
+/// the setup does not change) and the samples between; nothing where these do not tell all of it.
+/// The covariance is propagated to first order, with the noise and the walk of the biases; that of
+/// the setup is not in it.
+std::optional<InertialEstimate> predict(const InertialEstimate& first,
+                                        const ImuSamples& samples,
+                                        std::int64_t begin_ns,
+                                        std::int64_t end_ns,
+                                        const ImuNoise& noise,
+                                        const InertialSetup& setup);
 
 }  // namespace waymark

@@ -19,35 +19,17 @@ constexpr double kMaxShiftSigmas = 3.0;
 /// Errors of a turn in standard deviations, of three components, that count fully.
 constexpr double kHuberTurn = 3.0;
 
-/// How the IMU is turned at any time by its own account.
-class OrientationTrack {
- public:
-  OrientationTrack(std::span<const ImuSample> samples, const Eigen::Vector3d& bias)
-      : samples_(samples), bias_(bias), orientations_(samples.size()) {
-    orientations_[0].setIdentity();
-    for (std::size_t i = 1; i < samples.size(); ++i) {
-      orientations_[i] = turned(i - 1, samples[i]).normalized();
-    }
+/// How the IMU turned by its own account: imu_1_from_imu_2.
+Eigen::Quaterniond turn_of(std::span<const ImuSample> samples, const Eigen::Vector3d& bias) {
+  Eigen::Quaterniond turn = Eigen::Quaterniond::Identity();
+  for (std::size_t i = 1; i < samples.size(); ++i) {
+    const ImuSample& a = samples[i - 1];
+    const ImuSample& b = samples[i];
+    const double dt = 1e-9 * static_cast<double>(b.timestamp_ns - a.timestamp_ns);
+    turn = turn * so3_exp(dt * (0.5 * (a.angular_velocity + b.angular_velocity) - bias));
   }
-  Eigen::Quaterniond at(const ImuSamples& samples, std::int64_t timestamp_ns) const {
-    const auto after =
-        std::ranges::upper_bound(samples_, timestamp_ns, {}, &ImuSample::timestamp_ns);
-    return turned(static_cast<std::size_t>(after - samples_.begin()) - 1,
-                  *samples.at(timestamp_ns));
-  }
-
- private:
-  Eigen::Quaterniond turned(std::size_t from, const ImuSample& to) const {
-    const ImuSample& begin = samples_[from];
-    const double dt = 1e-9 * static_cast<double>(to.timestamp_ns - begin.timestamp_ns);
-    return orientations_[from] *
-           so3_exp(dt * (0.5 * (begin.angular_velocity + to.angular_velocity) - bias_));
-  }
-
-  std::span<const ImuSample> samples_;
-  Eigen::Vector3d bias_;
-  std::vector<Eigen::Quaterniond> orientations_;
-};
+  return turn.normalized();
+}
 
 /// Mean angular velocities between neighbouring poses, each in its own frame, rad/s; a column each.
 struct TurnRates {
@@ -62,7 +44,7 @@ struct TurnFit {
   double cost = std::numeric_limits<double>::infinity();
 };
 
-TurnRates turn_rates(const StartProblem& problem, const OrientationTrack& track, double shift) {
+TurnRates turn_rates(const StartProblem& problem, const Eigen::Vector3d& bias, double shift) {
   const auto most = static_cast<Eigen::Index>(problem.poses.size());
   TurnRates rates{Eigen::Matrix3Xd(3, most), Eigen::Matrix3Xd(3, most), Eigen::VectorXd(most)};
   Eigen::Index count = 0;
@@ -72,10 +54,10 @@ TurnRates turn_rates(const StartProblem& problem, const OrientationTrack& track,
     const VisionPose& second = problem.poses[i];
     const std::int64_t begin = first.timestamp_ns + shift_ns;
     const std::int64_t end = second.timestamp_ns + shift_ns;
-    if (problem.samples.coverage(begin, end) != ImuCoverage::kWhole) continue;
+    const std::vector<ImuSample> samples = problem.samples.between(begin, end);
+    if (samples.empty()) continue;
     const double dt = 1e-9 * static_cast<double>(end - begin);
-    rates.of_imu.col(count) =
-        so3_log(track.at(problem.samples, begin).conjugate() * track.at(problem.samples, end)) / dt;
+    rates.of_imu.col(count) = so3_log(turn_of(samples, bias)) / dt;
     rates.of_rig.col(count) =
         so3_log(first.rig_from_world.rotation * second.rig_from_world.rotation.conjugate()) / dt;
     const double gyroscope = problem.noise.gyroscope;
@@ -130,13 +112,11 @@ TurnFit fit_turns(const StartProblem& problem,
 }
 
 /// The time shift of the least cost: on a grid, then by the parabola through it and its neighbours.
-double best_time_shift(const StartProblem& problem,
-                       const OrientationTrack& track,
-                       const Eigen::Vector3d& bias) {
+double best_time_shift(const StartProblem& problem, const Eigen::Vector3d& bias) {
   const double sigma = problem.options.time_shift_sigma_s;
   const auto cost = [&](int i) {
     const double shift = i * kShiftStep;
-    return fit_turns(problem, turn_rates(problem, track, shift), bias).cost +
+    return fit_turns(problem, turn_rates(problem, bias, shift), bias).cost +
            shift * shift / (sigma * sigma);
   };
   const int most = static_cast<int>(std::ceil(kMaxShiftSigmas * sigma / kShiftStep));
@@ -158,12 +138,11 @@ std::optional<RotationStart> rotation_start(const StartProblem& problem) {
   if (problem.samples.all().empty() || problem.poses.size() < 2) return std::nullopt;
   RotationStart start;
   for (int round = 0; round < kRounds; ++round) {
-    const OrientationTrack track(problem.samples.all(), start.gyroscope_bias);
     const auto& told_shift = problem.calibration.time_shift_s;
-    start.time_shift_s =
-        told_shift ? *told_shift : best_time_shift(problem, track, start.gyroscope_bias);
-    const TurnFit fit =
-        fit_turns(problem, turn_rates(problem, track, start.time_shift_s), start.gyroscope_bias);
+    start.time_shift_s = told_shift ? *told_shift : best_time_shift(problem, start.gyroscope_bias);
+    const TurnFit fit = fit_turns(problem,
+                                  turn_rates(problem, start.gyroscope_bias, start.time_shift_s),
+                                  start.gyroscope_bias);
     if (!std::isfinite(fit.cost)) return std::nullopt;
     start.imu_from_rig = Eigen::Quaterniond(fit.imu_from_rig).normalized();
     start.gyroscope_bias += fit.bias;

@@ -79,29 +79,11 @@ ImuStream stream_of(const std::filesystem::path& path) {
   return stream;
 }
 
-std::filesystem::path table_in(const std::filesystem::path& folder) {
-  for (const char* name : {"imu0/data.csv", "mav0/imu0/data.csv", "data.csv"}) {
-    if (std::filesystem::is_regular_file(folder / name)) return folder / name;
-  }
-  std::filesystem::path gyroscope;
-  for (const std::filesystem::path& table : tables_in(folder)) {
-    const std::string name = name_of(table);
-    const bool has_turn = name.find("gyr") != std::string::npos;
-    const bool has_both = has_turn && name.find("acc") != std::string::npos;
-    if (has_both || name.find("imu") != std::string::npos) return table;
-    if (has_turn && gyroscope.empty()) gyroscope = table;
-  }
-  if (!gyroscope.empty()) return gyroscope;
-  throw InputError(folder.string(),
-                   "holds no inertial data by the names of its files, expected imu.csv, "
-                   "Gyroscope.csv with TotalAcceleration.csv or Accelerometer.csv, or the like");
-}
-
 }  // namespace
 
 ImuStream read_imu_file(const std::filesystem::path& path) {
   try {
-    return stream_of(std::filesystem::is_directory(path) ? table_in(path) : path);
+    return stream_of(path);
   } catch (const std::filesystem::filesystem_error& error) {
     throw InputError(path.string(),
                      "cannot be read: " + error.code().message() + ", expected the right to");

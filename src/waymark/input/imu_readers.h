@@ -63,8 +63,7 @@ struct ImuTable {
 ImuTable parse_imu_table(std::string_view text, const std::string& name);
 
 /// Reads a table of an IMU; one of a single sensor with that of the other beside it, which has the
-/// same name but for the sensor; or a folder that holds such tables, or imu0/data.csv. Throws
-/// InputError.
+/// same name but for the sensor. Throws InputError.
 ImuStream read_imu_file(const std::filesystem::path& path);
 
 /// The inertial data of a EuRoC data set: mav0/imu0/data.csv, with what sensor.yaml beside it and

@@ -104,7 +104,7 @@ struct InputOptions {
   std::optional<BagTimes> times = {};
   /// Calibration from settings; takes the place of the one the data set carries.
   std::optional<CameraChain> calibration = {};
-  /// Inertial data: a file or folder (read_imu_file()), or "none"; empty: what the input carries.
+  /// Inertial data: a table (read_imu_file()), or "none"; empty: what the input carries.
   std::filesystem::path imu = {};
   /// What settings say of the IMU; takes the place, part by part, of what the input knows.
   ImuCalibration imu_calibration = {};

@@ -3,6 +3,7 @@
 #include "waymark/simulate/dataset.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <opencv2/core.hpp>
@@ -15,7 +16,6 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/image/opencv_image.h"
 #include "waymark/results/trajectory.h"
-#include "waymark/simulate/imu_dataset.h"
 #include "waymark/simulate/video_compression.h"
 
 namespace waymark {
@@ -72,6 +72,70 @@ void write_png(const fs::path& path, const BasicImage<T>& image) {
     throw OutputError(path.string(), error.err);
   }
   if (!is_written) throw OutputError(path.string(), "cannot be written");
+}
+
+std::string comma_separated(const Eigen::Vector3d& vector) {
+  return fmt::format(
+      "{},{},{}", unsigned_zero(vector.x()), unsigned_zero(vector.y()), unsigned_zero(vector.z()));
+}
+
+/// The lines of a camera that say how the IMU is mounted to it.
+std::string format_mounting(const ChainCamera& camera, const ImuCalibration& told) {
+  std::string text;
+  if (told.imu_from_rig) {
+    const Eigen::Matrix4d cam_from_imu =
+        (camera.cam_from_rig * told.imu_from_rig->inverse()).matrix().unaryExpr(&unsigned_zero);
+    text += "  T_cam_imu:\n";
+    for (int row = 0; row < 4; ++row) {
+      text += fmt::format("  - [{}]\n", fmt::join(cam_from_imu.row(row), ", "));
+    }
+  }
+  if (told.time_shift_s) text += fmt::format("  timeshift_cam_imu: {}\n", *told.time_shift_s);
+  return text;
+}
+
+/// Samples as EuRoC's imu0/data.csv.
+std::string format_imu_samples(std::span<const ImuSample> samples) {
+  std::string text =
+      "#timestamp [ns],w_RS_S_x [rad s^-1],w_RS_S_y [rad s^-1],w_RS_S_z [rad s^-1],"
+      "a_RS_S_x [m s^-2],a_RS_S_y [m s^-2],a_RS_S_z [m s^-2]\n";
+  for (const ImuSample& sample : samples) {
+    text += fmt::format("{},{},{}\n",
+                        sample.timestamp_ns,
+                        comma_separated(sample.angular_velocity),
+                        comma_separated(sample.acceleration));
+  }
+  return text;
+}
+
+/// The beginning of EuRoC's imu0/sensor.yaml, whose body is the rig; the rest is imu.yaml.
+std::string format_imu_mounting(const Rigid3& imu_from_rig) {
+  const Eigen::Matrix4d body_from_imu = imu_from_rig.inverse().matrix().unaryExpr(&unsigned_zero);
+  return fmt::format("sensor_type: imu\nT_BS:\n  cols: 4\n  rows: 4\n  data: [{}]\n",
+                     fmt::join(body_from_imu.reshaped<Eigen::RowMajor>(), ", "));
+}
+
+/// Kalibr's imu.yaml.
+std::string format_imu_noise(const ImuNoise& noise, double rate_hz) {
+  return fmt::format(
+      "gyroscope_noise_density: {}\ngyroscope_random_walk: {}\n"
+      "accelerometer_noise_density: {}\naccelerometer_random_walk: {}\n"
+      "rostopic: /imu0\nupdate_rate: {}\n",
+      noise.gyroscope,
+      noise.gyroscope_walk,
+      noise.accelerometer,
+      noise.accelerometer_walk,
+      rate_hz);
+}
+
+/// With T_cam_imu and timeshift_cam_imu of each camera, as far as they are told.
+std::string format_camchain_imu(const CameraChain& chain, const ImuCalibration& told) {
+  std::string text = format_camchain(chain);
+  for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
+    const std::string section = fmt::format("cam{}:\n", i);
+    text.insert(text.find(section) + section.size(), format_mounting(chain.cameras[i], told));
+  }
+  return text;
 }
 
 /// Writes frames of one layout and gathers its lists.
@@ -138,12 +202,11 @@ class Writer {
     write_trajectory(folder_ / "groundtruth.txt", truth_, TrajectoryFormat::kTum);
   }
 
-  void add_imu(const std::vector<RecordedImuSample>& samples) const {
+  void add_imu(const std::vector<ImuSample>& samples) const {
     const bool is_csv = layout_ == Layout::kEuroc || layout_ == Layout::kTumVi;
     const fs::path sensor = is_csv ? folder_ / "mav0" / "imu0" : folder_;
     make_output_folder(sensor);
     write_file_atomically(sensor / (is_csv ? "data.csv" : "imu0.csv"), format_imu_samples(samples));
-    write_file_atomically(folder_ / "imu0_truth.csv", format_imu_truth(samples));
     if (!told_imu_.noise) return;
     const std::string noise = format_imu_noise(*told_imu_.noise, spec_.imu->rate_hz);
     write_file_atomically(folder_ / "imu.yaml", noise);

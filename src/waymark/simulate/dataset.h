@@ -20,8 +20,8 @@ namespace waymark {
 /// With each: groundtruth.txt (TUM format, world_from_camera0) and camchain.yaml (Kalibr); where
 /// the spec tells a wrong calibration the right one is in calibration_true.yaml. With an IMU: its
 /// samples in mav0/imu0 (data.csv, and sensor.yaml of EuRoC, whose body is the rig) or imu0.csv,
-/// imu.yaml (Kalibr), T_cam_imu and timeshift_cam_imu in camchain.yaml, as far as they are told,
-/// and imu0_truth.csv (see format_imu_truth()). Calls done(frame) after each frame, if given.
+/// imu.yaml (Kalibr), T_cam_imu and timeshift_cam_imu in camchain.yaml, as far as they are told.
+/// Calls done(frame) after each frame, if given.
 /// Throws OutputError, and InputError for what cannot be told wrong.
 void write_dataset(SimulatedSequence& sequence,
                    const std::filesystem::path& folder,

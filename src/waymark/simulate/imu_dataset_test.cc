@@ -1,7 +1,5 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/imu_dataset.h"
-
 #include <gtest/gtest.h>
 #include <yaml-cpp/yaml.h>
 
@@ -88,18 +86,17 @@ void expect_kalibr(const fs::path& folder, const SequenceSpec& spec) {
 
 void expect_samples(const fs::path& file, const SimulatedSequence& sequence) {
   const auto rows = number_rows(file);
-  const std::vector<RecordedImuSample> samples = sequence.imu_samples();
+  const std::vector<ImuSample> samples = sequence.imu_samples();
   ASSERT_EQ(rows.size(), samples.size());
-  EXPECT_EQ(samples[100].sample.timestamp_ns, sequence.timestamp_ns(0) + 15'000'000);
-  EXPECT_EQ(samples.back().sample.timestamp_ns,
+  EXPECT_EQ(samples[100].timestamp_ns, sequence.timestamp_ns(0) + 15'000'000);
+  EXPECT_EQ(samples.back().timestamp_ns,
             sequence.timestamp_ns(2) + 50'000'000 + 500'000'000 + 15'000'000);
   for (std::size_t i = 0; i < rows.size(); ++i) {
     ASSERT_EQ(rows[i].size(), 7u);
-    EXPECT_EQ(static_cast<std::int64_t>(rows[i][0]), samples[i].sample.timestamp_ns);
+    EXPECT_EQ(static_cast<std::int64_t>(rows[i][0]), samples[i].timestamp_ns);
     for (int axis = 0; axis < 3; ++axis) {
-      EXPECT_EQ(rows[i][static_cast<std::size_t>(1 + axis)],
-                samples[i].sample.angular_velocity[axis]);
-      EXPECT_EQ(rows[i][static_cast<std::size_t>(4 + axis)], samples[i].sample.acceleration[axis]);
+      EXPECT_EQ(rows[i][static_cast<std::size_t>(1 + axis)], samples[i].angular_velocity[axis]);
+      EXPECT_EQ(rows[i][static_cast<std::size_t>(4 + axis)], samples[i].acceleration[axis]);
     }
   }
 }
@@ -144,28 +141,6 @@ TEST(ImuDataset, OthersHaveFilesBesideTheChain) {
   expect_kalibr(folder.path(), spec);
   EXPECT_EQ(file_text(folder / "dso" / "imu_config.yaml"), file_text(folder / "imu.yaml"));
   EXPECT_EQ(file_text(folder / "dso" / "camchain.yaml"), file_text(folder / "camchain.yaml"));
-}
-
-TEST(ImuDataset, TheTruthIsThatOfTheImu) {
-  const testing::TemporaryFolder folder;
-  SequenceSpec spec = inertial_spec(mono_chain(named_camera("perspective", 24)));
-  spec.num_frames = 100;
-  SimulatedSequence sequence(spec);
-  write_dataset(sequence, folder.path());
-  const auto rows = number_rows(folder / "imu0_truth.csv");
-  ASSERT_EQ(rows.size(), sequence.imu_samples().size());
-  const std::vector<double>& row = rows[110];  // Frame 1.
-  ASSERT_EQ(row.size(), 17u);
-  const Rigid3 world_from_imu(Eigen::Quaterniond(row[4], row[5], row[6], row[7]),
-                              {row[1], row[2], row[3]});
-  EXPECT_LT(motion_between(world_from_imu * *spec.imu->calibration().imu_from_rig,
-                           sequence.world_from_rig(1)),
-            1e-9);
-  const Eigen::Vector3d moved = Eigen::Map<const Eigen::Vector3d>(rows[111].data() + 1) -
-                                Eigen::Map<const Eigen::Vector3d>(rows[109].data() + 1);
-  EXPECT_LT((Eigen::Map<const Eigen::Vector3d>(row.data() + 8) - moved / 0.01).norm(), 0.01);
-  EXPECT_EQ(row[11], sequence.imu_samples()[110].gyroscope_bias.x());
-  EXPECT_EQ(row[16], sequence.imu_samples()[110].accelerometer_bias.z());
 }
 
 TEST(ImuDataset, TellsAWrongCalibrationByTheAmountsAsked) {

@@ -46,30 +46,13 @@ ImuDevice phone() {
   return imu;
 }
 
-/// Data sheet of the MPU-6050: .005 deg/s and 400 ug per sqrt(Hz); tolerances of 20 deg/s, 50 mg
-/// and 3 % are taken for three standard deviations. It says nothing of walks: ten times those of
-/// the phone.
-ImuDevice consumer() {
-  ImuDevice imu;
-  imu.gyroscope = {
-      0.005 * kRadPerMountDeg, 2.2e-5, 20.0 / 3.0 * kRadPerMountDeg, 0.01, 500.0 * kRadPerMountDeg};
-  imu.accelerometer = {400e-6 * kStandardGravity,
-                       8.6e-4,
-                       0.05 / 3.0 * kStandardGravity,
-                       0.01,
-                       4.0 * kStandardGravity};
-  return imu;
-}
-
 struct NamedImu {
   std::string_view name;
   ImuDevice (*make)();
 };
 
-constexpr std::array<NamedImu, 4> kImus = {{{"perfect", [] { return ImuDevice{}; }},
-                                            {"mems", mems},
-                                            {"phone", phone},
-                                            {"consumer", consumer}}};
+constexpr std::array<NamedImu, 3> kImus = {
+    {{"perfect", [] { return ImuDevice{}; }}, {"mems", mems}, {"phone", phone}}};
 
 /// A number of a device, by its name in the option.
 struct ImuKey {

@@ -3,12 +3,14 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cstdint>
 #include <limits>
 #include <string>
 #include <vector>
 
 #include "waymark/geometry/rigid3.h"
 #include "waymark/imu/imu.h"
+#include "waymark/simulate/motion.h"
 
 namespace waymark {
 
@@ -41,7 +43,6 @@ struct ImuDevice {
 ///   perfect    without errors
 ///   mems       ADIS16448, as of EuRoC
 ///   phone      BMI160, as of TUM-VI
-///   consumer   MPU-6050
 std::vector<std::string> imu_names();
 
 /// Reads a name and then KEY=VALUE each, which replace what that says. Keys are Kalibr's
@@ -50,5 +51,13 @@ std::vector<std::string> imu_names();
 /// turn_x, turn_y, turn_z in degrees; lever_x, lever_y, lever_z in cm; shift in ms. Throws
 /// InputError.
 ImuDevice parse_imu(const std::vector<std::string>& words);
+
+/// The samples of a whole motion, whose first moment is start_ns by the clock of the cameras; from
+/// half a second before it to half a second after, as real ones begin before the first image. The
+/// same seed gives the same errors whatever the motion.
+std::vector<ImuSample> record_imu(const ImuDevice& imu,
+                                  const Motion& motion,
+                                  std::int64_t start_ns,
+                                  std::uint64_t seed);
 
 }  // namespace waymark

@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/imu_recording.h"
-
 #include <cmath>
 #include <numbers>
 
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
+#include "waymark/simulate/imu_device.h"
 
 namespace waymark {
 namespace {
@@ -28,16 +27,13 @@ class InertialTriad {
     scale_ = Vector3d::Ones() + draw(errors.scale);
   }
 
-  const Vector3d& bias() const { return bias_; }
-
   Vector3d measure(const Vector3d& truth) {
     // Sampling white noise of a density averages it over 1 / rate (Crassidis 2006).
     const Vector3d noise = draw(errors_.noise_density * std::sqrt(rate_hz_));
     const Vector3d value = scale_.cwiseProduct(truth) + bias_ + noise;
+    bias_ += draw(errors_.random_walk / std::sqrt(rate_hz_));
     return value.cwiseMax(-errors_.range).cwiseMin(errors_.range);
   }
-
-  void step() { bias_ += draw(errors_.random_walk / std::sqrt(rate_hz_)); }
 
  private:
   Vector3d draw(double sigma) {
@@ -110,38 +106,28 @@ ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig)
 
 }  // namespace
 
-std::vector<RecordedImuSample> record_imu(const ImuDevice& imu,
-                                          const Motion& motion,
-                                          std::int64_t start_ns,
-                                          std::uint64_t seed) {
+std::vector<ImuSample> record_imu(const ImuDevice& imu,
+                                  const Motion& motion,
+                                  std::int64_t start_ns,
+                                  std::uint64_t seed) {
+  constexpr double kLeadSeconds = 0.5;
   WAYMARK_CHECK(imu.rate_hz > 0.0);
   const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
-  const Rigid3 rig_from_imu = imu_from_rig.inverse();
   InertialTriad gyroscope(imu.gyroscope, imu.rate_hz, seed, kGyroscopeStream);
   InertialTriad accelerometer(imu.accelerometer, imu.rate_hz, seed, kAccelerometerStream);
   const RotorVibration vibration(imu.vibration, seed);
-  std::vector<RecordedImuSample> recorded;
-  const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kImuLeadS));
-  for (std::int64_t i = -std::llround(imu.rate_hz * kImuLeadS); i <= last; ++i) {
+  std::vector<ImuSample> samples;
+  const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kLeadSeconds));
+  for (std::int64_t i = -std::llround(imu.rate_hz * kLeadSeconds); i <= last; ++i) {
     const double seconds = static_cast<double>(i) / imu.rate_hz;
-    const MotionState state = motion.state(seconds);
     const Vector3d shake = vibration.at(seconds);
-    RecordedImuSample now;
-    now.world_from_imu = state.world_from_rig * rig_from_imu;
-    const Vector3d lever = state.world_from_rig.rotation * rig_from_imu.translation;
-    now.velocity = state.velocity + state.angular_velocity.cross(lever);
-    now.gyroscope_bias = gyroscope.bias();
-    now.accelerometer_bias = accelerometer.bias();
-    now.sample = exact_imu_sample(state, imu_from_rig);
-    now.sample.timestamp_ns = start_ns + std::llround(1e9 * (seconds + imu.time_shift_s));
-    now.sample.angular_velocity =
-        gyroscope.measure(now.sample.angular_velocity + RotorVibration::kTurnPerShake * shake);
-    now.sample.acceleration = accelerometer.measure(now.sample.acceleration + shake);
-    recorded.push_back(now);
-    gyroscope.step();
-    accelerometer.step();
+    const ImuSample exact = exact_imu_sample(motion.state(seconds), imu_from_rig);
+    samples.push_back(
+        {start_ns + std::llround(1e9 * (seconds + imu.time_shift_s)),
+         gyroscope.measure(exact.angular_velocity + RotorVibration::kTurnPerShake * shake),
+         accelerometer.measure(exact.acceleration + shake)});
   }
-  return recorded;
+  return samples;
 }
 
 }  // namespace waymark

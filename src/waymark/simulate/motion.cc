@@ -15,7 +15,6 @@
 
 #include "waymark/base/check.h"
 #include "waymark/base/rng.h"
-#include "waymark/simulate/ride.h"
 
 namespace waymark {
 namespace {

@@ -1,12 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/ride.h"
-
 #include <algorithm>
 #include <cmath>
 #include <numbers>
 
 #include "waymark/imu/imu.h"
+#include "waymark/simulate/motion.h"
 
 namespace waymark {
 namespace {

@@ -1,11 +1,11 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/simulate/ride.h"
-
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
+
+#include "waymark/simulate/motion.h"
 
 namespace waymark {
 namespace {

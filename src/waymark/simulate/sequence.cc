@@ -135,7 +135,7 @@ Rigid3 SimulatedSequence::world_from_rig(int index) const {
   return motion_.world_from_rig(seconds(index));
 }
 
-std::vector<RecordedImuSample> SimulatedSequence::imu_samples() const {
+std::vector<ImuSample> SimulatedSequence::imu_samples() const {
   if (!spec_.imu) return {};
   return record_imu(*spec_.imu, motion_, kFirstTimestampNs, spec_.seed);
 }

@@ -32,7 +32,6 @@
 #include "waymark/marker/known_markers.h"
 #include "waymark/simulate/calibration_error.h"
 #include "waymark/simulate/imu_device.h"
-#include "waymark/simulate/imu_recording.h"
 #include "waymark/simulate/motion.h"
 #include "waymark/simulate/render.h"
 #include "waymark/simulate/stabilizer.h"
@@ -130,7 +129,7 @@ class SimulatedSequence {
   /// True pose of a frame, without rendering it.
   Rigid3 world_from_rig(int index) const;
   /// What the IMU of the spec measures, see record_imu(); nothing without one.
-  std::vector<RecordedImuSample> imu_samples() const;
+  std::vector<ImuSample> imu_samples() const;
   /// Renders a frame; index in [0, num_frames()).
   SimulatedFrame frame(int index);
 
