@@ -38,8 +38,7 @@ struct Scene {
     Rng rng(0, 0);
     const ImuSamples samples = testing::simulated_samples(
         motion, begin_s - 0.1, end_s + 0.1, rate_hz, {}, biases, setup.gravity, rng);
-    return {
-        samples.between(nanoseconds(begin_s), nanoseconds(end_s)), kResidualNoise, biases};
+    return {samples.between(nanoseconds(begin_s), nanoseconds(end_s)), kResidualNoise, biases};
   }
 };
 
