@@ -4,6 +4,7 @@
 
 #include <Eigen/LU>
 #include <algorithm>
+#include <bit>
 #include <cmath>
 #include <utility>
 #include <vector>
@@ -15,6 +16,28 @@
 
 namespace waymark {
 namespace {
+
+std::uint64_t big_endian(std::string_view bytes) {
+  std::uint64_t value = 0;
+  for (const char byte : bytes) value = value << 8 | static_cast<unsigned char>(byte);
+  return value;
+}
+
+/// Nothing of types that no sensor has.
+std::vector<double> numbers_of(char type, std::string_view data) {
+  const bool is_short = type == 's' || type == 'S';
+  const bool is_long = type == 'l' || type == 'L' || type == 'f';
+  const std::size_t size = is_short ? 2 : 4;
+  std::vector<double> numbers;
+  for (std::size_t at = 0; (is_short || is_long) && at + size <= data.size(); at += size) {
+    const auto bits = static_cast<std::uint32_t>(big_endian(data.substr(at, size)));
+    numbers.push_back(type == 's'   ? static_cast<std::int16_t>(bits)
+                      : type == 'l' ? static_cast<std::int32_t>(bits)
+                      : type == 'f' ? std::bit_cast<float>(bits)
+                                    : static_cast<double>(bits));
+  }
+  return numbers;
+}
 
 /// Of the models that do not tell theirs, HERO5 on: "Accelerometer (up/down, right/left,
 /// forward/back)", "Gyroscope (z,x,y)".
@@ -128,6 +151,48 @@ bool is_stabilized(std::span<const TelemetryPacket> packets) {
 }
 
 }  // namespace
+
+// Key, length, value: four letters, a type, the bytes of a sample, the number of samples (16 bits,
+// most significant byte first as all numbers), and these, filled up to whole 4 bytes. What holds
+// others has no type: they follow its head, so that all are read one after the other.
+std::vector<GpmfStream> parse_gpmf(std::string_view payload) {
+  constexpr std::size_t kHead = 8;
+  std::vector<GpmfStream> streams;
+  GpmfStream stream;
+  std::vector<double> scales;
+  while (payload.size() >= kHead) {
+    const std::string_view key = payload.substr(0, 4);
+    const char type = payload[4];
+    const std::size_t sample_size = static_cast<unsigned char>(payload[5]);
+    const std::uint64_t num_samples = big_endian(payload.substr(6, 2));
+    payload.remove_prefix(kHead);
+    if (key == "STRM" || key == "DEVC") {
+      stream = {.device = key == "STRM" ? stream.device : ""};
+      scales.clear();
+    }
+    if (type == 0) continue;
+    const std::size_t size = sample_size * num_samples;
+    if (size > payload.size()) break;
+    const std::string_view data = payload.substr(0, size);
+    payload.remove_prefix(std::min(payload.size(), (size + 3) / 4 * 4));
+    const std::string text(data.substr(0, data.find('\0')));
+    if (key == "DVNM") stream.device = text;
+    if (key == "ORIN") stream.axes = text;
+    if (key == "SCAL") scales = numbers_of(type, data);
+    if (key == "TSMP") stream.num_total = big_endian(data.substr(0, 8));
+    if (key != "ACCL" && key != "GYRO" && key != "GRAV" && key != "IORI") continue;
+    stream.key = key;
+    stream.values = numbers_of(type, data);
+    if (stream.values.empty()) continue;
+    stream.num_values = std::max<std::size_t>(1, stream.values.size() / num_samples);
+    for (std::size_t i = 0; i < stream.values.size() && !scales.empty(); ++i) {
+      const double scale = scales[std::min(i % stream.num_values, scales.size() - 1)];
+      if (scale != 0.0) stream.values[i] /= scale;
+    }
+    streams.push_back(stream);
+  }
+  return streams;
+}
 
 std::optional<ImuStream> imu_of_gopro(std::span<const TelemetryPacket> packets,
                                       const std::string& source) {

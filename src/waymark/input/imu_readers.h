@@ -79,7 +79,7 @@ std::optional<ImuStream> imu_of_bag(const Bag& bag,
 
 /// Measurements of one kind, in one payload of GPMF, the telemetry of GoPro cameras.
 struct GpmfStream {
-  std::string key;             ///< "ACCL", "GYRO", "GRAV", "IORI", ...
+  std::string key;             ///< "ACCL", "GYRO", "GRAV", "IORI".
   std::string device;          ///< The model (DVNM).
   std::size_t num_values = 1;  ///< Of a sample.
   std::vector<double> values;  ///< Scaled (SCAL), sample after sample.
@@ -90,8 +90,8 @@ struct GpmfStream {
   std::size_t num_samples() const { return values.size() / num_values; }
 };
 
-/// Parses a payload: the last element of each STRM, if it is of numbers of 16 or 32 bits, with what
-/// the elements before say of it. What is cut off or malformed ends it: what came before is given.
+/// The streams ACCL, GYRO, GRAV and IORI of a payload, of numbers of 16 or 32 bits, with what is
+/// said of them before. What is cut off or malformed ends it: what came before is given.
 std::vector<GpmfStream> parse_gpmf(std::string_view payload);
 
 /// The IMU of a GoPro camera, of the packets of a file's telemetry (GPMF); nothing where they have

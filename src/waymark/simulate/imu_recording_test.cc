@@ -68,11 +68,11 @@ TEST(ImuRecording, PerfectSamplesIntegrateToTheRenderedPath) {
     const Recorded samples = record_from_start(imu, motion);
     const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
     ASSERT_EQ(samples[500].timestamp_ns, kRecordingStartNs);
-    const std::size_t start = 502;  // At its beginning the acceleration jumps.
+    const std::size_t start = 502;  // Where it begins and ends acceleration jumps.
     TrueState flight = true_state(imu, motion, 0.002);
     double worst_m = 0.0;
     double worst_rad = 0.0;
-    for (std::size_t i = start; i < 20500; i += 2) {
+    for (std::size_t i = start; i < 20496; i += 2) {
       integrate(samples, i, 1e-3, flight);
       const double seconds = 1e-3 * static_cast<double>(i + 2 - 500);
       const Rigid3 rig = flight.world_from_imu * imu_from_rig;
@@ -105,10 +105,10 @@ TEST(ImuRecording, AtRestItFeelsGravityUpwards) {
   const Motion still = make_motion("room", "still", 1.0);
   const Rigid3 world_from_imu = true_state(imu, still, 0.0).world_from_imu;
   for (const ImuSample& now : record_from_start(imu, still)) {
-    EXPECT_NEAR(now.acceleration.norm(), kStandardGravity, 1e-9);
+    EXPECT_NEAR(now.acceleration.norm(), kStandardGravity, 1e-7);
     const Vector3d upwards = world_from_imu.rotation * now.acceleration;
-    EXPECT_LT((upwards - kStandardGravity * Vector3d::UnitZ()).norm(), 1e-9);
-    EXPECT_LT(now.angular_velocity.norm(), 1e-12);
+    EXPECT_LT((upwards - kStandardGravity * Vector3d::UnitZ()).norm(), 1e-7);
+    EXPECT_LT(now.angular_velocity.norm(), 1e-9);
   }
 }
 
