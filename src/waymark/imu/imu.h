@@ -41,7 +41,7 @@ struct ImuCalibration {
   /// What is added to the time of an image to have it by the IMU's clock (Kalibr's
   /// timeshift_cam_imu).
   std::optional<double> time_shift_s;
-  std::optional<ImuNoise> noise;
+  std::optional<ImuNoise> noise;  ///< Of its samples.
 };
 
 }  // namespace waymark

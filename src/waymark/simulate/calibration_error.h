@@ -20,11 +20,10 @@ struct CalibrationError {
   double distortion = 1.0;  ///< Factor of the distortion coefficients; 0: none is told.
   /// By this rotation vector camera 1 is told turned about its own axes, in mrad.
   Eigen::Vector3d turn_mrad = Eigen::Vector3d::Zero();
-  double baseline = 1.0;  ///< Factor of the distance of camera 1 from camera 0.
-  double depth = 1.0;     ///< Factor of the units of the depth image per metre.
-  /// The IMU is told turned by this angle, and so far away, each along (1, 1, 1) of its own axes.
-  double imu_turn_deg = 0.0;
-  double imu_lever_cm = 0.0;
+  double baseline = 1.0;      ///< Factor of the distance of camera 1 from camera 0.
+  double depth = 1.0;         ///< Factor of the units of the depth image per metre.
+  double imu_turn_deg = 0.0;  ///< The IMU is told turned by it about (1, 1, 1) of its own axes.
+  double imu_lever_cm = 0.0;  ///< And so far away along these.
   double imu_shift_ms = 0.0;  ///< Added to the time shift of the IMU.
   bool is_imu_told = true;    ///< Otherwise there is nothing but samples.
 };

@@ -34,7 +34,7 @@ struct CameraShake {
 
 /// How the rig moves at a moment. Vectors are in the world.
 struct MotionState {
-  Rigid3 world_from_rig;
+  Rigid3 world_from_rig;                 ///< Where it is.
   Eigen::Vector3d velocity;              ///< Of the rig's origin, m/s.
   Eigen::Vector3d acceleration;          ///< Of the rig's origin, m/s^2; without gravity.
   Eigen::Vector3d angular_velocity;      ///< rad/s.
