@@ -19,19 +19,6 @@ ImuTable read_table(const std::filesystem::path& path) {
 
 std::string name_of(const std::filesystem::path& path) { return lower_case(path.stem().string()); }
 
-std::vector<std::filesystem::path> tables_in(const std::filesystem::path& folder) {
-  constexpr std::size_t kMaxFiles = 10000;
-  std::vector<std::filesystem::path> tables;
-  for (const auto& entry : std::filesystem::directory_iterator(folder)) {
-    const std::string extension = lower_case(entry.path().extension().string());
-    const bool is_table = extension == ".csv" || extension == ".txt";
-    if (is_table && entry.is_regular_file()) tables.push_back(entry.path());
-    if (tables.size() == kMaxFiles) break;
-  }
-  std::ranges::sort(tables);
-  return tables;
-}
-
 /// A name without what it says of a sensor.
 std::string without_sensor(std::string name) {
   for (const std::string_view word :
@@ -44,22 +31,29 @@ std::string without_sensor(std::string name) {
 
 /// The table of the other sensor beside one: its name is the same but for the sensor.
 std::filesystem::path find_partner(const std::filesystem::path& path, ImuSensor other) {
-  std::filesystem::path best;
+  std::vector<std::filesystem::path> partners;
+  std::error_code ignored;
   const auto folder = path.has_parent_path() ? path.parent_path() : std::filesystem::path(".");
-  for (const std::filesystem::path& table : tables_in(folder)) {
-    const std::string name = name_of(table);
-    const bool is_partner =
-        sensor_of_name(name) == other && without_sensor(name) == without_sensor(name_of(path));
-    // The accelerations of Sensor Logger's Accelerometer.csv lack gravity.
-    if (is_partner && (best.empty() || name.find("total") != std::string::npos)) best = table;
+  for (const auto& entry : std::filesystem::directory_iterator(folder, ignored)) {
+    const std::string name = name_of(entry.path());
+    const bool is_partner = entry.path().extension() == path.extension() &&
+                            sensor_of_name(name) == other &&
+                            without_sensor(name) == without_sensor(name_of(path));
+    if (is_partner && entry.is_regular_file(ignored)) partners.push_back(entry.path());
   }
-  if (!best.empty()) return best;
+  // The accelerations of Sensor Logger's Accelerometer.csv lack gravity, TotalAcceleration.csv's do
+  // not.
+  const auto best = std::ranges::max_element(
+      partners, {}, [](const auto& partner) { return std::pair(name_of(partner), partner); });
+  if (best != partners.end()) return *best;
   throw InputError(path.string(),
                    "is of one sensor, expected that of the other beside it, as Gyroscope.csv and "
                    "Accelerometer.csv are");
 }
 
-ImuStream stream_of(const std::filesystem::path& path) {
+}  // namespace
+
+ImuStream read_imu_file(const std::filesystem::path& path) {
   ImuTable table = read_table(path);
   std::string source = path.string();
   if (table.accelerometer.empty() || table.gyroscope.empty()) {
@@ -77,17 +71,6 @@ ImuStream stream_of(const std::filesystem::path& path) {
   std::ranges::sort(stream.notes);
   stream.notes.erase(std::unique(stream.notes.begin(), stream.notes.end()), stream.notes.end());
   return stream;
-}
-
-}  // namespace
-
-ImuStream read_imu_file(const std::filesystem::path& path) {
-  try {
-    return stream_of(path);
-  } catch (const std::filesystem::filesystem_error& error) {
-    throw InputError(path.string(),
-                     "cannot be read: " + error.code().message() + ", expected the right to");
-  }
 }
 
 }  // namespace waymark

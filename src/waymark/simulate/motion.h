@@ -74,8 +74,8 @@ class Motion {
   std::vector<Wave> waves_;
 };
 
-/// Keys of a Motion of duration_s that goes along the whole of another, in a time of its own. What
-/// the other takes for it does not count.
+// Keys of a Motion of duration_s that goes along the whole of another, in a time of its own. What
+// the other takes for it does not count.
 
 /// As a car does: it moves where it looks, at a constant speed but for two stops, of a tenth of the
 /// time each.
