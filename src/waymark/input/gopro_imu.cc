@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <Eigen/LU>
+#include <Eigen/QR>
 #include <algorithm>
 #include <bit>
 #include <cmath>
@@ -70,31 +71,24 @@ std::vector<Piece> pieces_of(std::span<const TelemetryPacket> packets, std::stri
   return pieces;
 }
 
-/// Times by the number of the sample, on a line through the beginnings of packets by least squares:
-/// a packet has a sample more or less, as its end comes.
-struct TimeLine {
-  double start_s = 0.0;
-  double step_s = 0.0;
-
-  explicit TimeLine(const std::vector<Piece>& pieces) {
-    double count = 0.0, x = 0.0, y = 0.0, xx = 0.0, xy = 0.0;
-    const auto add = [&](double index, double time_s) {
-      count += 1.0;
-      x += index;
-      y += time_s;
-      xx += index * index;
-      xy += index * time_s;
-    };
-    for (const Piece& piece : pieces) add(piece.first, piece.time_s);
-    // The last packet is as long as the video, not as its samples.
-    const Piece& last = pieces.back();
-    const auto num_in_last = static_cast<double>(last.stream.num_samples());
-    if (pieces.size() == 1) add(last.first + num_in_last, last.time_s + last.duration_s);
-    const double spread = count * xx - x * x;
-    if (spread > 0.0) step_s = (count * xy - x * y) / spread;
-    start_s = (y - step_s * x) / count;
+/// Time of the first sample and from one to the next, s: a line through the beginnings of packets
+/// by least squares, since a packet has a sample more or less, as its end comes.
+Eigen::Vector2d fit_times(const std::vector<Piece>& pieces) {
+  const auto count = static_cast<Eigen::Index>(pieces.size());
+  Eigen::MatrixX2d numbers = Eigen::MatrixX2d::Ones(count + 1, 2);
+  Eigen::VectorXd times_s(count + 1);
+  for (Eigen::Index i = 0; i < count; ++i) {
+    const Piece& piece = pieces[static_cast<std::size_t>(i)];
+    numbers(i, 1) = piece.first;
+    times_s[i] = piece.time_s;
   }
-};
+  // The last packet is as long as the video, not as its samples, but a single one has no other.
+  const Piece& last = pieces.back();
+  numbers(count, 1) = last.first + static_cast<double>(last.stream.num_samples());
+  times_s[count] = last.time_s + last.duration_s;
+  const Eigen::Index used = count == 1 ? 2 : count;
+  return numbers.topRows(used).colPivHouseholderQr().solve(times_s.head(used));
+}
 
 /// What turns the values of a sample into the camera's axes.
 Eigen::Matrix3d camera_from_values(const std::string& axes, const std::string& source) {
@@ -121,14 +115,14 @@ std::vector<SensorReading> read_sensor(const std::vector<Piece>& pieces,
                                        const std::string& source) {
   std::vector<SensorReading> readings;
   if (pieces.empty()) return readings;
-  const TimeLine line(pieces);
+  const Eigen::Vector2d line = fit_times(pieces);
   const std::string& told = pieces.front().stream.axes;
   const Eigen::Matrix3d turn = camera_from_values(told.empty() ? kUsualAxes : told, source);
   for (const Piece& piece : pieces) {
     const std::vector<double>& values = piece.stream.values;
     for (std::size_t k = 0; k < piece.stream.num_samples(); ++k) {
       constexpr double kMaxSeconds = 1e9;
-      const double time_s = line.start_s + line.step_s * (piece.first + static_cast<double>(k));
+      const double time_s = line[0] + line[1] * (piece.first + static_cast<double>(k));
       if (piece.stream.num_values != 3 || !(std::abs(time_s) < kMaxSeconds)) continue;
       const Eigen::Vector3d value(values[3 * k], values[3 * k + 1], values[3 * k + 2]);
       if (!value.allFinite() || readings.size() == kMaxImuSamples) continue;

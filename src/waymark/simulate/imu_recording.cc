@@ -49,45 +49,36 @@ class InertialTriad {
   Vector3d scale_;
 };
 
+/// How much a frame turns for what it shakes: a gyroscope feels 0.03 rad/s for each m/s^2.
+constexpr double kTurnPerShake = 0.03;
+
+/// Of a sine that a rotor shakes an IMU with.
+struct Tone {
+  double rate;    ///< rad/s.
+  double phase;   ///< rad.
+  Vector3d push;  ///< m/s^2.
+};
+
 /// What an IMU feels of four rotors and of the frame that they shake: each one's frequency, and
 /// twice and three times of it. The samples of a slow IMU show it as lower frequencies, as those of
-/// one without a filter do.
-class RotorVibration {
- public:
-  /// How much a frame turns for what it shakes: a gyroscope feels 0.03 rad/s for each m/s^2.
-  static constexpr double kTurnPerShake = 0.03;
-
-  RotorVibration(double acceleration, std::uint64_t seed) {
-    Rng rng(seed, kVibrationStream);
-    double power = 0.0;  // Of an axis: a sine's is half of its amplitude's square.
-    for (int rotor = 0; rotor < 4; ++rotor) {
-      const double rate = 2.0 * std::numbers::pi * rng.uniform(70.0, 110.0);
-      for (int harmonic = 1; harmonic <= 3; ++harmonic) {
-        const double x = rng.normal();
-        const double y = rng.normal();
-        const Vector3d push = Vector3d(x, y, rng.normal()) / (harmonic * harmonic);
-        power += push.squaredNorm() / 6.0;
-        tones_.push_back({harmonic * rate, rng.uniform(0.0, 6.0), push});
-      }
+/// one without a filter do. acceleration: standard deviation along each axis, m/s^2.
+std::vector<Tone> rotor_tones(double acceleration, std::uint64_t seed) {
+  Rng rng(seed, kVibrationStream);
+  std::vector<Tone> tones;
+  double power = 0.0;  // Of an axis: a sine's is half of its amplitude's square.
+  for (int rotor = 0; rotor < 4; ++rotor) {
+    const double rate = 2.0 * std::numbers::pi * rng.uniform(70.0, 110.0);
+    for (int harmonic = 1; harmonic <= 3; ++harmonic) {
+      const double x = rng.normal();
+      const double y = rng.normal();
+      const Vector3d push = Vector3d(x, y, rng.normal()) / (harmonic * harmonic);
+      power += push.squaredNorm() / 6.0;
+      tones.push_back({harmonic * rate, rng.uniform(0.0, 6.0), push});
     }
-    for (Tone& tone : tones_) tone.push *= acceleration / std::sqrt(power);
   }
-
-  /// m/s^2.
-  Vector3d at(double seconds) const {
-    Vector3d sum = Vector3d::Zero();
-    for (const Tone& tone : tones_) sum += std::sin(tone.rate * seconds + tone.phase) * tone.push;
-    return sum;
-  }
-
- private:
-  struct Tone {
-    double rate;   ///< rad/s.
-    double phase;  ///< rad.
-    Vector3d push;
-  };
-  std::vector<Tone> tones_;
-};
+  for (Tone& tone : tones) tone.push *= acceleration / std::sqrt(power);
+  return tones;
+}
 
 /// What a perfect IMU measures; without time stamp.
 ImuSample exact_imu_sample(const MotionState& state, const Rigid3& imu_from_rig) {
@@ -115,17 +106,17 @@ std::vector<ImuSample> record_imu(const ImuDevice& imu,
   const Rigid3 imu_from_rig = *imu.calibration().imu_from_rig;
   InertialTriad gyroscope(imu.gyroscope, imu.rate_hz, seed, kGyroscopeStream);
   InertialTriad accelerometer(imu.accelerometer, imu.rate_hz, seed, kAccelerometerStream);
-  const RotorVibration vibration(imu.vibration, seed);
+  const std::vector<Tone> tones = rotor_tones(imu.vibration, seed);
   std::vector<ImuSample> samples;
   const std::int64_t last = std::llround(imu.rate_hz * (motion.duration_s() + kLeadSeconds));
   for (std::int64_t i = -std::llround(imu.rate_hz * kLeadSeconds); i <= last; ++i) {
     const double seconds = static_cast<double>(i) / imu.rate_hz;
-    const Vector3d shake = vibration.at(seconds);
+    Vector3d shake = Vector3d::Zero();
+    for (const Tone& tone : tones) shake += std::sin(tone.rate * seconds + tone.phase) * tone.push;
     const ImuSample exact = exact_imu_sample(motion.state(seconds), imu_from_rig);
-    samples.push_back(
-        {start_ns + std::llround(1e9 * (seconds + imu.time_shift_s)),
-         gyroscope.measure(exact.angular_velocity + RotorVibration::kTurnPerShake * shake),
-         accelerometer.measure(exact.acceleration + shake)});
+    samples.push_back({start_ns + std::llround(1e9 * (seconds + imu.time_shift_s)),
+                       gyroscope.measure(exact.angular_velocity + kTurnPerShake * shake),
+                       accelerometer.measure(exact.acceleration + shake)});
   }
   return samples;
 }
