@@ -161,7 +161,9 @@ std::vector<GpmfStream> parse_gpmf(std::string_view payload) {
     const std::uint64_t num_samples = big_endian(payload.substr(6, 2));
     payload.remove_prefix(kHead);
     if (key == "STRM" || key == "DEVC") {
-      stream = {.device = key == "STRM" ? stream.device : ""};
+      const std::string device = key == "STRM" ? stream.device : "";
+      stream = GpmfStream();
+      stream.device = device;
       scales.clear();
     }
     if (type == 0) continue;
