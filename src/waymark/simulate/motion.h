@@ -51,12 +51,12 @@ class Motion {
 
   /// Time from the first pose to the last.
   double duration_s() const { return duration_s_; }
-  /// Pose at a time; outside of [0, duration] it goes on at the rates of the nearer end, as what is
-  /// measured before the first image and after the last.
+  /// Pose at a time of [0, duration]; times outside are moved to the nearer end.
   Rigid3 world_from_rig(double seconds) const;
-  /// The same as position and angles; times outside are moved to the nearer end.
+  /// The same as position and angles.
   MotionKey key(double seconds) const;
-  /// The pose and its derivatives, by differences in time.
+  /// The pose and its derivatives, by differences in time. Beyond [0, duration] it goes on at the
+  /// rates of the nearer end, as what is measured before the first image and after the last.
   MotionState state(double seconds) const;
 
  private:

@@ -19,6 +19,21 @@ constexpr double kRadPerDeg = std::numbers::pi / 180.0;
 /// 1e-7 m/s^2.
 constexpr double kTimeStep = 1e-4;
 
+/// At a time; before and after the motion it goes on at the rates of the nearer end.
+Rigid3 pose_at(const Motion& motion, double seconds) {
+  const double inside = std::clamp(seconds, 0.0, motion.duration_s());
+  MotionKey at = motion.key(inside);
+  if (inside == seconds) return pose_of(at);
+  const double back_s = seconds < inside ? kTimeStep : -kTimeStep;
+  const MotionKey before = motion.key(inside + back_s);
+  const double steps = (inside - seconds) / back_s;
+  at.position += steps * (at.position - before.position);
+  at.yaw_deg += steps * (at.yaw_deg - before.yaw_deg);
+  at.pitch_deg += steps * (at.pitch_deg - before.pitch_deg);
+  at.roll_deg += steps * (at.roll_deg - before.roll_deg);
+  return pose_of(at);
+}
+
 }  // namespace
 
 Rigid3 pose_of(const MotionKey& key) {
@@ -33,24 +48,12 @@ Rigid3 pose_of(const MotionKey& key) {
   return {(Eigen::Quaterniond(level) * Eigen::Quaterniond(roll)).normalized(), key.position};
 }
 
-Rigid3 Motion::world_from_rig(double seconds) const {
-  const double inside = std::clamp(seconds, 0.0, duration_s_);
-  MotionKey at = key(inside);
-  if (inside == seconds) return pose_of(at);
-  const double back_s = seconds < inside ? kTimeStep : -kTimeStep;
-  const MotionKey before = key(inside + back_s);
-  const double steps = (inside - seconds) / back_s;
-  at.position += steps * (at.position - before.position);
-  at.yaw_deg += steps * (at.yaw_deg - before.yaw_deg);
-  at.pitch_deg += steps * (at.pitch_deg - before.pitch_deg);
-  at.roll_deg += steps * (at.roll_deg - before.roll_deg);
-  return pose_of(at);
-}
+Rigid3 Motion::world_from_rig(double seconds) const { return pose_of(key(seconds)); }
 
 MotionState Motion::state(double seconds) const {
-  const Rigid3 before = world_from_rig(seconds - kTimeStep);
-  const Rigid3 now = world_from_rig(seconds);
-  const Rigid3 after = world_from_rig(seconds + kTimeStep);
+  const Rigid3 before = pose_at(*this, seconds - kTimeStep);
+  const Rigid3 now = pose_at(*this, seconds);
+  const Rigid3 after = pose_at(*this, seconds + kTimeStep);
   const Vector3d turn_to = so3_log(now.rotation * before.rotation.conjugate());
   const Vector3d turn_from = so3_log(after.rotation * now.rotation.conjugate());
   constexpr double kSquare = kTimeStep * kTimeStep;
