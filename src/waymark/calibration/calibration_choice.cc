@@ -26,17 +26,17 @@ constexpr double kNone = 1e-7;
 /// A bound is wider by so much for the rounding of what it bounds.
 constexpr double kRounding = 1.0 + 1e-6;
 
-/// A pair whose bearings are off smoothly over the image, in one direction, is as likely, as is an
-/// offset of depths that nobody told of; most shutters roll, but not those of the cameras that
-/// people calibrate.
-constexpr double kRareErrorProbability = 1e-3;
-constexpr double kReadoutProbability = 0.1;
+/// Of pairs so many have bearings that are off smoothly over the image, in each direction.
+constexpr double kBearingErrorProbability = 0.3;
+/// Depths have an offset that nobody told of, or a shutter rolls: most do, but not those of the
+/// cameras that people calibrate.
+constexpr double kSensorErrorProbability = 0.1;
 
 /// No camera needs longer for its rows.
 constexpr double kMaxReadoutMs = 100.0;
 
-/// An explanation: which spread each of the three groups has, and which of the rare errors there
-/// are.
+/// An explanation: which spread each of the three groups has, and which of the other errors
+/// there are.
 struct Spreads {
   std::array<std::size_t, 3> groups = {};
   bool is_off_along = false;
@@ -54,11 +54,11 @@ std::vector<Spreads> all_spreads(const CalibrationParameters& parameters, FreePa
   for (std::size_t focal = 0; focal < kSpreads.size(); ++focal) {
     for (std::size_t radial = 0; radial < kSpreads.size(); ++radial) {
       for (std::size_t turn = 0; turn < (is_pair ? kSpreads.size() : 1); ++turn) {
-        for (unsigned rare = 0; rare < (is_pair ? 8 : 4); ++rare) {
-          const bool has_first = (rare & 1) != 0, has_second = (rare & 2) != 0;
+        for (unsigned others = 0; others < (is_pair ? 8 : 4); ++others) {
+          const bool has_first = (others & 1) != 0, has_second = (others & 2) != 0;
           const std::array<std::size_t, 3> groups = {focal, radial, turn};
           // Pairs have no depth image.
-          all.push_back(is_pair ? Spreads{groups, has_first, has_second, (rare & 4) != 0, false}
+          all.push_back(is_pair ? Spreads{groups, has_first, has_second, (others & 4) != 0, false}
                                 : Spreads{groups, false, false, has_first, has_second});
         }
       }
@@ -102,13 +102,12 @@ double log_probability(const CalibrationParameters& parameters, const Spreads& s
     return at && parameters.list()[*at].given != 0.0;
   };
   double sum = 0.0;
-  sum += (int{spreads.is_off_along} + int{spreads.is_off_across}) * std::log(kRareErrorProbability);
-  if (spreads.has_depth_offset && !is_told(CalibrationGroup::kDepthOffset)) {
-    sum += std::log(kRareErrorProbability);
-  }
-  if (spreads.has_readout && !is_told(CalibrationGroup::kReadout)) {
-    sum += std::log(kReadoutProbability);
-  }
+  sum +=
+      (int{spreads.is_off_along} + int{spreads.is_off_across}) * std::log(kBearingErrorProbability);
+  const bool has_untold_offset =
+      spreads.has_depth_offset && !is_told(CalibrationGroup::kDepthOffset);
+  const bool has_untold_readout = spreads.has_readout && !is_told(CalibrationGroup::kReadout);
+  sum += (int{has_untold_offset} + int{has_untold_readout}) * std::log(kSensorErrorProbability);
   for (const std::size_t spread : spreads.groups) sum += std::log(kSpreads[spread].probability);
   return sum;
 }

@@ -36,7 +36,7 @@ constexpr double kQuadraticErrorSigma = 1.0;  // px
 /// However many images tell the same, disparities are off by so much, as where surfaces are
 /// slanted, and focal lengths and distortions by this part of the usual standard deviation: so much
 /// do recordings of one camera differ.
-constexpr double kSystematicErrorPx = 0.2;
+constexpr double kSystematicErrorPx = 0.1;
 constexpr double kSystematicPart = 0.15;
 /// Rectified images of cars on the road look like readouts of 7 ms from the bottom up.
 constexpr double kSystematicReadout = 2.5;       // ms
@@ -198,10 +198,13 @@ void CalibrationParameters::add_projection(std::size_t camera) {
 void CalibrationParameters::add_bearing_error(std::size_t camera) {
   const Camera& model = *given_.cameras[camera].camera;
   const double pixel_rad = central_pixel_angle(model);
-  const double side = std::min(0.5 * model.width_px() * pixel_rad, 1.0);
+  const double x = std::min(0.5 * model.width_px() * pixel_rad, 1.0);
+  const double y = std::min(0.5 * model.height_px() * pixel_rad, 1.0);
+  const std::array<double, BearingError::kNumTerms> at_side = {x, y, x * x, x * y, y * y};
   for (int i = 0; i < kNumErrors; ++i) {
-    const bool is_linear = i % BearingError::kNumTerms < 2;
-    const double to_bearing = pixel_rad / (is_linear ? side : side * side);
+    const int term = i % BearingError::kNumTerms;
+    const bool is_linear = term < 2;
+    const double to_bearing = pixel_rad / at_side[static_cast<std::size_t>(term)];
     add({.name = fmt::format("cam{}.{}", camera, kErrorNames[static_cast<std::size_t>(i)]),
          .group =
              i < BearingError::kNumTerms ? CalibrationGroup::kAlong : CalibrationGroup::kAcross,
