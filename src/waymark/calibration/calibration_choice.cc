@@ -26,8 +26,9 @@ constexpr double kNone = 1e-7;
 /// A bound is wider by so much for the rounding of what it bounds.
 constexpr double kRounding = 1.0 + 1e-6;
 
-/// Of pairs so many have bearings that are off smoothly over the image, in each direction.
-constexpr double kBearingErrorProbability = 0.3;
+/// Of pairs so many have bearings that are off smoothly over the image, in each direction: in short
+/// pieces a slanted floor looks alike.
+constexpr double kBearingErrorProbability = 1e-3;
 /// Depths have an offset that nobody told of, or a shutter rolls: most do, but not those of the
 /// cameras that people calibrate.
 constexpr double kSensorErrorProbability = 0.1;

@@ -57,7 +57,7 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
 
 /// Of the priors that say how calibrations err, the one that makes the images likeliest, and what
 /// follows from it. A calibration is as good as usual or, which is rarer, wrong by more, in its
-/// focal lengths, its distortion and its turns each for itself; often are bearings of a pair off
+/// focal lengths, its distortion and its turns each for itself; rarely are bearings of a pair off
 /// smoothly over the image, now and then depths are, or a shutter rolls that is not told of. Among
 /// explanations that fit alike the one wins that needs the smaller and fewer errors (MacKay, 1992,
 /// "Bayesian interpolation").
