@@ -26,9 +26,8 @@ constexpr double kNone = 1e-7;
 /// A bound is wider by so much for the rounding of what it bounds.
 constexpr double kRounding = 1.0 + 1e-6;
 
-/// Of pairs so many have bearings that are off smoothly over the image, in each direction: in short
-/// pieces a slanted floor looks alike.
-constexpr double kBearingErrorProbability = 1e-3;
+/// Of pairs so many have bearings that are off smoothly over the image, in each direction.
+constexpr double kBearingErrorProbability = 0.3;
 /// Depths have an offset that nobody told of, or a shutter rolls: most do, but not those of the
 /// cameras that people calibrate.
 constexpr double kSensorErrorProbability = 0.1;
@@ -176,8 +175,8 @@ CalibrationPosterior posterior(const CalibrationTold& told, CalibrationPrior pri
   result.prior = std::move(prior);
   const Eigen::LLT<Eigen::MatrixXd> factor(told.information + result.prior.information);
   const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior.information);
-  result.gain = gain_of(told, factor);
-  result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
+  result.log_evidence =
+      gain_of(told, factor) + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
   return result;
 }
 

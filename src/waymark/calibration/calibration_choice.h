@@ -37,7 +37,6 @@ struct CalibrationPosterior {
   // Where what images tell has systematic errors:
   Eigen::VectorXd sigma;      ///< Standard deviations of the change.
   double log_evidence = 0.0;  ///< Of the prior, over that of no change.
-  double gain = 0.0;          ///< By how much a change is likelier than none, in nats.
 };
 
 /// By how much the images are likelier, in nats, with what they and a prior tell than with another
