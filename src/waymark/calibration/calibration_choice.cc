@@ -175,8 +175,8 @@ CalibrationPosterior posterior(const CalibrationTold& told, CalibrationPrior pri
   result.prior = std::move(prior);
   const Eigen::LLT<Eigen::MatrixXd> factor(told.information + result.prior.information);
   const Eigen::LLT<Eigen::MatrixXd> of_prior(result.prior.information);
-  result.gain = gain_of(told, factor);
-  result.log_evidence = result.gain + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
+  result.log_evidence =
+      gain_of(told, factor) + 0.5 * (log_determinant(of_prior) - log_determinant(factor));
   return result;
 }
 

@@ -37,7 +37,6 @@ struct CalibrationPosterior {
   // Where what images tell has systematic errors:
   Eigen::VectorXd sigma;      ///< Standard deviations of the change.
   double log_evidence = 0.0;  ///< Of the prior, over that of no change.
-  double gain = 0.0;          ///< By how much a change is likelier than none, in nats.
 };
 
 /// By how much the images are likelier, in nats, with what they and a prior tell than with another
@@ -57,7 +56,7 @@ double variance_between_parts(const CalibrationCost& cost, const CalibrationPost
 
 /// Of the priors that say how calibrations err, the one that makes the images likeliest, and what
 /// follows from it. A calibration is as good as usual or, which is rarer, wrong by more, in its
-/// focal lengths, its distortion and its turns each for itself; often are bearings of a pair off
+/// focal lengths, its distortion and its turns each for itself; rarely are bearings of a pair off
 /// smoothly over the image, now and then depths are, or a shutter rolls that is not told of. Among
 /// explanations that fit alike the one wins that needs the smaller and fewer errors (MacKay, 1992,
 /// "Bayesian interpolation").

@@ -18,12 +18,11 @@ namespace {
 constexpr int kMaxPasses = 10;
 /// What was given is replaced by what makes parts of the way that it was not fitted to likelier by
 /// so many nats, and their squared residuals smaller by this share: what gains less is as well
-/// explained by errors of matching (docs/decisions/calibrate.md).
+/// explained by errors of matching, which differ smoothly over the image where pairs see slanted
+/// surfaces (docs/decisions/calibrate.md).
 constexpr double kMinGain = 10.0;
-constexpr double kMinShare = 0.01;
-/// By so many nats where systematic errors of what images tell are taken for known: three standard
-/// deviations.
-constexpr double kMinSystematicGain = 4.5;
+constexpr double kMinShare = 0.015;
+constexpr double kMinShareOfPairs = 0.03;
 /// What was found before is replaced by what predicts so much better; below it there is nothing to
 /// look for: two standard deviations.
 constexpr double kLeastGain = 2.0;
@@ -211,8 +210,8 @@ bool is_better(const CalibrationCost& cost,
                double squared_residuals) {
   const double predicted = predicted_gain(cost, found, known.change);
   if (known.is_always_refined || known.is_changed()) return predicted > kLeastGain;
-  return found.gain > kMinSystematicGain && predicted > kMinGain &&
-         predicted * cost.variance > kMinShare * squared_residuals;
+  const double min_share = known.given->cameras.size() > 1 ? kMinShareOfPairs : kMinShare;
+  return predicted > kMinGain && predicted * cost.variance > min_share * squared_residuals;
 }
 
 /// What a depth image measured of a point: along z, in which no calibration has a part. Where a

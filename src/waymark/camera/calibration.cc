@@ -36,7 +36,7 @@ constexpr double kQuadraticErrorSigma = 1.0;  // px
 /// However many images tell the same, disparities are off by so much, as where surfaces are
 /// slanted, and focal lengths and distortions by this part of the usual standard deviation: so much
 /// do recordings of one camera differ.
-constexpr double kSystematicErrorPx = 0.1;
+constexpr double kSystematicErrorPx = 0.15;
 constexpr double kSystematicPart = 0.15;
 /// Rectified images of cars on the road look like readouts of 7 ms from the bottom up.
 constexpr double kSystematicReadout = 2.5;       // ms

@@ -20,9 +20,6 @@ namespace {
 
 /// To tell a camera from how it moves takes that many.
 constexpr std::size_t kMinCalibrationKeyframes = 6;
-/// What else is wrong shows once the calibration is better: images are no longer bent, and what
-/// fits only a wrong calibration is gone.
-constexpr int kMaxRefinements = 4;
 /// A rolling shutter, which bends all that the map is made of, shows at so few, or when they turned
 /// more.
 constexpr std::array<std::size_t, 5> kReadoutKeyframes = {5, 7, 10, 14, 20};
@@ -194,15 +191,8 @@ void Mapper::refresh_appearances() {
 }
 
 void Mapper::refine_globally(bool with_calibration) {
-  if (!with_calibration) {
-    for (const SubmapId submap : submaps_by_size(map_)) apply(adjust_globally(map_, submap));
-    return;
-  }
-  for (int pass = 0; pass < kMaxRefinements; ++pass) {
-    const std::shared_ptr<const Rig> before = calibration_.rig;
-    apply(adjust_with_calibration(map_, calibration_));
-    if (calibration_.rig == before) break;
-  }
+  if (with_calibration) return apply(adjust_with_calibration(map_, calibration_));
+  for (const SubmapId submap : submaps_by_size(map_)) apply(adjust_globally(map_, submap));
 }
 
 }  // namespace waymark
