@@ -33,6 +33,21 @@ void report_markers(Reporter& reporter, const MarkerSummary& markers) {
   }
 }
 
+void report_imu(Reporter& reporter, const ImuSummary& imu) {
+  if (!imu.is_used) {
+    reporter.warning(fmt::format("the inertial data is not used: {}", imu.reason));
+    return;
+  }
+  reporter.info(fmt::format(
+      "inertial data: {}level to {:.2g} degrees; clock {:+.1f} +- {:.2g} ms, mounting known to "
+      "{:.2g} degrees",
+      imu.metric_from ? fmt::format("metres known to {:.2g} %, ", 100.0 * imu.scale_sigma) : "",
+      imu.gravity_sigma_deg,
+      imu.time_shift_ms,
+      imu.time_shift_sigma_ms,
+      imu.rotation_sigma_deg));
+}
+
 }  // namespace
 
 void report_results(Reporter& reporter,
@@ -53,6 +68,7 @@ void report_results(Reporter& reporter,
   report_reasons(reporter, results.table, summary);
   if (summary.quality) reporter.info(describe(*summary.quality, summary.loops));
   if (summary.markers) report_markers(reporter, *summary.markers);
+  if (summary.imu) report_imu(reporter, *summary.imu);
   if (!results.ego_mask.values.empty()) {
     reporter.info(
         fmt::format("{:.1f} % of the image moves along with the camera and has no features: {}",

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <cstddef>
 
+#include "waymark/base/check.h"
 #include "waymark/base/median.h"
 
 namespace waymark {
@@ -83,7 +84,27 @@ void measure_rest(std::span<const ImuSample> samples, ImuHealth& health) {
   health.noise = noise;
 }
 
+double shown_density(std::span<const ImuSample> samples, Eigen::Vector3d ImuSample::*sensor) {
+  std::vector<double> squared, steps_s;
+  for (std::size_t i = 2; i < samples.size(); ++i) {
+    const Eigen::Vector3d second =
+        samples[i - 2].*sensor - 2.0 * (samples[i - 1].*sensor) + samples[i].*sensor;
+    squared.push_back(second.squaredNorm());
+    steps_s.push_back(1e-9 *
+                      static_cast<double>(samples[i].timestamp_ns - samples[i - 1].timestamp_ns));
+  }
+  constexpr double kMedianOfThree = 2.366;  // Of the chi-square distribution for three axes.
+  constexpr double kOfSecondDifference = 1.0 + 4.0 + 1.0;
+  return std::sqrt(median(squared) / (kMedianOfThree * kOfSecondDifference) * median(steps_s));
+}
+
 }  // namespace
+
+ImuNoise shown_imu_noise(std::span<const ImuSample> samples) {
+  WAYMARK_CHECK(samples.size() >= 3);
+  return {.gyroscope = shown_density(samples, &ImuSample::angular_velocity),
+          .accelerometer = shown_density(samples, &ImuSample::acceleration)};
+}
 
 ImuNoise default_imu_noise() { return {2.4e-4, 3.5e-3, 1.9e-5, 3e-3}; }
 

@@ -46,4 +46,9 @@ ImuHealth imu_health(std::span<const ImuSample> samples);
 /// which hold what temperature does.
 ImuNoise default_imu_noise();
 
+/// White noise that samples show whatever the motion, which changes little from one to the next: by
+/// the median of their second differences. Filters hide some of it, and what shakes the device
+/// adds. Walks are 0. At least three samples.
+ImuNoise shown_imu_noise(std::span<const ImuSample> samples);
+
 }  // namespace waymark

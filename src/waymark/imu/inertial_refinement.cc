@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/imu/chain_hessian.h"
 #include "waymark/imu/start_steps.h"
 #include "waymark/solver/levenberg_marquardt.h"
 
@@ -43,21 +44,14 @@ SteppedUnknowns operator*(const UnknownsStep& step, SteppedUnknowns unknowns) {
   return unknowns;
 }
 
-/// Of a few hundred rows, for which Eigen's LLT by blocks is several times as fast as its LDLT.
-struct UnknownsHessian : Eigen::MatrixXd {
-  using Eigen::MatrixXd::MatrixXd;
-  using Eigen::MatrixXd::operator=;
-  auto ldlt() const { return llt(); }
-};
-
 /// NormalEquations of a size that is known only when it runs.
 struct UnknownsEquations {
-  UnknownsHessian hessian;
+  ChainHessian hessian;
   Eigen::VectorXd gradient;
   double cost = 0.0;
 
-  explicit UnknownsEquations(Eigen::Index size)
-      : hessian(Eigen::MatrixXd::Zero(size, size)), gradient(Eigen::VectorXd::Zero(size)) {}
+  explicit UnknownsEquations(std::size_t num_states)
+      : hessian(num_states), gradient(Eigen::VectorXd::Zero(hessian.diagonal().size())) {}
   /// Components from there on that are off by so much, with one standard deviation.
   void add_prior(Eigen::Index at, const Eigen::VectorXd& error, double sigma) {
     const double information = 1.0 / (sigma * sigma);
@@ -115,7 +109,7 @@ UnknownsEquations linearize_unknowns(const StartProblem& problem,
                                      const PreintegrationChain& chain,
                                      double log_scale_sigma,
                                      const InertialUnknowns& unknowns) {
-  UnknownsEquations equations(10 + 15 * static_cast<Eigen::Index>(unknowns.states.size()));
+  UnknownsEquations equations(unknowns.states.size());
   add_setup_priors(problem, chain, unknowns.setup, log_scale_sigma, equations);
   add_state_priors(problem, chain, unknowns, equations);
   Eigen::Matrix<double, 15, 30> by_states;
@@ -129,34 +123,26 @@ UnknownsEquations linearize_unknowns(const StartProblem& problem,
                                 residual.by_second.middleCols<3>(6) * second.velocity;
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
     by_states << residual.by_first, residual.by_second;
-    equations.hessian.block<30, 30>(at, at) += by_states.transpose() * by_states;
-    equations.hessian.block<30, 10>(at, 0) += by_states.transpose() * residual.by_setup;
-    equations.hessian.block<10, 10>(0, 0) += residual.by_setup.transpose() * residual.by_setup;
+    equations.hessian.add(i, by_states, residual.by_setup);
     equations.gradient.segment<30>(at) += by_states.transpose() * residual.value;
     equations.gradient.head<10>() += residual.by_setup.transpose() * residual.value;
     equations.cost += residual.value.squaredNorm();
   }
-  const Eigen::Index num_of_states = equations.hessian.rows() - 10;
-  equations.hessian.topRightCorner(10, num_of_states) =
-      equations.hessian.bottomLeftCorner(num_of_states, 10).transpose();
   return equations;
 }
 
 /// Of the setup and the last state, by the last equations; none where rounding has left them
 /// singular.
-Matrix25d covariance_of(const Eigen::MatrixXd& hessian, const Eigen::Vector3d& last_velocity) {
-  const Eigen::LLT<Eigen::MatrixXd> factor(hessian);
+Matrix25d covariance_of(const ChainHessian& hessian, const Eigen::Vector3d& last_velocity) {
+  const Eigen::LLT<Matrix25d> factor(hessian.of_setup_and_last());
   if (factor.info() != Eigen::Success) {
     return Matrix25d::Constant(std::numeric_limits<double>::quiet_NaN());
   }
-  Eigen::MatrixXd units = Eigen::MatrixXd::Zero(hessian.rows(), 25);
-  units.topLeftCorner<10, 10>().setIdentity();
-  units.bottomRightCorner<15, 15>().setIdentity();
   // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
   by_step.block<3, 1>(16, 2) = last_velocity;
   const Matrix25d covariance =
-      by_step * (units.transpose() * factor.solve(units)) * by_step.transpose();
+      by_step * factor.solve(Matrix25d::Identity()) * by_step.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 

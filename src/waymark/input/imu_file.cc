@@ -65,8 +65,10 @@ ImuStream read_imu_file(const std::filesystem::path& path) {
     (is_turn ? table.accelerometer : table.gyroscope) =
         std::move(is_turn ? other.accelerometer : other.gyroscope);
     std::ranges::move(other.notes, std::back_inserter(table.notes));
+    if (table.fault.empty()) table.fault = std::move(other.fault);
   }
   ImuStream stream = merge_imu(table.gyroscope, std::move(table.accelerometer), source);
+  stream.fault = std::move(table.fault);
   std::ranges::move(table.notes, std::back_inserter(stream.notes));
   std::ranges::sort(stream.notes);
   stream.notes.erase(std::unique(stream.notes.begin(), stream.notes.end()), stream.notes.end());

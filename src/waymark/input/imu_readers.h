@@ -53,6 +53,7 @@ struct ImuTable {
   std::vector<SensorReading> gyroscope;      ///< rad/s; empty: the table has none.
   std::vector<SensorReading> accelerometer;  ///< m/s^2; the same.
   std::vector<std::string> notes;            ///< Units as understood, for people.
+  std::string fault;                         ///< As ImuStream::fault.
 };
 
 /// Parses a table with a row per moment, with or without a header. Times are in the unit with 10 to

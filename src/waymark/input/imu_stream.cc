@@ -101,6 +101,17 @@ ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
   return stream;
 }
 
+std::string fault_of(const ImuStream& stream) {
+  if (!stream.fault.empty()) return stream.fault;
+  if (stream.num_out_of_order > stream.samples.size() / 10) {
+    return "so many samples are out of order as those of two devices, or of two clocks, are";
+  }
+  const ImuHealth health = imu_health(stream.samples);
+  if (health.gyroscope.is_constant) return "the gyroscope always shows the same";
+  if (health.accelerometer.is_constant) return "the accelerometer always shows the same";
+  return {};
+}
+
 std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>& image_times_ns) {
   const ImuHealth health = imu_health(stream.samples);
   std::string text = fmt::format("inertial data: {}\n", stream.source);
@@ -110,10 +121,8 @@ std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>&
                       health.rate_hz);
   for (const std::string& note : stream.notes) text += fmt::format("  {}\n", note);
   if (stream.num_out_of_order > 0) {
-    const bool are_many = stream.num_out_of_order > stream.samples.size() / 10;
-    text += fmt::format("  note: {} out of order are sorted in{}\n",
-                        count_of(stream.num_out_of_order, "sample"),
-                        are_many ? ": as those of two devices, or of two clocks, are" : "");
+    text += fmt::format("  note: {} out of order are sorted in\n",
+                        count_of(stream.num_out_of_order, "sample"));
   }
   if (stream.num_doubles > 0) {
     text += fmt::format("  note: {} at the time of another left out\n",
@@ -131,10 +140,11 @@ std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>&
       "  mean length of the acceleration {:.3f} m/s^2, of the angular velocity {:.3f} rad/s\n",
       health.accelerometer.mean_length,
       health.gyroscope.mean_length);
-  if (health.gyroscope.is_constant) text += "  note: the gyroscope always shows the same\n";
-  if (health.accelerometer.is_constant) text += "  note: the accelerometer always shows the same\n";
   if (health.noise) {
     text += fmt::format("  at rest for {:.0f} s: {}\n", health.rest_s, format_noise(*health.noise));
+  }
+  if (const std::string fault = fault_of(stream); !fault.empty()) {
+    text += fmt::format("  note: it is not used: {}\n", fault);
   }
   return text + format_imu_calibration(stream.calibration);
 }

@@ -24,10 +24,14 @@ struct ImuStream {
   ImuCalibration calibration;      ///< As far as it is told.
   std::string source;              ///< For people: a file, a topic.
   std::vector<std::string> notes;  ///< What was understood and assumed, for people.
+  std::string fault = {};          ///< What its reader found wrong with it; see fault_of().
   /// Samples that came later than one with a later time, and were sorted in.
   std::size_t num_out_of_order = 0;
   std::size_t num_doubles = 0;  ///< Samples left out as there is another of their time.
 };
+
+/// Why what it measured cannot be used, for people; empty where it can.
+std::string fault_of(const ImuStream& stream);
 
 /// What the stream holds, a line each; image_times_ns: of the images beside it, if known.
 std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>& image_times_ns);

@@ -246,10 +246,13 @@ const AxisColumns* take_accelerometer(const TableReader& reader,
                     is_negated ? "; turned about, as it is that of Core Motion" : ""));
     return &axes;
   }
-  throw InputError(name,
-                   fmt::format("has accelerations of a middle length of {:.3g}, expected gravity "
-                               "in them, 9.8 m/s^2 or 1 g",
-                               length));
+  table.accelerometer = reader.read(reader.accelerometers.back());
+  table.fault = fmt::format(
+      "{}: has accelerations of a middle length of {:.3g}, expected gravity in them, 9.8 m/s^2 or "
+      "1 g",
+      name,
+      length);
+  return &reader.accelerometers.back();
 }
 
 void take_gyroscope(const TableReader& reader, const AxisColumns& axes, ImuTable& table) {

@@ -112,7 +112,7 @@ TEST(ImuTable, BringsTwoTablesTogether) {
     EXPECT_LT((stream.samples[5].acceleration - Eigen::Vector3d(0.1, 0.2, 9.8)).norm(), 1e-9);
     EXPECT_THAT(stream.notes, Contains(HasSubstr("interpolated")));
   }
-  EXPECT_THAT(input_error_of([&] { read_imu_file(folder / "Accelerometer.csv"); }),
+  EXPECT_THAT(read_imu_file(folder / "Accelerometer.csv").fault,
               HasSubstr("a middle length of 0, expected gravity in them"));
 }
 

@@ -147,6 +147,33 @@ Json to_json(const MarkerSummary& summary) {
   return json;
 }
 
+Json to_json(const Eigen::Vector3d& vector) {
+  return {rounded(vector.x()), rounded(vector.y()), rounded(vector.z())};
+}
+
+Json with_sigma(const Json& value, double sigma) {
+  return {{"value", value}, {"sigma", rounded(sigma)}};
+}
+
+Json to_json(const ImuSummary& summary) {
+  Json json;
+  json["used"] = summary.is_used;
+  if (!summary.is_used) {
+    json["reason"] = summary.reason;
+    return json;
+  }
+  json["metric_from_frame"] = summary.metric_from ? Json(*summary.metric_from) : Json(nullptr);
+  json["scale_sigma"] = rounded(summary.scale_sigma);
+  json["gravity_in_world"] = to_json(summary.gravity_in_world);
+  json["gravity_sigma_deg"] = rounded(summary.gravity_sigma_deg);
+  json["time_shift_ms"] = with_sigma(rounded(summary.time_shift_ms), summary.time_shift_sigma_ms);
+  json["rotation_deg"] = with_sigma(to_json(summary.rotation_deg), summary.rotation_sigma_deg);
+  json["lever_arm_m"] = with_sigma(to_json(summary.lever_arm_m), summary.lever_arm_sigma_m);
+  json["gyro_bias"] = to_json(summary.gyro_bias);
+  json["accel_bias"] = to_json(summary.accel_bias);
+  return json;
+}
+
 }  // namespace
 
 void FrameRecord::set_stages(std::span<const double> times_ms) {
@@ -267,6 +294,7 @@ std::string format_summary_json(const RunSummary& summary) {
   if (summary.moves_along) json["moves_along"] = *summary.moves_along;
   if (summary.mistakes) json["mistakes"] = *summary.mistakes;
   if (summary.markers) json["markers"] = to_json(*summary.markers);
+  if (summary.imu) json["imu"] = to_json(*summary.imu);
   if (!summary.refined_calibration.empty()) {
     json["refined_calibration"] = to_json(summary.refined_calibration);
   }

@@ -14,6 +14,7 @@
 #include "waymark/base/check.h"
 #include "waymark/exchange/export_scene.h"
 #include "waymark/input/decode.h"
+#include "waymark/session/imu_feed.h"
 #include "waymark/session/quality.h"
 
 namespace waymark {
@@ -199,7 +200,9 @@ void add_trajectories(const Map& map,
 SessionResults run_session(Input& input, System& system, const SessionHooks& hooks) {
   const UsageMeter usage;
   MemoryReserve reserve;
+  ImuFeed imu(input.info().imu, system);
   const auto feed = [&](const FrameImages& frame) {
+    imu.feed_until(frame.timestamp_ns);
     TrackingResult result = system.feed(frame);
     if (hooks.on_result) hooks.on_result(frame, result);
     if (hooks.watch) hooks.watch->add(frame, result, system);
@@ -226,6 +229,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   results.summary = summarize(system, frames);
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.summary.loop_frames = list_loops(system, frames);
+  results.summary.imu = imu.summarize(frames);
   for (const TransferredScale& kept : system.kept_scales()) {
     results.summary.scales.push_back({kept.submap.value, kept.before.value});
   }

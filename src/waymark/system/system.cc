@@ -7,6 +7,7 @@
 #include "waymark/base/check.h"
 #include "waymark/system/back_end.h"
 #include "waymark/system/frame_preparation.h"
+#include "waymark/system/inertial_estimator.h"
 #include "waymark/system/starting_map.h"
 #include "waymark/system/trajectory.h"
 #include "waymark/track/tracker.h"
@@ -38,6 +39,9 @@ class System::Impl {
     preparation_.prepare(images, std::move(owner));
   }
   std::size_t max_prepared() const { return preparation_.max_prepared(); }
+  void set_imu(const ImuCalibration& calibration) { inertial_.set_calibration(calibration); }
+  void feed_imu(const ImuSample& sample) { inertial_.add(sample); }
+  const std::optional<InertialReport>& inertial() const { return inertial_.report(); }
   void finish();
   void keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory);
   void set_mapping(bool is_on);
@@ -72,6 +76,7 @@ class System::Impl {
   FramePreparation preparation_;
   std::optional<Tracker> tracker_;
   TrajectoryMemory memory_;
+  InertialEstimator inertial_;
   PublishedMap visible_;
   TrackingResult result_;
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
@@ -91,8 +96,11 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
   result_.frame = FrameId{id.value - memory_.first().value};
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
   preparation_.set_calibration(rig());
-  const Frame frame = preparation_.make_frame(
+  Frame frame = preparation_.make_frame(
       id, images, [this] { return tracker_->predict_motion(); }, result_);
+  if (const auto last_ns = tracker_->last_pose_ns()) {
+    frame.turn = inertial_.turn(*last_ns, frame.timestamp_ns);
+  }
   {
     StageTimer timer(result_.stages, Stage::kWait);
     back_end_.update(id, visible_);
@@ -100,6 +108,7 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
   std::optional<MapperMessage> message = tracker_->track(frame, visible_.snapshot, result_);
   preparation_.watch(images.image0, result_);
   memory_.add(frame, result_, *map());
+  inertial_.update(memory_, *map());
   if (message) hand_over(frame, images, *std::move(message));
   return result_;
 }
@@ -136,6 +145,7 @@ std::unique_ptr<System::Impl> System::Impl::begin_anew() const {
   WAYMARK_CHECK(!is_finished_);
   auto anew = std::make_unique<Impl>(*given_rig_, settings_, timing_, nullptr, num_threads_);
   anew->purpose_ = purpose_;
+  anew->inertial_ = inertial_.begin_anew();
   anew->keep_map_in(back_end_.map_memory());
   return anew;
 }
@@ -151,6 +161,7 @@ void System::Impl::finish() {
   back_end_.end_threads();
   visible_ = back_end_.finish(motions());
   memory_.settle(*rig(), *map());
+  visible_.snapshot.map = inertial_.finish(memory_, map(), memory_.first() == FrameId{0});
 }
 
 /// How the rig moved at the keyframes, where that matters.
@@ -184,6 +195,9 @@ const TrackingResult& System::feed(const FrameImages& images) { return impl_->fe
 void System::prepare(const FrameImages& images, std::shared_ptr<const void> owner) {
   impl_->prepare(images, std::move(owner));
 }
+void System::set_imu(const ImuCalibration& calibration) { impl_->set_imu(calibration); }
+void System::feed_imu(const ImuSample& sample) { impl_->feed_imu(sample); }
+const std::optional<InertialReport>& System::inertial() const { return impl_->inertial(); }
 std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
 void System::keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory) {

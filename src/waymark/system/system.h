@@ -30,6 +30,7 @@
 #include "waymark/camera/calibration.h"
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
+#include "waymark/imu/imu.h"
 #include "waymark/map/map.h"
 #include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
@@ -64,6 +65,25 @@ struct MarkerReport {
   std::optional<MarkerFrame> frame;     ///< Of the map, where they define one.
 };
 
+/// What vision and an inertial measurement unit told of each other.
+struct InertialReport {
+  bool is_used = false;
+  std::string reason;  ///< Why it is not used; empty where it is.
+  /// In mono from which frame on it told the unit of length; nothing where it did not, or where
+  /// that is known otherwise.
+  std::optional<FrameId> metric_from;
+  double scale_sigma = 0.0;  ///< Of the logarithm of metres per map unit.
+  /// Acceleration of free fall in the frame of the map, m/s^2.
+  Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();
+  double gravity_sigma_rad = 0.0;  ///< Of its direction.
+  double time_shift_s = 0.0;       ///< What is added to the time of an image for the IMU's clock.
+  double time_shift_sigma_s = 0.0;
+  Rigid3 imu_from_rig;  ///< In metres; the rig's frame is that of camera 0.
+  double rotation_sigma_rad = 0.0;
+  double lever_arm_sigma_m = 0.0;
+  ImuBiases biases;  ///< At the end.
+};
+
 /// Visual SLAM on a stream of frames. One thread feeds; mapping runs beside it unless the timing is
 /// kInline. kInline and kLockstep give the same bits; kRealtime never waits for the mapper, but for
 /// a new sub-map, without which there is nothing to track in.
@@ -89,6 +109,14 @@ class System {
   /// then the first frame throws InputError. Rethrows what failed in the mapper's thread. The
   /// result stays valid until the next call.
   const TrackingResult& feed(const FrameImages& images);
+
+  /// What is known of the IMU whose samples come; before the first of them. Nothing need be.
+  void set_imu(const ImuCalibration& calibration);
+  /// One measurement of an IMU; times must increase, others are left out. Before or after the image
+  /// of its time: a frame makes use of what was fed before it, the whole way of all.
+  void feed_imu(const ImuSample& sample);
+  /// What it told so far, nothing without samples. After finish(): final.
+  const std::optional<InertialReport>& inertial() const;
 
   /// Has other threads find the features of a frame that is fed later, while those before it are
   /// tracked: with the images of max_prepared() frames at hand all cores are busy. Only time

@@ -2,9 +2,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <Eigen/Geometry>
 #include <cstdint>
 #include <functional>
 #include <memory>
+#include <optional>
 
 #include "waymark/base/id.h"
 #include "waymark/features/features.h"
@@ -22,6 +24,8 @@ struct Frame {
   std::shared_ptr<const SmallImage> image = nullptr;  ///< Of camera 0; null where there is none.
   /// Looks for markers in its image, which takes its time; empty where none are looked for.
   std::function<MarkerObservations()> find_markers = nullptr;
+  /// How the rig turned since the newest frame that has a pose, by a gyroscope: rig_from_rig_then.
+  std::optional<Eigen::Quaterniond> turn = std::nullopt;
 };
 
 }  // namespace waymark

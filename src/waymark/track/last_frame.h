@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -58,11 +59,19 @@ class MotionModel {
   }
 
   const Rigid3& pose() const { return rig_from_world_; }
+  std::int64_t timestamp_ns() const { return timestamp_ns_; }
 
-  Rigid3 predict(std::int64_t timestamp_ns) const {
-    if (!has_velocity_) return rig_from_world_;
-    const double seconds = 1e-9 * static_cast<double>(timestamp_ns - timestamp_ns_);
-    return Rigid3::exp(motion_ * (seconds / seconds_)) * rig_from_world_;
+  /// turn: since the last pose, where a gyroscope tells it; else that goes on, too.
+  Rigid3 predict(std::int64_t timestamp_ns,
+                 const std::optional<Eigen::Quaterniond>& turn = {}) const {
+    Rigid3 predicted = rig_from_world_;
+    if (has_velocity_) {
+      const double seconds = 1e-9 * static_cast<double>(timestamp_ns - timestamp_ns_);
+      predicted = Rigid3::exp(motion_ * (seconds / seconds_)) * rig_from_world_;
+    }
+    if (!turn) return predicted;
+    const Eigen::Quaterniond rotation = *turn * rig_from_world_.rotation;
+    return {rotation, -(rotation * predicted.origin_in_source())};
   }
 
  private:
@@ -110,8 +119,13 @@ class LastFrame {
 
   /// Its pose; after carry_over() in the map of that.
   const Rigid3& rig_from_world() const { return motion_.pose(); }
-  /// Pose of a frame at this time if the motion goes on.
-  Rigid3 predict(std::int64_t timestamp_ns) const { return motion_.predict(timestamp_ns); }
+  /// Its time, where it has a pose.
+  std::int64_t timestamp_ns() const { return motion_.timestamp_ns(); }
+  /// Pose of a frame at this time if the motion goes on; turn: by a gyroscope, if any.
+  Rigid3 predict(std::int64_t timestamp_ns,
+                 const std::optional<Eigen::Quaterniond>& turn = {}) const {
+    return motion_.predict(timestamp_ns, turn);
+  }
 
   /// How the rig moves in the next frame if it goes on as before; 0 where that is not known. Were
   /// the change of the turn to go on, too, errors of poses would come back larger in each frame.

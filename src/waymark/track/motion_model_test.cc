@@ -53,6 +53,17 @@ TEST(MotionModel, TellsHowFastTheRigTurns) {
   EXPECT_NEAR(model.last_motion().turn_rad_s.y(), 4.0f, 1e-5f);
 }
 
+TEST(MotionModel, TurnsAsAGyroscopeSaysWhileTheWayGoesOn) {
+  MotionModel model;
+  model.update(0, Rigid3(so3_exp({0.0, 0.1, 0.0}), {1.0, 0.0, 0.0}));
+  model.update(100, Rigid3::exp(kMotion));
+  const Eigen::Quaterniond turn = so3_exp({0.3, 0.0, -0.1});
+  const Rigid3 predicted = model.predict(200, turn);
+  EXPECT_TRUE(predicted.rotation.isApprox(turn * model.pose().rotation, 1e-12));
+  EXPECT_TRUE(
+      predicted.origin_in_source().isApprox(model.predict(200).origin_in_source(), 1e-12));
+}
+
 TEST(MotionModel, ForgetsOnReset) {
   MotionModel model;
   model.update(0, Rigid3());

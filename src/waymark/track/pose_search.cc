@@ -83,7 +83,7 @@ std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
                                                StageTimes& times) {
   const bool is_motion_known = !context.is_lost || is_recent(context, options());
   if (is_motion_known) context.last.carry_over(*context.visible.map);
-  check_.begin(is_motion_known ? std::optional(context.last.predict(frame.timestamp_ns))
+  check_.begin(is_motion_known ? std::optional(context.last.predict(frame.timestamp_ns, frame.turn))
                                : std::nullopt);
   found_by_ = {};
   bool has_found = false;
@@ -108,7 +108,7 @@ std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
 }
 
 std::optional<LocatedFrame> PoseSearch::by_motion(Frame& frame, const Context& context) {
-  const Rigid3 predicted = context.last.predict(frame.timestamp_ns);
+  const Rigid3 predicted = context.last.predict(frame.timestamp_ns, frame.turn);
   const auto [radius_px, wide_radius_px] = search_radii_px(frame, options());
   if (auto located = locate_near(frame, context, predicted, radius_px)) return located;
   Found wide = locate_near(frame, context, predicted, wide_radius_px);
@@ -123,7 +123,7 @@ std::optional<LocatedFrame> PoseSearch::near_last_pose(Frame& frame, const Conte
   };
   Found found = locate_near(frame,
                             context,
-                            context.last.predict(frame.timestamp_ns),
+                            context.last.predict(frame.timestamp_ns, frame.turn),
                             search_radii_px(frame, options()).back());
   if (!is_enough(found)) found = locate_by_image(frame, context);
   if (!is_enough(found)) return std::nullopt;
@@ -149,7 +149,7 @@ std::optional<LocatedFrame> PoseSearch::by_patches(Frame& frame, const Context& 
       context.last.reference());
   const LandmarkSet& around = local_map().landmarks;
   const LocatedPatches before{*context.last.image(), context.last.rig_from_world()};
-  const Rigid3 predicted = context.last.predict(frame.timestamp_ns);
+  const Rigid3 predicted = context.last.predict(frame.timestamp_ns, frame.turn);
   const auto aligned =
       patch_locator_.align(before, around, well_known(around, map), frame, predicted);
   if (!aligned) return std::nullopt;
@@ -214,7 +214,7 @@ std::optional<Rigid3> PoseSearch::predict_by_image(const Frame& frame, const Con
   const Eigen::Quaterniond cam_from_rig = camera.cam_from_rig.rotation;
   const Eigen::Quaterniond rig_turn = cam_from_rig.conjugate() * turn.b_from_a * cam_from_rig;
   const Eigen::Quaterniond rotation = (rig_turn * last.rig_from_world().rotation).normalized();
-  const Eigen::Vector3d centre = last.predict(frame.timestamp_ns).origin_in_source();
+  const Eigen::Vector3d centre = last.predict(frame.timestamp_ns, frame.turn).origin_in_source();
   return Rigid3(rotation, -(rotation * centre));
 }
 

@@ -2,6 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
 #include <optional>
 #include <string_view>
 #include <vector>
@@ -41,6 +42,11 @@ class Tracker {
   /// Goes on between two frames with this purpose in a map that lacks what is newest of the one so
   /// far, or nothing. What is not in it is forgotten.
   void continue_in(const Map& map, TrackingPurpose purpose);
+
+  /// Time of the newest frame that has a pose, if any has.
+  std::optional<std::int64_t> last_pose_ns() const {
+    return last_.has_pose() ? std::optional(last_.timestamp_ns()) : std::nullopt;
+  }
 
   /// How the rig should move in the frame to come; 0 where that is not known.
   RigMotion predict_motion() const;

@@ -9,6 +9,8 @@
 #include <optional>
 #include <vector>
 
+#include "waymark/track/frame.h"
+#include "waymark/track/frame_locator.h"
 #include "waymark/track/pose_refiner.h"
 #include "waymark/track/tracking_result.h"
 

@@ -1,0 +1,224 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/system/inertial_estimator.h"
+
+#include <algorithm>
+#include <cmath>
+#include <utility>
+
+#include "waymark/base/median.h"
+#include "waymark/imu/imu_health.h"
+#include "waymark/imu/preintegration.h"
+#include "waymark/map/align.h"
+#include "waymark/system/trajectory.h"
+#include "waymark/track/last_frame.h"
+
+namespace waymark {
+namespace {
+
+/// Looks at the way begin with as many frames, and come again when it is half as long again.
+constexpr std::size_t kFirstFrames = 20;
+constexpr double kGrowth = 1.5;
+/// Of a longer way every second, third, ... frame is looked at; of the whole of it more.
+constexpr std::size_t kMaxPoses = 100;
+constexpr std::size_t kMaxPosesInTheEnd = 300;
+/// Poses of vision are that good: in rad, and as a part of how far away things are.
+constexpr double kPoseSigma = 0.001;
+/// Residuals of an IMU that vision contradicts are larger than expected by this factor.
+constexpr double kContradiction = 3.0;
+/// What was told is wrong where vision and IMU are off by so many standard deviations.
+constexpr double kFarFromTold = 5.0;
+/// Poses of vision err alike for long, which no number of them averages out.
+constexpr double kSystematicScale = 0.002;        // As a part.
+constexpr double kSystematicRotation = 5e-4;      // rad
+constexpr double kSystematicTimeShift_s = 2e-4;
+/// So many samples show their noise.
+constexpr std::size_t kShownSamples = 2000;
+/// Of the lengths of a map that is metric, as a part: baselines and depths are that good.
+constexpr double kMetricSigma = 0.01;
+/// A scale is told where its logarithm has a smaller standard deviation, and a turn of the
+/// gyroscope where that of its mounting, in rad, has.
+constexpr double kFirmScale = 0.05;
+constexpr double kFirmRotation = 0.02;
+/// Rates of turn that biases may have, rad/s.
+constexpr double kFirmBias = 0.01;
+
+/// Where components of the tangent vector of a start begin.
+constexpr int kGravityAt = 0;
+constexpr int kLogScaleAt = 2;
+constexpr int kLeverArmAt = 3;
+constexpr int kRotationAt = 6;
+constexpr int kTimeShiftAt = 9;
+constexpr int kGyroscopeBiasAt = 19;
+
+double largest_sigma(const InertialStart& start, int first, int count = 3) {
+  return std::sqrt(start.covariance.diagonal().segment(first, count).maxCoeff());
+}
+
+/// Frames of one part of the map, as far apart as their number asks.
+std::vector<VisionPose> choose_poses(std::span<const TrajectoryFrame> frames,
+                                     SubmapId submap,
+                                     std::size_t max_count) {
+  std::vector<VisionPose> poses;
+  for (const TrajectoryFrame& frame : frames) {
+    if (frame.submap != submap || frame.state != FrameState::kTracked) continue;
+    poses.push_back({frame.timestamp_ns, frame.world_from_rig.inverse()});
+  }
+  const std::size_t step = 1 + poses.size() / max_count;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < poses.size(); i += step) poses[count++] = poses[i];
+  poses.resize(count);
+  return poses;
+}
+
+/// How far away things are, in map units: the median over keyframes of the median of each.
+double distance_of_things(const Map& map, SubmapId submap) {
+  std::vector<float> inverse;
+  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
+    if (keyframe.submap != submap) return;
+    const float of_one = median_inverse_range(map, keyframe.rig_from_world, keyframe.landmarks);
+    if (of_one > 0.0f) inverse.push_back(of_one);
+  });
+  return inverse.empty() ? 1.0 : 1.0 / static_cast<double>(median(inverse));
+}
+
+/// Whether an estimate is further from what was believed before than both allow: what it moved by
+/// has the variance that what was measured took away.
+bool is_far(double moved, double sigma_before, double sigma) {
+  const double taken = sigma_before * sigma_before - sigma * sigma;
+  const double least = 0.01 * sigma_before * sigma_before;
+  return moved * moved > kFarFromTold * kFarFromTold * std::max(taken, least);
+}
+
+bool is_far_from_told(const InertialStart& start,
+                      const ImuCalibration& told,
+                      const InertialStartOptions& options) {
+  if (told.time_shift_s && is_far(start.time_shift_s - *told.time_shift_s,
+                                  options.told_time_shift_sigma_s,
+                                  start.sigma(kTimeShiftAt))) {
+    return true;
+  }
+  if (!told.imu_from_rig) return false;
+  const Rigid3& found = start.setup.imu_from_rig;
+  const Eigen::Vector3d lever_arm =
+      found.origin_in_source() - told.imu_from_rig->origin_in_source();
+  return is_far(found.rotation.angularDistance(told.imu_from_rig->rotation),
+                options.told_rotation_sigma,
+                largest_sigma(start, kRotationAt)) ||
+         is_far(lever_arm.norm(), options.told_lever_arm_sigma, largest_sigma(start, kLeverArmAt));
+}
+
+/// As told, but not less than the samples themselves show, and than biases usually walk.
+ImuNoise noise_of(const ImuCalibration& told, std::span<const ImuSample> samples) {
+  const ImuNoise usual = default_imu_noise();
+  const ImuNoise noise = told.noise.value_or(usual);
+  const ImuNoise shown = shown_imu_noise(samples.last(std::min(samples.size(), kShownSamples)));
+  return {std::max(noise.gyroscope, shown.gyroscope),
+          std::max(noise.accelerometer, shown.accelerometer),
+          std::max(noise.gyroscope_walk, usual.gyroscope_walk),
+          std::max(noise.accelerometer_walk, usual.accelerometer_walk)};
+}
+
+bool is_contradicted(const InertialStart& start) {
+  return start.squared_error > kContradiction * start.degrees_of_freedom;
+}
+
+/// Residuals that are larger than expected make all as much less sure.
+void describe(const InertialStart& start, InertialReport& report) {
+  const double less_sure =
+      std::sqrt(std::max(1.0, start.squared_error / std::max(1.0, start.degrees_of_freedom)));
+  report.is_used = true;
+  report.scale_sigma = std::hypot(less_sure * start.sigma(kLogScaleAt), kSystematicScale);
+  report.gravity_in_world = start.setup.gravity;
+  report.gravity_sigma_rad = std::hypot(less_sure * largest_sigma(start, kGravityAt, 2),
+                                        kSystematicRotation);
+  report.time_shift_s = start.time_shift_s;
+  report.time_shift_sigma_s = std::hypot(less_sure * start.sigma(kTimeShiftAt),
+                                         kSystematicTimeShift_s);
+  report.imu_from_rig = start.setup.imu_from_rig;
+  report.rotation_sigma_rad =
+      std::hypot(less_sure * largest_sigma(start, kRotationAt), kSystematicRotation);
+  report.lever_arm_sigma_m = less_sure * largest_sigma(start, kLeverArmAt);
+  report.biases = start.states.back().biases;
+}
+
+}  // namespace
+
+InertialEstimator InertialEstimator::begin_anew() const {
+  InertialEstimator anew;
+  anew.told_ = told_;
+  return anew;
+}
+
+void InertialEstimator::update(const TrajectoryMemory& memory, const Map& map) {
+  const std::size_t num_frames = memory.entries().size();
+  if (!has_samples() || num_frames < std::max(next_look_, kFirstFrames)) return;
+  next_look_ = static_cast<std::size_t>(kGrowth * static_cast<double>(num_frames));
+  const std::vector<TrajectoryFrame> frames = list_poses(memory, map);
+  if (frames.empty()) return;
+  look(choose_poses(frames, frames.back().submap, kMaxPoses), frames.back().submap, map);
+  if (metric_from_ || !report_->is_used || report_->scale_sigma > kFirmScale) return;
+  if (map.submaps()[frames.back().submap.value].is_metric) return;
+  metric_from_ = report_->metric_from = FrameId{static_cast<std::uint32_t>(num_frames - 1)};
+}
+
+void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap, const Map& map) {
+  InertialStartOptions options;
+  options.pose_rotation_sigma = kPoseSigma;
+  options.pose_position_sigma = kPoseSigma * distance_of_things(map, submap);
+  if (map.submaps()[submap.value].is_metric) options.log_scale_sigma = kMetricSigma;
+  const ImuNoise noise = noise_of(told_, samples_.all());
+  found_ = start_inertial(samples_, poses, told_, noise, options);
+  if (!found_ || is_contradicted(*found_) || is_far_from_told(*found_, told_, options)) {
+    const ImuCalibration nothing;
+    auto anew = start_inertial(samples_, poses, nothing, noise, options);
+    if (anew && !is_contradicted(*anew)) found_ = std::move(anew);
+  }
+  report_.emplace();
+  report_->metric_from = metric_from_;
+  if (!found_) {
+    report_->reason = "too little was seen and measured at the same time";
+  } else if (is_contradicted(*found_)) {
+    report_->reason = "it contradicts the images";
+    found_.reset();
+  } else {
+    describe(*found_, *report_);
+  }
+}
+
+std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
+                                                          std::int64_t end_ns) const {
+  if (!found_ || largest_sigma(*found_, kRotationAt) > kFirmRotation) return std::nullopt;
+  if (largest_sigma(*found_, kGyroscopeBiasAt) > kFirmBias) return std::nullopt;
+  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * found_->time_shift_s));
+  std::vector<ImuSample> samples = samples_.between(begin_ns + shift_ns, end_ns + shift_ns);
+  if (samples.empty()) return std::nullopt;
+  const Preintegration turned(
+      std::move(samples), default_imu_noise(), found_->states.back().biases);
+  const Eigen::Quaterniond& imu_from_rig = found_->setup.imu_from_rig.rotation;
+  return imu_from_rig.conjugate() * turned.delta().rotation.conjugate() * imu_from_rig;
+}
+
+std::shared_ptr<const Map> InertialEstimator::finish(const TrajectoryMemory& memory,
+                                                     std::shared_ptr<const Map> map,
+                                                     bool is_new) {
+  if (!has_samples() || map->keyframes().is_empty()) return map;
+  const SubmapId submap = submaps_by_size(*map).front();
+  look(choose_poses(list_poses(memory, *map), submap, kMaxPosesInTheEnd), submap, *map);
+  if (!report_->is_used || !is_new) return map;
+  const bool is_metric = map->submaps()[submap.value].is_metric;
+  const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
+  const Sim3 level(turn_upright(-report_->gravity_in_world),
+                   Eigen::Vector3d::Zero(),
+                   is_scaled ? std::exp(found_->setup.log_scale) : 1.0);
+  report_->gravity_in_world = level.rotation * report_->gravity_in_world;
+  Map next = Map::thaw(*map);
+  if (is_scaled) {
+    next = put_into_metres(std::move(next), submap, level);
+  } else {
+    transform_submap(next, submap, level);
+  }
+  return next.freeze();
+}
+
+}  // namespace waymark

@@ -1,0 +1,64 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <Eigen/Core>
+#include <Eigen/Geometry>
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "waymark/imu/imu_samples.h"
+#include "waymark/imu/inertial_start.h"
+#include "waymark/map/map.h"
+#include "waymark/system/system.h"
+#include "waymark/track/trajectory_memory.h"
+
+namespace waymark {
+
+/// What an IMU adds to a session: from the poses that vision gave and what the IMU measured between
+/// them it finds the unit of length, the direction of gravity, biases, and where and when the IMU
+/// is (start_inertial()). Anew as the way grows, and once more of the whole; an IMU that vision
+/// contradicts is left out.
+class InertialEstimator {
+ public:
+  /// Of the samples to come: what is known of their IMU.
+  void set_calibration(const ImuCalibration& told) { told_ = told; }
+  void add(const ImuSample& sample) { samples_.add(sample); }
+  bool has_samples() const { return samples_.all().size() > 2; }
+
+  /// The same IMU, of a session that begins anew.
+  InertialEstimator begin_anew() const;
+
+  /// Looks at the way so far, if it has grown enough since the last time.
+  void update(const TrajectoryMemory& memory, const Map& map);
+
+  /// How the rig turned from one image to another by the gyroscope: rig_end_from_rig_begin. Nothing
+  /// before that is known well, and where samples are missing.
+  std::optional<Eigen::Quaterniond> turn(std::int64_t begin_ns, std::int64_t end_ns) const;
+
+  /// Looks at the whole way. is_new: the map was begun in this session, so that its frame may be
+  /// chosen. Gives the map with its largest part level (z up), and in metres where these are told;
+  /// the same map where nothing is.
+  std::shared_ptr<const Map> finish(const TrajectoryMemory& memory,
+                                    std::shared_ptr<const Map> map,
+                                    bool is_new);
+
+  /// Empty without samples.
+  const std::optional<InertialReport>& report() const { return report_; }
+
+ private:
+  void look(std::span<const VisionPose> poses, SubmapId submap, const Map& map);
+
+  ImuCalibration told_;
+  ImuSamples samples_;
+  std::optional<InertialStart> found_;  ///< Last, where vision and IMU agree.
+  std::optional<InertialReport> report_;
+  std::optional<FrameId> metric_from_;
+  std::size_t next_look_ = 0;           ///< Number of frames.
+};
+
+}  // namespace waymark
