@@ -13,6 +13,7 @@
 #include "waymark/camera/camchain.h"
 #include "waymark/features/depth.h"
 #include "waymark/image/convert.h"
+#include "waymark/imu/imu.h"
 #include "waymark/input/input.h"
 #include "waymark/system/settings.h"
 #include "waymark/system/system.h"
@@ -85,5 +86,11 @@ class FrameArguments {
   DepthImage depth_;
   FrameImages input_;
 };
+
+/// Samples of an IMU, one or arrays of N: times int or (N,), the others (3,) or (N, 3). TypeError,
+/// ValueError for what is none.
+std::vector<ImuSample> imu_samples(const py::object& timestamp_ns,
+                                   const py::object& angular_velocity,
+                                   const py::object& acceleration);
 
 }  // namespace waymark::python

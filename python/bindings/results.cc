@@ -3,6 +3,7 @@
 //
 // What System and Localizer return.
 #include <fmt/format.h>
+#include <pybind11/eigen.h>
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
@@ -222,12 +223,56 @@ void bind_statistics(py::module_& module) {
       });
 }
 
+void bind_inertial(py::module_& module) {
+  Class<InertialReport>(module, "InertialReport", "What an inertial measurement unit told.")
+      .get("is_used", "bool: whether vision agrees with it.", &InertialReport::is_used)
+      .get("reason", "str: why it is not used.", &InertialReport::reason)
+      .get("metric_from",
+           "int: the frame from which on lengths of a map in mono are known, or None.",
+           [](const InertialReport& self) -> std::optional<std::uint32_t> {
+             if (!self.metric_from) return std::nullopt;
+             return self.metric_from->value;
+           })
+      .get("scale_sigma",
+           "float: standard deviation of lengths, as a part of them.",
+           &InertialReport::scale_sigma)
+      .get("gravity_in_world",
+           "array (3,): acceleration of free fall in the map, m/s^2.",
+           &InertialReport::gravity_in_world)
+      .get("time_shift_s",
+           "float: what is added to the time of an image to have it by the IMU's clock.",
+           &InertialReport::time_shift_s)
+      .get("time_shift_sigma_s",
+           "float: its standard deviation.",
+           &InertialReport::time_shift_sigma_s)
+      .get("imu_from_rig",
+           "array (4, 4): from the frame of camera 0 to that of the IMU, metres.",
+           [](const InertialReport& self) { return Eigen::Matrix4d(self.imu_from_rig.matrix()); })
+      .get("rotation_sigma_rad",
+           "float: standard deviation of its rotation.",
+           &InertialReport::rotation_sigma_rad)
+      .get("lever_arm_sigma_m",
+           "float: standard deviation of its translation.",
+           &InertialReport::lever_arm_sigma_m)
+      .get("gyroscope_bias",
+           "array (3,): at the end, rad/s.",
+           [](const InertialReport& self) { return self.biases.gyroscope; })
+      .get("accelerometer_bias",
+           "array (3,): at the end, m/s^2.",
+           [](const InertialReport& self) { return self.biases.accelerometer; })
+      .def("__repr__", [](const InertialReport& self) {
+        return self.is_used ? std::string("<InertialReport>")
+                            : fmt::format("<InertialReport: not used: {}>", self.reason);
+      });
+}
+
 }  // namespace
 
 void bind_results(py::module_& module) {
   bind_tracking_result(module);
   bind_trajectory(module);
   bind_statistics(module);
+  bind_inertial(module);
 }
 
 }  // namespace waymark::python

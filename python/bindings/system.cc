@@ -24,8 +24,7 @@ namespace {
 
 constexpr double kMaxMemoryGb = 1e6;
 
-/// A System with what the arguments of Python need to be understood. Methods that take long let
-/// other threads of Python run.
+/// A System with what arguments need to be understood; what takes long lets other threads run.
 class PythonSystem {
  public:
   PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map);
@@ -48,6 +47,17 @@ class PythonSystem {
     // The first frame decides.
     if (!config_.setup) config_.setup = frame.has_depth() ? Setup::kRgbd : Setup::kMono;
     return result;
+  }
+
+  void feed_imu(const py::object& timestamp_ns, const py::object& turns, const py::object& forces) {
+    const Turn turn = take();
+    expect_unfinished("feed_imu");
+    for (const ImuSample& one : imu_samples(timestamp_ns, turns, forces)) system_.feed_imu(one);
+  }
+
+  std::optional<InertialReport> inertial() {
+    const Turn turn = take();
+    return system_.inertial();
   }
 
   void finish() {
@@ -234,6 +244,25 @@ TypeError, ValueError for arrays of the wrong type or shape and for images that 
 have; InputError for a wrong size or time; RuntimeError after finish().)");
 }
 
+void bind_imu(SystemClass& system) {
+  system
+      .def("feed_imu",
+           &PythonSystem::feed_imu,
+           py::arg("timestamp_ns"),
+           py::arg("angular_velocity"),
+           py::arg("acceleration"),
+           R"(feed_imu(self, timestamp_ns, angular_velocity, acceleration)
+--
+
+Measurements of an IMU (docs/imu.md), which frames fed later make use of: one, or arrays of N.
+timestamp_ns: int or array (N,), later than those before, others are left out.
+angular_velocity, acceleration: array (3,) or (N, 3), rad/s and m/s^2, gravity included.)")
+      .def("inertial", &PythonSystem::inertial, R"(inertial(self)
+--
+
+What the IMU told so far: an InertialReport, or None without samples. Final after finish().)");
+}
+
 void bind_control(SystemClass& system) {
   system
       .def("finish", &PythonSystem::finish, R"(finish(self)
@@ -361,6 +390,7 @@ map: a Map to go on in; a copy is extended.
 
 InputError for cameras or settings that are malformed or cannot work together.)");
   bind_feed(system);
+  bind_imu(system);
   bind_control(system);
   bind_memory(system);
   bind_reading(system);

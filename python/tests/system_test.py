@@ -189,6 +189,35 @@ class Results(Test):
         system.set_mapping(True)
         self.assertEqual(system.feed(0, some[0].image0, some[0].image1).frame, 0)
 
+    def test_inertial_samples_by_themselves_and_in_arrays(self):
+        reports = []
+        for is_array in (False, True):
+            system = waymark.System(camchain(), timing="inline")
+            self.assertIsNone(system.inertial())
+            for frame in frames():
+                times = frame.timestamp_ns + np.arange(10) * 5_000_000
+                turns, pushes = np.zeros((10, 3)), np.tile((0.0, -9.81, 0.0), (10, 1))
+                if is_array:
+                    system.feed_imu(times, turns, pushes)
+                else:
+                    for time, turn, push in zip(times, turns, pushes.tolist()):
+                        system.feed_imu(int(time), turn, push)
+                system.feed(frame.timestamp_ns, frame.image0, frame.image1)
+            system.finish()
+            reports.append(system.inertial())
+        # The camera does turn, and this says that it does not.
+        self.assertFalse(reports[0].is_used)
+        self.assertNotEqual(reports[0].reason, "")
+        self.assertEqual(repr(reports[0]), repr(reports[1]))
+        self.assert_raises(RuntimeError, "after finish", system.feed_imu, 0, turns[0], pushes[0])
+
+    def test_inertial_samples_of_wrong_shapes(self):
+        system = waymark.System(camchain())
+        self.assert_raises(ValueError, "expected one for each of 2 times", system.feed_imu, [0, 1], np.zeros((2, 3)),
+                           np.zeros(3))
+        self.assert_raises(TypeError, "timestamp_ns", system.feed_imu, 0.5, np.zeros(3), np.zeros(3))
+        self.assert_raises(ValueError, "angular_velocity", system.feed_imu, 0, np.zeros(4), np.zeros(3))
+
     def test_a_map_in_a_file_gives_the_same(self):
         def positions(limit_gb):
             system = waymark.System(camchain())

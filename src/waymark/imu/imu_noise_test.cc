@@ -60,6 +60,17 @@ TEST(ImuNoise, ComesFromTheRestAloneAndNotFromMotion) {
   EXPECT_NEAR(found->accelerometer / truth.accelerometer, 1.05, 0.15);
 }
 
+TEST(ImuNoise, ShowsWhateverTheMotion) {
+  const ImuNoise truth{1.5e-4, 2e-3, 2e-5, 1e-4};
+  Rng rng(5, 0);
+  const testing::ImuMotion motion = testing::hand_held_motion(rng);
+  const ImuSamples samples =
+      testing::simulated_samples(motion, 0.0, 10.0, 200.0, truth, kRestBiases, kRestGravity, rng);
+  const ImuNoise shown = shown_imu_noise(samples.all());
+  EXPECT_NEAR(shown.gyroscope / truth.gyroscope, 1.0, 0.25);
+  EXPECT_NEAR(shown.accelerometer / truth.accelerometer, 1.0, 0.25);
+}
+
 TEST(ImuNoise, OfAConstantOutputIsNotZero) {
   Rng rng(4, 0);
   const ImuSamples samples =

@@ -141,8 +141,7 @@ Matrix25d covariance_of(const ChainHessian& hessian, const Eigen::Vector3d& last
   // Of the tangent vectors themselves, in which velocities do not grow with the scale.
   Matrix25d by_step = Matrix25d::Identity();
   by_step.block<3, 1>(16, 2) = last_velocity;
-  const Matrix25d covariance =
-      by_step * factor.solve(Matrix25d::Identity()) * by_step.transpose();
+  const Matrix25d covariance = by_step * factor.solve(Matrix25d::Identity()) * by_step.transpose();
   return 0.5 * (covariance + covariance.transpose());
 }
 

@@ -144,9 +144,9 @@ struct MarkerSummary {
 /// What an inertial measurement unit gave in a run; see InertialReport.
 struct ImuSummary {
   bool is_used = false;
-  std::string reason;                     ///< Why it is not, in words.
-  std::optional<std::size_t> metric_from;  ///< Index of the frame.
-  double scale_sigma = 0.0;               ///< As a part of lengths.
+  std::string reason;                                          ///< Why it is not, in words.
+  std::optional<std::size_t> metric_from;                      ///< Index of the frame.
+  double scale_sigma = 0.0;                                    ///< As a part of lengths.
   Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();  ///< m/s^2.
   double gravity_sigma_deg = 0.0;
   double time_shift_ms = 0.0;  ///< Added to times of images for the clock of the IMU.

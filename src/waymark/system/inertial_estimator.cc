@@ -29,8 +29,8 @@ constexpr double kContradiction = 3.0;
 /// What was told is wrong where vision and IMU are off by so many standard deviations.
 constexpr double kFarFromTold = 5.0;
 /// Poses of vision err alike for long, which no number of them averages out.
-constexpr double kSystematicScale = 0.002;        // As a part.
-constexpr double kSystematicRotation = 5e-4;      // rad
+constexpr double kSystematicScale = 0.002;    // As a part.
+constexpr double kSystematicRotation = 5e-4;  // rad
 constexpr double kSystematicTimeShift_s = 2e-4;
 /// So many samples show their noise.
 constexpr std::size_t kShownSamples = 2000;
@@ -130,11 +130,11 @@ void describe(const InertialStart& start, InertialReport& report) {
   report.is_used = true;
   report.scale_sigma = std::hypot(less_sure * start.sigma(kLogScaleAt), kSystematicScale);
   report.gravity_in_world = start.setup.gravity;
-  report.gravity_sigma_rad = std::hypot(less_sure * largest_sigma(start, kGravityAt, 2),
-                                        kSystematicRotation);
+  report.gravity_sigma_rad =
+      std::hypot(less_sure * largest_sigma(start, kGravityAt, 2), kSystematicRotation);
   report.time_shift_s = start.time_shift_s;
-  report.time_shift_sigma_s = std::hypot(less_sure * start.sigma(kTimeShiftAt),
-                                         kSystematicTimeShift_s);
+  report.time_shift_sigma_s =
+      std::hypot(less_sure * start.sigma(kTimeShiftAt), kSystematicTimeShift_s);
   report.imu_from_rig = start.setup.imu_from_rig;
   report.rotation_sigma_rad =
       std::hypot(less_sure * largest_sigma(start, kRotationAt), kSystematicRotation);

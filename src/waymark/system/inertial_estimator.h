@@ -58,7 +58,7 @@ class InertialEstimator {
   std::optional<InertialStart> found_;  ///< Last, where vision and IMU agree.
   std::optional<InertialReport> report_;
   std::optional<FrameId> metric_from_;
-  std::size_t next_look_ = 0;           ///< Number of frames.
+  std::size_t next_look_ = 0;  ///< Number of frames.
 };
 
 }  // namespace waymark

@@ -60,8 +60,7 @@ TEST(MotionModel, TurnsAsAGyroscopeSaysWhileTheWayGoesOn) {
   const Eigen::Quaterniond turn = so3_exp({0.3, 0.0, -0.1});
   const Rigid3 predicted = model.predict(200, turn);
   EXPECT_TRUE(predicted.rotation.isApprox(turn * model.pose().rotation, 1e-12));
-  EXPECT_TRUE(
-      predicted.origin_in_source().isApprox(model.predict(200).origin_in_source(), 1e-12));
+  EXPECT_TRUE(predicted.origin_in_source().isApprox(model.predict(200).origin_in_source(), 1e-12));
 }
 
 TEST(MotionModel, ForgetsOnReset) {

@@ -12,6 +12,7 @@
 #include <string_view>
 #include <type_traits>
 
+#include "waymark/bag/bag_content.h"
 #include "waymark/bag/ros_messages.h"
 
 namespace waymark::testing {

@@ -1,0 +1,131 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/session/imu_feed.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <memory>
+#include <thread>
+#include <utility>
+#include <vector>
+
+#include "waymark/geometry/rigid3.h"
+#include "waymark/session/session.h"
+#include "waymark/session/testing/memory_input.h"
+#include "waymark/simulate/imu_device.h"
+#include "waymark/simulate/named_cameras.h"
+#include "waymark/simulate/sequence.h"
+
+namespace waymark {
+namespace {
+
+using ::testing::HasSubstr;
+using testing::MemoryInput;
+
+constexpr int kNumTurned = 70;
+
+/// A head that turns quickly, with an IMU upside down beside the camera; rendered once.
+struct ImuRecording {
+  Rig rig;
+  std::vector<InputFrame> frames;
+  std::vector<Rigid3> world_from_rig;
+  Rigid3 imu_from_rig;
+  ImuStream imu;
+};
+
+const ImuRecording& imu_recording() {
+  static const ImuRecording made = [] {
+    SequenceSpec spec;
+    spec.chain = mono_chain(named_camera("perspective", 320));
+    spec.motion = "turns_150";
+    spec.num_frames = kNumTurned;
+    spec.effects.noise_sigma = 2.0;
+    spec.imu = parse_imu({"mems", "turn_x=180", "lever_y=5", "shift=4"});
+    SimulatedSequence sequence(spec, std::thread::hardware_concurrency());
+    ImuRecording recording;
+    recording.imu_from_rig = *spec.imu->calibration().imu_from_rig;
+    recording.imu.samples = sequence.imu_samples();
+    recording.rig = sequence.rig();
+    for (int i = 0; i < kNumTurned; ++i) {
+      SimulatedFrame simulated = sequence.frame(i);
+      InputFrame& frame = recording.frames.emplace_back();
+      frame.index = static_cast<std::size_t>(i);
+      frame.timestamp_ns = simulated.timestamp_ns;
+      frame.images = std::move(simulated.images);
+      recording.world_from_rig.push_back(simulated.world_from_rig);
+    }
+    return recording;
+  }();
+  return made;
+}
+
+SessionResults run_with(const ImuStream& imu, Timing timing = Timing::kInline) {
+  MemoryInput input(imu_recording().frames);
+  input.info().imu = std::make_shared<const ImuStream>(imu);
+  System system(imu_recording().rig, Settings(), timing);
+  return run_session(input, system, {});
+}
+
+double length_of(const std::vector<StampedPose>& poses) {
+  double length = 0.0;
+  for (std::size_t i = 1; i < poses.size(); ++i) {
+    length += (poses[i].world_from_camera.translation - poses[i - 1].world_from_camera.translation)
+                  .norm();
+  }
+  return length;
+}
+
+TEST(ImuFeed, GivesMetresAndALevelMapAndFindsWhereTheImuIs) {
+  const SessionResults results = run_with(imu_recording().imu);
+  const ImuSummary& imu = results.summary.imu.value();
+  ASSERT_TRUE(imu.is_used) << imu.reason;
+  EXPECT_TRUE(imu.metric_from);
+  EXPECT_TRUE(results.summary.quality->is_metric);
+  std::vector<StampedPose> truth;
+  for (const Rigid3& pose : imu_recording().world_from_rig) truth.push_back({0, pose});
+  const double ratio = length_of(results.trajectories.at(0)) / length_of(truth);
+  EXPECT_NEAR(ratio, 1.0, 4.0 * imu.scale_sigma + 0.01);
+  EXPECT_NEAR(imu.time_shift_ms, 4.0, 1.0);
+  const Eigen::Quaterniond found = so3_exp(imu.rotation_deg * M_PI / 180.0);
+  EXPECT_LT(found.angularDistance(imu_recording().imu_from_rig.rotation), 0.01);
+  // Up is up: what was level in the truth is level in the map.
+  const Rigid3& first = results.trajectories[0].front().world_from_camera;
+  const std::size_t row = results.summary.counts.initialized_at.value();
+  const Eigen::Vector3d up_in_rig =
+      imu_recording().world_from_rig[row].rotation.conjugate() * Eigen::Vector3d::UnitZ();
+  EXPECT_GT((first.rotation * up_in_rig).z(), std::cos(0.02));
+}
+
+TEST(ImuFeed, GivesTheSameBitsInlineAndInLockstep) {
+  const SessionResults in_line = run_with(imu_recording().imu);
+  const SessionResults lockstep = run_with(imu_recording().imu, Timing::kLockstep);
+  ASSERT_EQ(in_line.trajectories.at(0).size(), lockstep.trajectories.at(0).size());
+  for (std::size_t i = 0; i < in_line.trajectories[0].size(); ++i) {
+    EXPECT_EQ(in_line.trajectories[0][i].world_from_camera.matrix(),
+              lockstep.trajectories[0][i].world_from_camera.matrix());
+  }
+}
+
+TEST(ImuFeed, LeavesOutWhatContradictsTheImages) {
+  ImuStream swapped = imu_recording().imu;  // Axes of one sensor only.
+  for (ImuSample& sample : swapped.samples) {
+    std::swap(sample.angular_velocity.x(), sample.angular_velocity.y());
+  }
+  const SessionResults results = run_with(swapped);
+  EXPECT_FALSE(results.summary.imu->is_used);
+  EXPECT_THAT(results.summary.imu->reason, HasSubstr("contradicts"));
+  EXPECT_FALSE(results.summary.quality->is_metric);
+}
+
+TEST(ImuFeed, DoesNotUseWhatIsWrongInItself) {
+  ImuStream constant = imu_recording().imu;
+  for (ImuSample& sample : constant.samples) sample.angular_velocity.setZero();
+  const SessionResults results = run_with(constant);
+  EXPECT_FALSE(results.summary.imu->is_used);
+  EXPECT_THAT(results.summary.imu->reason, HasSubstr("always shows the same"));
+}
+
+}  // namespace
+}  // namespace waymark

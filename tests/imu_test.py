@@ -1,0 +1,78 @@
+#!/usr/bin/python3
+# Copyright the Waymark authors.
+# SPDX-License-Identifier: Apache-2.0
+"""One camera and an IMU give metres and a level map, however the IMU is described; one that is wrong is left out with
+a line, and changes nothing. Needs WAYMARK_DATA."""
+import json
+import os
+import pathlib
+import unittest
+
+from cli_support import CliTest, waymark
+
+DATA = pathlib.Path(os.environ.get("WAYMARK_DATA", ""))
+EUROC, PHONE = DATA / "euroc_mh01_stereo", DATA / "phone_lowlight_mono"
+WRONG = """cam0:
+  T_cam_imu:
+  - [0.0, -1.0, 0.0, 0.1]
+  - [1.0, 0.0, 0.0, 0.0]
+  - [0.0, 0.0, 1.0, 0.0]
+  - [0.0, 0.0, 0.0, 1.0]
+  timeshift_cam_imu: 0.02
+"""
+
+
+@unittest.skipUnless(os.environ.get("WAYMARK_DATA") and EUROC.is_dir(), "needs euroc_mh01_stereo in WAYMARK_DATA")
+class Recorded(CliTest):
+    def figures(self, *options):
+        done = self.run_on(EUROC, "--setup", "mono", *options)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        judged = {}
+        for align in ("se3", "sim3"):
+            text = waymark("eval", self.out / "trajectory.txt", EUROC / "groundtruth.txt", "--align", align, "--json")
+            judged[align] = json.loads(text.stdout)
+        return judged["se3"]["ate_rmse_m"], judged["sim3"]["scale"], self.summary()
+
+    def check(self, *options):
+        ate_m, scale, summary = self.figures(*options)
+        imu = summary["imu"]
+        self.assertTrue(imu["used"])
+        self.assertLess(ate_m, 0.008)
+        self.assertLess(abs(scale - 1.0), min(0.003, 3.0 * imu["scale_sigma"]))
+        self.assertLess(imu["metric_from_frame"], 60)
+        self.assertTrue(summary["quality"]["is_metric"])
+        self.assertLess(abs(imu["time_shift_ms"]["value"]), 1.0)
+        # The table lies on its side: gravity is along z whatever the first image showed.
+        self.assertLess(max(map(abs, imu["gravity_in_world"][:2])), 1e-6)
+        return imu
+
+    def test_metres_from_one_camera(self):
+        imu = self.check()
+        self.assertLess(abs(imu["rotation_deg"]["value"][2] - 89.15), 0.3)
+
+    def test_a_wrong_description(self):
+        calibration = self.folder / "wrong.yaml"
+        intrinsics = (EUROC / "camchain.yaml").read_text().split("cam0:\n")[1].split("cam1:")[0]
+        kept = [line for line in intrinsics.splitlines() if "T_cam_imu" not in line and "- [" not in line]
+        calibration.write_text(WRONG + "\n".join(kept) + "\n")
+        self.check("-c", calibration)
+
+    def test_without(self):
+        _, scale, summary = self.figures("--imu", "none")
+        self.assertNotIn("imu", summary)
+        self.assertGreater(scale, 2.0)
+
+    def test_samples_of_two_devices(self):
+        camera = ("-c", PHONE / "camchain.yaml", "--setup", "mono", "--frames", 100)
+        done = self.run_on(PHONE, *camera)
+        path = (self.out / "trajectory.txt").read_bytes()
+        self.assertEqual(done.returncode, 0, done.stderr)
+        done = self.run_on(PHONE, *camera, "--imu", PHONE / "imu0.csv")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        self.assertIn("the inertial data is not used", done.stderr)
+        self.assertFalse(self.summary()["imu"]["used"])
+        self.assertEqual((self.out / "trajectory.txt").read_bytes(), path)
+
+
+if __name__ == "__main__":
+    unittest.main()
