@@ -219,7 +219,7 @@ class Results(CliTest):
         columns = set((self.out / "frames.csv").read_text().split("\n")[0].split(","))
         self.assertEqual(tables["| column | meaning |"], columns | {"name"})
         keys = set(json.loads((self.out / "summary.json").read_text()))
-        self.assertEqual(tables["| key | meaning |"], keys | {"calibration", "refined_calibration", "localized", "markers", "scales"})
+        self.assertEqual(tables["| key | meaning |"], keys | {"calibration", "refined_calibration", "localized", "markers", "scales", "imu"})
         self.assertEqual(tables["| state | meaning |"], self.names_of("FrameState"))
         self.assertEqual(tables["| reason | meaning |"], self.names_of("FrameReason") - {"none"})
 

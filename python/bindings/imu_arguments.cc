@@ -17,7 +17,7 @@ std::vector<ImuSample> imu_samples(const py::object& timestamp_ns,
     return numbers_argument(name, rows, 3);
   };
   std::vector<std::int64_t> times;
-  if (py::isinstance<py::int_>(timestamp_ns)) {
+  if (!py::isinstance<py::iterable>(timestamp_ns)) {
     times.push_back(integer_argument("timestamp_ns", timestamp_ns));
   } else {
     for (const py::handle time : py::iter(timestamp_ns)) {

@@ -201,17 +201,21 @@ std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
 
 std::shared_ptr<const Map> InertialEstimator::finish(const TrajectoryMemory& memory,
                                                      std::shared_ptr<const Map> map,
-                                                     bool is_new) {
+                                                     bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
   const SubmapId submap = submaps_by_size(*map).front();
   look(choose_poses(list_poses(memory, *map), submap, kMaxPosesInTheEnd), submap, *map);
-  if (!report_->is_used || !is_new) return map;
+  if (!report_->is_used || !is_frame_free) return map;
   const bool is_metric = map->submaps()[submap.value].is_metric;
   const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
   const Sim3 level(turn_upright(-report_->gravity_in_world),
                    Eigen::Vector3d::Zero(),
                    is_scaled ? std::exp(found_->setup.log_scale) : 1.0);
   report_->gravity_in_world = level.rotation * report_->gravity_in_world;
+  if (is_scaled && !report_->metric_from) {
+    report_->metric_from = FrameId{static_cast<std::uint32_t>(memory.entries().size() - 1)};
+  }
+  if (!is_scaled) report_->metric_from.reset();
   Map next = Map::thaw(*map);
   if (is_scaled) {
     next = put_into_metres(std::move(next), submap, level);

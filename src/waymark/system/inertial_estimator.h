@@ -40,12 +40,12 @@ class InertialEstimator {
   /// before that is known well, and where samples are missing.
   std::optional<Eigen::Quaterniond> turn(std::int64_t begin_ns, std::int64_t end_ns) const;
 
-  /// Looks at the whole way. is_new: the map was begun in this session, so that its frame may be
-  /// chosen. Gives the map with its largest part level (z up), and in metres where these are told;
-  /// the same map where nothing is.
+  /// Looks at the whole way. is_frame_free: the map was begun in this session and no marker says
+  /// where it is. Gives the map with its largest part level (z up), and in metres where these are
+  /// told; the same map where nothing is.
   std::shared_ptr<const Map> finish(const TrajectoryMemory& memory,
                                     std::shared_ptr<const Map> map,
-                                    bool is_new);
+                                    bool is_frame_free);
 
   /// Empty without samples.
   const std::optional<InertialReport>& report() const { return report_; }

@@ -161,7 +161,8 @@ void System::Impl::finish() {
   back_end_.end_threads();
   visible_ = back_end_.finish(motions());
   memory_.settle(*rig(), *map());
-  visible_.snapshot.map = inertial_.finish(memory_, map(), memory_.first() == FrameId{0});
+  const bool is_frame_free = memory_.first() == FrameId{0} && !back_end_.marker_survey().frame;
+  visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free);
 }
 
 /// How the rig moved at the keyframes, where that matters.
