@@ -68,9 +68,12 @@ void sort_samples(ImuStream& stream) {
     latest_ns = std::max(latest_ns, sample.timestamp_ns);
   }
   std::ranges::stable_sort(samples, {}, &ImuSample::timestamp_ns);
-  const auto doubles = std::ranges::unique(samples, {}, &ImuSample::timestamp_ns);
-  stream.num_doubles += doubles.size();
-  samples.erase(doubles.begin(), doubles.end());
+  const auto doubles = std::unique(
+      samples.begin(), samples.end(), [](const ImuSample& before, const ImuSample& sample) {
+        return before.timestamp_ns == sample.timestamp_ns;
+      });
+  stream.num_doubles += static_cast<std::size_t>(samples.end() - doubles);
+  samples.erase(doubles, samples.end());
   if (samples.size() >= 2) return;
   throw InputError(stream.source,
                    fmt::format("has {} of inertial data, expected at least 2 at different times",
