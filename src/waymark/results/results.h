@@ -143,20 +143,20 @@ struct MarkerSummary {
 
 /// What an inertial measurement unit gave in a run; see InertialReport.
 struct ImuSummary {
-  bool is_used = false;
-  std::string reason;                                          ///< Why it is not, in words.
-  std::optional<std::size_t> metric_from;                      ///< Index of the frame.
-  double scale_sigma = 0.0;                                    ///< As a part of lengths.
+  bool is_used = false;                    ///< Whether the images agree with it.
+  std::string reason;                      ///< Why it is not, in words.
+  std::optional<std::size_t> metric_from;  ///< Index of the frame.
+  double scale_sigma = 0.0;                ///< As a part of lengths.
   Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();  ///< m/s^2.
-  double gravity_sigma_deg = 0.0;
-  double time_shift_ms = 0.0;  ///< Added to times of images for the clock of the IMU.
-  double time_shift_sigma_ms = 0.0;
+  double gravity_sigma_deg = 0.0;    ///< Standard deviation of its direction.
+  double time_shift_ms = 0.0;        ///< Added to times of images for the clock of the IMU.
+  double time_shift_sigma_ms = 0.0;  ///< Its standard deviation.
   Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();  ///< Rotation vector, imu_from_cam0.
-  double rotation_sigma_deg = 0.0;
-  Eigen::Vector3d lever_arm_m = Eigen::Vector3d::Zero();  ///< Of camera 0 in the axes of the IMU.
-  double lever_arm_sigma_m = 0.0;
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();   ///< rad/s.
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();  ///< m/s^2.
+  double rotation_sigma_deg = 0.0;                         ///< Its standard deviation, per axis.
+  Eigen::Vector3d lever_arm_m = Eigen::Vector3d::Zero();   ///< Of camera 0 in the axes of the IMU.
+  double lever_arm_sigma_m = 0.0;                          ///< Its standard deviation, per axis.
+  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();     ///< rad/s.
+  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();    ///< m/s^2.
 };
 
 /// summary.json.
