@@ -42,7 +42,7 @@ class Recorded(CliTest):
         self.assertLess(imu["metric_from_frame"], 60)
         self.assertTrue(summary["quality"]["is_metric"])
         self.assertLess(abs(imu["time_shift_ms"]["value"]), 1.0)
-        # The table lies on its side: gravity is along z whatever the first image showed.
+        # As it is told of the map that was turned upright, whichever way the first image looked.
         self.assertLess(max(map(abs, imu["gravity_in_world"][:2])), 1e-6)
         return imu
 
