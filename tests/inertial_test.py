@@ -42,8 +42,6 @@ class Recorded(CliTest):
         self.assertLess(imu["metric_from_frame"], 60)
         self.assertTrue(summary["quality"]["is_metric"])
         self.assertLess(abs(imu["time_shift_ms"]["value"]), 1.0)
-        # As it is told of the map that was turned upright, whichever way the first image looked.
-        self.assertLess(max(map(abs, imu["gravity_in_world"][:2])), 1e-6)
         return imu
 
     def test_metres_from_one_camera(self):
@@ -62,6 +60,7 @@ class Recorded(CliTest):
         self.assertNotIn("imu", summary)
         self.assertGreater(scale, 2.0)
 
+    @unittest.skipUnless(PHONE.is_dir(), "needs phone_lowlight_mono in WAYMARK_DATA")
     def test_samples_of_two_devices(self):
         camera = ("-c", PHONE / "camchain.yaml", "--setup", "mono", "--frames", 100)
         done = self.run_on(PHONE, *camera)
