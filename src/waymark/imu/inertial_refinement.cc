@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "waymark/base/check.h"
+#include "waymark/geometry/robust_loss.h"
 #include "waymark/imu/chain_hessian.h"
 #include "waymark/imu/start_steps.h"
 #include "waymark/solver/levenberg_marquardt.h"
@@ -19,6 +20,8 @@ constexpr double kNegligibleError = 1e-2;
 
 /// What a velocity is below in m/s, where nothing tells it.
 constexpr double kAnySpeed = 1000.0;
+/// Poses that are not seen may be so many times as far from the guess as others from what is seen.
+constexpr double kUnseen = 1e5;
 
 /// A step of all unknowns: setup, then the states. Velocities grow with the scale, and their own
 /// part is added to that: otherwise all would have to follow each step of the scale to within the
@@ -95,8 +98,17 @@ void add_state_priors(const StartProblem& problem,
     const Vector6d error =
         (unknowns.states[i].rig_from_world * problem.poses[i].rig_from_world.inverse()).log();
     const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
-    equations.add_prior(at, error.head<3>(), problem.options.pose_position_sigma);
-    equations.add_prior(at + 3, error.tail<3>(), problem.options.pose_rotation_sigma);
+    double position_sigma = problem.options.pose_position_sigma;
+    double rotation_sigma = problem.options.pose_rotation_sigma;
+    const double squared = (error.head<3>() / position_sigma).squaredNorm() +
+                           (error.tail<3>() / rotation_sigma).squaredNorm();
+    const RobustValue robust = huber(squared, problem.options.pose_huber);
+    const double factor = problem.poses[i].is_seen ? 1.0 / std::sqrt(robust.weight) : kUnseen;
+    position_sigma *= factor;
+    rotation_sigma *= factor;
+    equations.add_prior(at, error.head<3>(), position_sigma);
+    equations.add_prior(at + 3, error.tail<3>(), rotation_sigma);
+    if (problem.poses[i].is_seen) equations.cost += robust.loss - robust.weight * squared;
     equations.add_prior(at + 6, unknowns.states[i].velocity, kAnySpeed);
     if (i > 0 && chain.intervals[i - 1]) continue;
     const ImuBiases& biases = unknowns.states[i].biases;

@@ -191,12 +191,15 @@ std::optional<InertialEstimate> predict(const InertialEstimate& first,
   const Preintegration measured(std::move(between), noise, first.state.biases);
   InertialEstimate second;
   second.state = state_after(first.state, measured, setup);
-  // The whitened residual of both has unit covariance: by_first * e_1 + by_second * e_2 = n.
+  // The whitened residual n of both has unit covariance: by_setup * e_s + by_first * e_1 +
+  // by_second * e_2 = n.
   const InertialResidual residual = inertial_residual(measured, first.state, second.state, setup);
   const Matrix15d inverse = residual.by_second.inverse();
-  const Matrix15d by_first = inverse * residual.by_first;
-  second.covariance =
-      by_first * first.covariance * by_first.transpose() + inverse * inverse.transpose();
+  Matrix25d by_before = Matrix25d::Identity();
+  by_before.bottomLeftCorner<15, 10>() = -inverse * residual.by_setup;
+  by_before.bottomRightCorner<15, 15>() = -inverse * residual.by_first;
+  second.covariance = by_before * first.covariance * by_before.transpose();
+  second.covariance.bottomRightCorner<15, 15>() += inverse * inverse.transpose();
   return second;
 }
 

@@ -16,6 +16,7 @@ namespace waymark {
 using Vector10d = Eigen::Matrix<double, 10, 1>;
 using Vector15d = Eigen::Matrix<double, 15, 1>;
 using Matrix15x10d = Eigen::Matrix<double, 15, 10>;
+using Matrix25d = Eigen::Matrix<double, 25, 25>;
 
 /// What a keyframe adds. Tangent vectors are (xi 6, velocity 3, gyroscope bias 3, accelerometer
 /// bias 3), with exp(xi) on the left of rig_from_world.
@@ -69,13 +70,12 @@ InertialResidual inertial_residual(const Preintegration& preintegration,
 /// A state and how sure it is.
 struct InertialEstimate {
   InertialState state;
-  Matrix15d covariance = Matrix15d::Zero();  ///< Of its tangent vector.
+  Matrix25d covariance = Matrix25d::Zero();  ///< Of the tangent vectors of (setup 10, state 15).
 };
 
 /// Where the rig is at end_ns by what it was at begin_ns (< end_ns, by the clock of the IMU, which
 /// the setup does not change) and the samples between; nothing where these do not tell all of it.
-/// The covariance is propagated to first order, with the noise and the walk of the biases; that of
-/// the setup is not in it.
+/// The covariance is propagated to first order, with the noise and the walk of the biases.
 std::optional<InertialEstimate> predict(const InertialEstimate& first,
                                         const ImuSamples& samples,
                                         std::int64_t begin_ns,

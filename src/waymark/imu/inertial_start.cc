@@ -33,8 +33,14 @@ PreintegrationChain cut_chain(const StartProblem& problem,
   return chain;
 }
 
+/// How the rig turned in an interval by the gyroscope: rig_end_from_rig_begin.
+Eigen::Quaterniond turn_of_rig(const Preintegration& interval,
+                               const Eigen::Quaterniond& imu_from_rig) {
+  return imu_from_rig.conjugate() * interval.delta().rotation.conjugate() * imu_from_rig;
+}
+
 /// Where refinement begins: gravity is what the mean force holds up, velocities are those of the
-/// poses at the scale believed.
+/// poses at the scale believed; poses that are not seen are turned as the gyroscope tells.
 InertialUnknowns first_guess(const StartProblem& problem,
                              const PreintegrationChain& chain,
                              const RotationStart& rotation) {
@@ -48,6 +54,12 @@ InertialUnknowns first_guess(const StartProblem& problem,
   for (std::size_t i = 0; i < poses.size(); ++i) {
     InertialState& state = unknowns.states.emplace_back();
     state.rig_from_world = poses[i].rig_from_world;
+    if (!poses[i].is_seen && i > 0 && chain.intervals[i - 1]) {
+      const Eigen::Quaterniond turned =
+          turn_of_rig(*chain.intervals[i - 1], rotation.imu_from_rig) *
+          unknowns.states[i - 1].rig_from_world.rotation;
+      state.rig_from_world = {turned, -(turned * poses[i].rig_from_world.origin_in_source())};
+    }
     state.biases.gyroscope = rotation.gyroscope_bias;
     const VisionPose& before = poses[i == 0 ? 0 : i - 1];
     const VisionPose& after = poses[std::min(i + 1, poses.size() - 1)];
@@ -63,9 +75,9 @@ InertialUnknowns first_guess(const StartProblem& problem,
 }
 
 /// What the squared error is in the mean: measured numbers and beliefs without what is fitted.
-double degrees_of_freedom(const PreintegrationChain& chain) {
-  const double num_states = static_cast<double>(chain.intervals.size() + 1);
-  double freedom = 8.0 - 10.0 + 6.0 - (15.0 - 6.0) * num_states;
+double degrees_of_freedom(const PreintegrationChain& chain, std::span<const VisionPose> poses) {
+  double freedom = 8.0 - 10.0 + 6.0;
+  for (const VisionPose& pose : poses) freedom += (pose.is_seen ? 6.0 : 0.0) - 15.0;
   for (const auto& interval : chain.intervals) freedom += interval ? 15.0 : 6.0;
   return freedom;
 }
@@ -151,7 +163,7 @@ std::optional<InertialStart> start_inertial(const ImuSamples& samples,
   start.states = std::move(refined.unknowns.states);
   start.covariance = refined.covariance;
   start.squared_error = refined.squared_error;
-  start.degrees_of_freedom = degrees_of_freedom(chain);
+  start.degrees_of_freedom = degrees_of_freedom(chain, poses);
   return start;
 }
 

@@ -3,7 +3,9 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <cmath>
 #include <cstdint>
+#include <limits>
 #include <optional>
 #include <span>
 #include <vector>
@@ -15,10 +17,11 @@
 
 namespace waymark {
 
-/// A pose that vision found.
+/// A pose that vision found, or one that is looked for.
 struct VisionPose {
   std::int64_t timestamp_ns = 0;  ///< By the clock of the images.
-  Rigid3 rig_from_world;          ///< In map units.
+  Rigid3 rig_from_world;          ///< In map units; where it is not seen, about where it is.
+  bool is_seen = true;            ///< If not, only the IMU tells it.
 };
 
 /// What is believed before any sample is read. Standard deviations are positive.
@@ -27,6 +30,8 @@ struct InertialStartOptions {
   /// Of each pose by itself: the place of the rig in map units, per axis.
   double pose_position_sigma = 0.003;
   double pose_rotation_sigma = 0.002;  ///< rad, per axis.
+  /// Errors of a pose in standard deviations, of six components, that count fully (Huber).
+  double pose_huber = std::numeric_limits<double>::infinity();
   /// Logarithm of metres per map unit. A map that is metric has a small sigma.
   double log_scale = 0.0;
   double log_scale_sigma = 2.0;
@@ -41,7 +46,19 @@ struct InertialStartOptions {
   double time_shift_sigma_s = 0.1;  ///< s.
 };
 
-using Matrix25d = Eigen::Matrix<double, 25, 25>;
+/// Where components of the tangent vectors of (setup 10, last state 15) begin.
+inline constexpr int kGravityAt = 0;
+inline constexpr int kLogScaleAt = 2;
+inline constexpr int kLeverArmAt = 3;
+inline constexpr int kRotationAt = 6;
+inline constexpr int kTimeShiftAt = 9;
+inline constexpr int kStateAt = 10;
+inline constexpr int kGyroscopeBiasAt = 19;
+
+/// The largest standard deviation of some neighbouring components.
+inline double largest_sigma(const Matrix25d& covariance, int first, int count = 3) {
+  return std::sqrt(covariance.diagonal().segment(first, count).maxCoeff());
+}
 
 /// What vision and inertial samples tell together, and how well.
 struct InertialStart {
@@ -54,6 +71,8 @@ struct InertialStart {
   double squared_error = 0.0;       ///< In standard deviations; at the scale that fits best.
   double degrees_of_freedom = 0.0;  ///< What squared_error is in the mean.
 
+  /// Whether vision and IMU do not agree: residuals are thrice as large as expected, squared.
+  bool is_contradicted() const { return squared_error > 3.0 * degrees_of_freedom; }
   /// Standard deviation of a component of the tangent vector.
   double sigma(int component) const { return std::sqrt(covariance(component, component)); }
 };
@@ -61,9 +80,9 @@ struct InertialStart {
 /// Finds gravity, scale, velocities, biases, and what is not told of the calibration, from poses in
 /// the order of time (a few dozen, .1 to 1 s apart) and the samples around them. No motion is asked
 /// for: what it does not tell has a large standard deviation; a scale that is not told to 10 % is
-/// the one believed before, as sure as that. Two steps: rotation_start,
-/// refine_inertial_start. Nothing if no two neighbouring poses have all samples
-/// between.
+/// the one believed before, as sure as that. Poses that are not seen come out as what all around
+/// them tells. Two steps: rotation_start, refine_inertial_start. Nothing if no two neighbouring
+/// poses that are seen have all samples between.
 std::optional<InertialStart> start_inertial(const ImuSamples& samples,
                                             std::span<const VisionPose> poses,
                                             const ImuCalibration& calibration,

@@ -246,6 +246,48 @@ TEST(InertialStart, AMetricMapTellsMore) {
   }
 }
 
+/// Three of the poses are only guessed, by half a metre and a third of a turn wrong.
+TEST(InertialStart, FindsPosesThatAreNotSeen) {
+  for (std::uint64_t trial = 0; trial < 5; ++trial) {
+    Rng rng(10, trial);
+    StartScene scene(testing::hand_held_motion, {}, rng);
+    scene.options.log_scale = scene.setup.log_scale;
+    scene.options.log_scale_sigma = 0.01;
+    const double metre = std::exp(-scene.setup.log_scale);
+    for (const std::size_t i : {5u, 6u, 7u}) {
+      Vector6d off;
+      off << 0.5 * metre * normal_vector(rng), normal_vector(rng);
+      scene.poses[i].rig_from_world = Rigid3::exp(off) * scene.poses[i].rig_from_world;
+      scene.poses[i].is_seen = false;
+    }
+    const auto found = scene.start();
+    ASSERT_TRUE(found);
+    EXPECT_NEAR(found->squared_error / found->degrees_of_freedom, 1.0, 0.5);
+    for (int i = 5; i < 8; ++i) {
+      const Rigid3 truth = scene.true_pose(i * kPoseInterval);
+      const Rigid3& pose = found->states[static_cast<std::size_t>(i)].rig_from_world;
+      EXPECT_LT((pose.origin_in_source() - truth.origin_in_source()).norm(), 0.02 * metre) << i;
+      EXPECT_LT(pose.rotation.angularDistance(truth.rotation), 0.005) << i;
+    }
+  }
+}
+
+TEST(InertialStart, LetsASinglePoseBeWrongWhereThatIsAllowed) {
+  Rng rng(11, 0);
+  StartScene scene(testing::hand_held_motion, {}, rng);
+  Vector6d off;
+  off << 100.0 * scene.options.pose_position_sigma * Vector6d::Ones().head<3>(),
+      Eigen::Vector3d::Zero();
+  scene.poses[6].rig_from_world = Rigid3::exp(off) * scene.poses[6].rig_from_world;
+  EXPECT_TRUE(scene.start()->is_contradicted());
+  scene.options.pose_huber = 2.0;
+  const auto found = scene.start();
+  ASSERT_TRUE(found);
+  const Rigid3 truth = scene.true_pose(6 * kPoseInterval);
+  EXPECT_LT((found->states[6].rig_from_world * truth.inverse()).log().head<3>().norm(),
+            0.1 * off.norm());
+}
+
 TEST(InertialStart, GoesOnAcrossAGap) {
   Rng rng(9, 0);
   StartScene scene(testing::hand_held_motion, {}, rng);

@@ -52,6 +52,7 @@ TurnRates turn_rates(const StartProblem& problem, const Eigen::Vector3d& bias, d
   for (std::size_t i = 1; i < problem.poses.size(); ++i) {
     const VisionPose& first = problem.poses[i - 1];
     const VisionPose& second = problem.poses[i];
+    if (!first.is_seen || !second.is_seen) continue;
     const std::int64_t begin = first.timestamp_ns + shift_ns;
     const std::int64_t end = second.timestamp_ns + shift_ns;
     const std::vector<ImuSample> samples = problem.samples.between(begin, end);

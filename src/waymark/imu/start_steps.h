@@ -41,8 +41,8 @@ struct RotationStart {
 /// The rotation imu_from_rig and the bias that explain how the rig turned from pose to pose by how
 /// the IMU did, from mean angular velocities (alignment of vectors, Umeyama 1991), robustly
 /// (Huber). A time shift that is not told is where they agree best. What does not show remains as
-/// told, or is near identity and 0. Nothing if no two neighbouring poses have all samples between
-/// them.
+/// told, or is near identity and 0. Nothing if no two neighbouring poses that are seen have all
+/// samples between them.
 std::optional<RotationStart> rotation_start(const StartProblem& problem);
 
 /// What samples say from pose to pose; nothing where some are missing.
