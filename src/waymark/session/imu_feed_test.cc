@@ -61,8 +61,10 @@ const ImuRecording& imu_recording() {
   return made;
 }
 
-SessionResults run_with(const ImuStream& imu, Timing timing = Timing::kInline) {
-  MemoryInput input(imu_recording().frames);
+SessionResults run_with(const ImuStream& imu,
+                        Timing timing = Timing::kInline,
+                        const std::vector<InputFrame>& frames = imu_recording().frames) {
+  MemoryInput input(frames);
   input.info().imu = std::make_shared<const ImuStream>(imu);
   System system(imu_recording().rig, Settings(), timing);
   return run_session(input, system, {});
@@ -96,6 +98,44 @@ TEST(ImuFeed, GivesMetresAndALevelMapAndFindsWhereTheImuIs) {
   const Eigen::Vector3d up_in_rig =
       imu_recording().world_from_rig[row].rotation.conjugate() * Eigen::Vector3d::UnitZ();
   EXPECT_GT((first.rotation * up_in_rig).z(), std::cos(0.02));
+}
+
+/// How far a frame is from another one in the results and in the truth.
+Rigid3 motion_error(const SessionResults& results, std::size_t from, std::size_t to) {
+  const auto& poses = results.trajectories.at(0);
+  const auto& truth = imu_recording().world_from_rig;
+  const std::size_t before = truth.size() - poses.size();  // Without a pose.
+  const Rigid3 found =
+      poses.at(from - before).world_from_camera.inverse() * poses.at(to - before).world_from_camera;
+  return (truth.at(from).inverse() * truth.at(to)).inverse() * found;
+}
+
+TEST(ImuFeed, BridgesImagesThatShowNothing) {
+  std::vector<InputFrame> frames = imu_recording().frames;
+  constexpr std::size_t kFirst = 48, kEnd = 60;
+  for (std::size_t i = kFirst; i < kEnd; ++i) {
+    frames[i].images[0] = Image(frames[i].images[0].width_px, frames[i].images[0].height_px);
+  }
+  const SessionResults results = run_with(imu_recording().imu, Timing::kInline, frames);
+  EXPECT_EQ(results.summary.counts.lost_count, 0u);
+  EXPECT_EQ(results.trajectories.size(), 1u);
+  for (std::size_t i = kFirst; i < kEnd; ++i) {
+    EXPECT_EQ(results.table.frames[i].state, FrameState::kFilled);
+    const Vector6d error = motion_error(results, kFirst - 1, i).log();
+    EXPECT_LT(error.head<3>().norm(), 0.01) << i;
+    EXPECT_LT(error.tail<3>().norm(), 0.005) << i;
+  }
+  // At the end there is no image to go back to.
+  std::fill(frames.begin() + kFirst, frames.end(), frames[kFirst]);
+  for (std::size_t i = kFirst; i < frames.size(); ++i) {
+    frames[i].index = i;
+    frames[i].timestamp_ns = imu_recording().frames[i].timestamp_ns;
+  }
+  const SessionResults without_end = run_with(imu_recording().imu, Timing::kInline, frames);
+  EXPECT_EQ(without_end.summary.counts.tracked, results.summary.counts.tracked);
+  const Vector6d error = motion_error(without_end, kFirst - 1, kEnd).log();
+  EXPECT_LT(error.head<3>().norm(), 0.25);  // The bias of the accelerometer is not known yet.
+  EXPECT_LT(error.tail<3>().norm(), 0.01);
 }
 
 TEST(ImuFeed, GivesTheSameBitsInlineAndInLockstep) {

@@ -24,8 +24,6 @@ constexpr std::size_t kMaxPoses = 100;
 constexpr std::size_t kMaxPosesInTheEnd = 300;
 /// Poses of vision are that good: in rad, and as a part of how far away things are.
 constexpr double kPoseSigma = 0.001;
-/// Residuals of an IMU that vision contradicts are larger than expected by this factor.
-constexpr double kContradiction = 3.0;
 /// What was told is wrong where vision and IMU are off by so many standard deviations.
 constexpr double kFarFromTold = 5.0;
 /// Poses of vision err alike for long, which no number of them averages out.
@@ -42,18 +40,6 @@ constexpr double kFirmScale = 0.05;
 constexpr double kFirmRotation = 0.02;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
-
-/// Where components of the tangent vector of a start begin.
-constexpr int kGravityAt = 0;
-constexpr int kLogScaleAt = 2;
-constexpr int kLeverArmAt = 3;
-constexpr int kRotationAt = 6;
-constexpr int kTimeShiftAt = 9;
-constexpr int kGyroscopeBiasAt = 19;
-
-double largest_sigma(const InertialStart& start, int first, int count = 3) {
-  return std::sqrt(start.covariance.diagonal().segment(first, count).maxCoeff());
-}
 
 /// Frames of one part of the map, as far apart as their number asks.
 std::vector<VisionPose> choose_poses(std::span<const TrajectoryFrame> frames,
@@ -104,8 +90,10 @@ bool is_far_from_told(const InertialStart& start,
       found.origin_in_source() - told.imu_from_rig->origin_in_source();
   return is_far(found.rotation.angularDistance(told.imu_from_rig->rotation),
                 options.told_rotation_sigma,
-                largest_sigma(start, kRotationAt)) ||
-         is_far(lever_arm.norm(), options.told_lever_arm_sigma, largest_sigma(start, kLeverArmAt));
+                largest_sigma(start.covariance, kRotationAt)) ||
+         is_far(lever_arm.norm(),
+                options.told_lever_arm_sigma,
+                largest_sigma(start.covariance, kLeverArmAt));
 }
 
 /// As told, but not less than the samples themselves show, and than biases usually walk.
@@ -119,10 +107,6 @@ ImuNoise noise_of(const ImuCalibration& told, std::span<const ImuSample> samples
           std::max(noise.accelerometer_walk, usual.accelerometer_walk)};
 }
 
-bool is_contradicted(const InertialStart& start) {
-  return start.squared_error > kContradiction * start.degrees_of_freedom;
-}
-
 /// Residuals that are larger than expected make all as much less sure.
 void describe(const InertialStart& start, InertialReport& report) {
   const double less_sure =
@@ -131,14 +115,14 @@ void describe(const InertialStart& start, InertialReport& report) {
   report.scale_sigma = std::hypot(less_sure * start.sigma(kLogScaleAt), kSystematicScale);
   report.gravity_in_world = start.setup.gravity;
   report.gravity_sigma_rad =
-      std::hypot(less_sure * largest_sigma(start, kGravityAt, 2), kSystematicRotation);
+      std::hypot(less_sure * largest_sigma(start.covariance, kGravityAt, 2), kSystematicRotation);
   report.time_shift_s = start.time_shift_s;
   report.time_shift_sigma_s =
       std::hypot(less_sure * start.sigma(kTimeShiftAt), kSystematicTimeShift_s);
   report.imu_from_rig = start.setup.imu_from_rig;
   report.rotation_sigma_rad =
-      std::hypot(less_sure * largest_sigma(start, kRotationAt), kSystematicRotation);
-  report.lever_arm_sigma_m = less_sure * largest_sigma(start, kLeverArmAt);
+      std::hypot(less_sure * largest_sigma(start.covariance, kRotationAt), kSystematicRotation);
+  report.lever_arm_sigma_m = less_sure * largest_sigma(start.covariance, kLeverArmAt);
   report.biases = start.states.back().biases;
 }
 
@@ -163,22 +147,23 @@ void InertialEstimator::update(const TrajectoryMemory& memory, const Map& map) {
 }
 
 void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap, const Map& map) {
-  InertialStartOptions options;
+  InertialStartOptions& options = options_ = {};
+  found_in_ = submap;
   options.pose_rotation_sigma = kPoseSigma;
   options.pose_position_sigma = kPoseSigma * distance_of_things(map, submap);
   if (map.submaps()[submap.value].is_metric) options.log_scale_sigma = kMetricSigma;
-  const ImuNoise noise = noise_of(told_, samples_.all());
-  found_ = start_inertial(samples_, poses, told_, noise, options);
-  if (!found_ || is_contradicted(*found_) || is_far_from_told(*found_, told_, options)) {
+  noise_ = noise_of(told_, samples_.all());
+  found_ = start_inertial(samples_, poses, told_, noise_, options);
+  if (!found_ || found_->is_contradicted() || is_far_from_told(*found_, told_, options)) {
     const ImuCalibration nothing;
-    auto anew = start_inertial(samples_, poses, nothing, noise, options);
-    if (anew && !is_contradicted(*anew)) found_ = std::move(anew);
+    auto anew = start_inertial(samples_, poses, nothing, noise_, options);
+    if (anew && !anew->is_contradicted()) found_ = std::move(anew);
   }
   report_.emplace();
   report_->metric_from = metric_from_;
   if (!found_) {
     report_->reason = "too little was seen and measured at the same time";
-  } else if (is_contradicted(*found_)) {
+  } else if (found_->is_contradicted()) {
     report_->reason = "it contradicts the images";
     found_.reset();
   } else {
@@ -186,10 +171,37 @@ void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap,
   }
 }
 
+InertialKnowledge InertialEstimator::knowledge() const {
+  return {samples_, *found_, noise_, options_, options_.pose_position_sigma / kPoseSigma};
+}
+
+bool InertialEstimator::is_firm() const {
+  return found_ && largest_sigma(found_->covariance, kRotationAt) < kFirmRotation &&
+         largest_sigma(found_->covariance, kGyroscopeBiasAt) < kFirmBias;
+}
+
+std::optional<ReckonedPose> InertialEstimator::dead_reckon(const TrajectoryMemory& memory,
+                                                           const Map& map,
+                                                           std::int64_t timestamp_ns) {
+  if (!is_firm() || found_->sigma(kLogScaleAt) > kFirmScale) return std::nullopt;
+  const auto& entries = memory.entries();
+  const auto newest = std::find_if(
+      entries.rbegin(), entries.rend(), [](const auto& entry) { return entry.is_seen(); });
+  if (newest == entries.rend()) return std::nullopt;
+  if (!reckoning_ || reckoning_->begin_ns() != newest->timestamp_ns) {
+    std::vector<TrajectoryFrame> frames = list_poses(memory, map);
+    std::erase_if(frames, [&](const TrajectoryFrame& frame) {
+      return frame.state != FrameState::kTracked || frame.submap != found_in_;
+    });
+    if (frames.empty() || frames.back().timestamp_ns != newest->timestamp_ns) return std::nullopt;
+    reckoning_.emplace(knowledge(), frames);
+  }
+  return reckoning_->to(knowledge(), timestamp_ns);
+}
+
 std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
                                                           std::int64_t end_ns) const {
-  if (!found_ || largest_sigma(*found_, kRotationAt) > kFirmRotation) return std::nullopt;
-  if (largest_sigma(*found_, kGyroscopeBiasAt) > kFirmBias) return std::nullopt;
+  if (!is_firm()) return std::nullopt;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * found_->time_shift_s));
   std::vector<ImuSample> samples = samples_.between(begin_ns + shift_ns, end_ns + shift_ns);
   if (samples.empty()) return std::nullopt;
@@ -199,12 +211,22 @@ std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
   return imu_from_rig.conjugate() * turned.delta().rotation.conjugate() * imu_from_rig;
 }
 
-std::shared_ptr<const Map> InertialEstimator::finish(const TrajectoryMemory& memory,
+std::optional<Eigen::Vector3f> InertialEstimator::turn_rad_s(std::int64_t timestamp_ns) const {
+  constexpr std::int64_t kHalfNs = 10'000'000;  // About half of what rolling shutters take.
+  const auto turned = turn(timestamp_ns - kHalfNs, timestamp_ns + kHalfNs);
+  if (!turned) return std::nullopt;
+  return (so3_log(*turned) / (2e-9 * static_cast<double>(kHalfNs))).cast<float>();
+}
+
+std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
                                                      std::shared_ptr<const Map> map,
                                                      bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
   const SubmapId submap = submaps_by_size(*map).front();
   look(choose_poses(list_poses(memory, *map), submap, kMaxPosesInTheEnd), submap, *map);
+  if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
+    smooth_trajectory(knowledge(), submap, *map, memory);
+  }
   if (!report_->is_used || !is_frame_free) return map;
   const bool is_metric = map->submaps()[submap.value].is_metric;
   const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;

@@ -14,6 +14,7 @@
 #include "waymark/imu/imu_samples.h"
 #include "waymark/imu/inertial_start.h"
 #include "waymark/map/map.h"
+#include "waymark/system/dead_reckoning.h"
 #include "waymark/system/system.h"
 #include "waymark/track/trajectory_memory.h"
 
@@ -40,10 +41,20 @@ class InertialEstimator {
   /// before that is known well, and where samples are missing.
   std::optional<Eigen::Quaterniond> turn(std::int64_t begin_ns, std::int64_t end_ns) const;
 
-  /// Looks at the whole way. is_frame_free: the map was begun in this session and no marker says
-  /// where it is. Gives the map with its largest part level (z up), and in metres where these are
-  /// told; the same map where nothing is.
-  std::shared_ptr<const Map> finish(const TrajectoryMemory& memory,
+  /// How the rig turns about a moment by the gyroscope, as RigMotion has it; where turn() tells it.
+  std::optional<Eigen::Vector3f> turn_rad_s(std::int64_t timestamp_ns) const;
+
+  /// How the rig moved since the newest frame that has a pose. Nothing where that is not told well
+  /// enough.
+  std::optional<ReckonedPose> dead_reckon(const TrajectoryMemory& memory,
+                                          const Map& map,
+                                          std::int64_t timestamp_ns);
+
+  /// Looks at the whole way, and gives frames without a pose those that the IMU tells.
+  /// is_frame_free: the map was begun in this session and no marker says where it is. Gives the map
+  /// with its largest part level (z up), and in metres where these are told; the same map where
+  /// nothing is.
+  std::shared_ptr<const Map> finish(TrajectoryMemory& memory,
                                     std::shared_ptr<const Map> map,
                                     bool is_frame_free);
 
@@ -51,11 +62,19 @@ class InertialEstimator {
   const std::optional<InertialReport>& report() const { return report_; }
 
  private:
+  /// Where something was found.
+  InertialKnowledge knowledge() const;
+  /// Whether all but the states is known well.
+  bool is_firm() const;
   void look(std::span<const VisionPose> poses, SubmapId submap, const Map& map);
 
   ImuCalibration told_;
   ImuSamples samples_;
   std::optional<InertialStart> found_;  ///< Last, where vision and IMU agree.
+  SubmapId found_in_;
+  ImuNoise noise_;
+  InertialStartOptions options_;            ///< That it was found with.
+  std::optional<DeadReckoning> reckoning_;  ///< From the newest frame that had a pose when asked.
   std::optional<InertialReport> report_;
   std::optional<FrameId> metric_from_;
   std::size_t next_look_ = 0;  ///< Number of frames.

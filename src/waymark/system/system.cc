@@ -66,6 +66,7 @@ class System::Impl {
 
  private:
   void make_tracker(bool has_range);
+  RigMotion predict_motion(std::int64_t timestamp_ns) const;
   void hand_over(const Frame& frame, const FrameImages& images, MapperMessage message);
   std::vector<std::pair<KeyframeId, RigMotion>> motions() const;
 
@@ -97,9 +98,15 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
   if (!tracker_) make_tracker(!images.image1.is_empty() || !images.depth.is_empty());
   preparation_.set_calibration(rig());
   Frame frame = preparation_.make_frame(
-      id, images, [this] { return tracker_->predict_motion(); }, result_);
+      id, images, [&] { return predict_motion(images.timestamp_ns); }, result_);
   if (const auto last_ns = tracker_->last_pose_ns()) {
     frame.turn = inertial_.turn(*last_ns, frame.timestamp_ns);
+    frame.turn_rad_s = inertial_.turn_rad_s(frame.timestamp_ns);
+    if (inertial_.has_samples()) {
+      frame.dead_reckon = [&, time_ns = frame.timestamp_ns] {
+        return inertial_.dead_reckon(memory_, *map(), time_ns);
+      };
+    }
   }
   {
     StageTimer timer(result_.stages, Stage::kWait);
@@ -111,6 +118,13 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
   inertial_.update(memory_, *map());
   if (message) hand_over(frame, images, *std::move(message));
   return result_;
+}
+
+RigMotion System::Impl::predict_motion(std::int64_t timestamp_ns) const {
+  RigMotion motion = tracker_->predict_motion();
+  if (motion == RigMotion{}) return motion;
+  if (const auto turn_rad_s = inertial_.turn_rad_s(timestamp_ns)) motion.turn_rad_s = *turn_rad_s;
+  return motion;
 }
 
 void System::Impl::hand_over(const Frame& frame, const FrameImages& images, MapperMessage message) {
@@ -168,7 +182,14 @@ void System::Impl::finish() {
 /// How the rig moved at the keyframes, where that matters.
 std::vector<std::pair<KeyframeId, RigMotion>> System::Impl::motions() const {
   if (!settings_.calibration.is_refined() && given_rig_->cameras[0].readout_s == 0.0) return {};
-  return list_motions(memory_, back_end_.map());
+  const Map& map = back_end_.map();
+  auto motions = list_motions(memory_, map);
+  for (auto& [id, motion] : motions) {
+    const FrameId frame = map.keyframes().at(id).frame;
+    const auto& entry = memory_.entries()[frame.value - memory_.first().value];
+    if (const auto rate = inertial_.turn_rad_s(entry.timestamp_ns)) motion.turn_rad_s = *rate;
+  }
+  return motions;
 }
 
 SystemStatistics System::Impl::statistics() const {

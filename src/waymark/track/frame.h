@@ -10,11 +10,18 @@
 
 #include "waymark/base/id.h"
 #include "waymark/features/features.h"
+#include "waymark/geometry/rigid3.h"
 #include "waymark/marker/marker.h"
 
 namespace waymark {
 
 struct SmallImage;
+
+/// How the rig moved since the newest frame that has a pose, by what an IMU measured.
+struct ReckonedPose {
+  Rigid3 rig_from_rig_then;                ///< In metres (map units for mono).
+  Matrix6d covariance = Matrix6d::Zero();  ///< As of TrackingResult.
+};
 
 /// A frame on its way through the tracker.
 struct Frame {
@@ -26,6 +33,11 @@ struct Frame {
   std::function<MarkerObservations()> find_markers = nullptr;
   /// How the rig turned since the newest frame that has a pose, by a gyroscope: rig_from_rig_then.
   std::optional<Eigen::Quaterniond> turn = std::nullopt;
+  /// How it turns within the frame by a gyroscope, as RigMotion has it.
+  std::optional<Eigen::Vector3f> turn_rad_s = std::nullopt;
+  /// Asked where it is not found by its motion; nothing where an IMU does not tell it well enough,
+  /// empty where there is none.
+  std::function<std::optional<ReckonedPose>()> dead_reckon = nullptr;
 };
 
 }  // namespace waymark

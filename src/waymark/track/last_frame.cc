@@ -39,12 +39,13 @@ RigMotion LastFrame::predict_motion(const Map& map) const {
 }
 
 RigMotion LastFrame::motion_in(const Map& map,
-                               std::int64_t timestamp_ns,
+                               const Frame& frame,
                                const Rigid3& rig_from_world,
                                std::span<const LandmarkId> landmarks) const {
   MotionModel model = motion_;
-  model.update(timestamp_ns, rig_from_world);
+  model.update(frame.timestamp_ns, rig_from_world);
   RigMotion motion = model.last_motion();
+  if (frame.turn_rad_s) motion.turn_rad_s = *frame.turn_rad_s;
   motion.inverse_range = median_inverse_range(map, rig_from_world, landmarks);
   return motion;
 }

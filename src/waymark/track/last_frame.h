@@ -132,7 +132,7 @@ class LastFrame {
   RigMotion predict_motion(const Map& map) const;
   /// How it moves in the next frame, whose pose and landmarks are known.
   RigMotion motion_in(const Map& map,
-                      std::int64_t timestamp_ns,
+                      const Frame& frame,
                       const Rigid3& rig_from_world,
                       std::span<const LandmarkId> landmarks) const;
 

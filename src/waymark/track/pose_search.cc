@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "waymark/features/feature_geometry.h"
+#include "waymark/track/keyframes_near.h"
 #include "waymark/track/search_radius.h"
 
 namespace waymark {
@@ -28,7 +29,7 @@ bool is_recent(const PoseSearch::Context& context, const PoseSearchOptions& opti
 void straighten(Frame& frame, const PoseSearch::Context& context, const LocatedFrame& located) {
   if (context.is_lost || frame.features->rig->cameras[0].readout_s == 0.0) return;
   const RigMotion motion = context.last.motion_in(
-      *context.visible.map, frame.timestamp_ns, located.rig_from_world, located.landmarks);
+      *context.visible.map, frame, located.rig_from_world, located.landmarks);
   frame.features = moved(frame.features, motion);
 }
 
@@ -44,12 +45,18 @@ struct PoseSearch::Step {
   bool is_confirmed = false;    ///< By itself, without the local map.
 };
 
-const std::array<PoseSearch::Step, 5> PoseSearch::kSteps = {{
+const std::array<PoseSearch::Step, 6> PoseSearch::kSteps = {{
     {.name = "motion",
      .stage = Stage::kPredict,
      .is_possible = [](const Context& context,
                        const PoseSearchOptions&) { return !context.is_lost; },
      .locate = &PoseSearch::by_motion,
+     .is_alternative = true},
+    {.name = "inertial",
+     .stage = Stage::kRecover,
+     .is_possible = [](const Context& context,
+                       const PoseSearchOptions&) { return context.last.has_pose(); },
+     .locate = &PoseSearch::by_dead_reckoning,
      .is_alternative = true},
     {.name = "last pose",
      .stage = Stage::kRecover,
@@ -115,6 +122,31 @@ std::optional<LocatedFrame> PoseSearch::by_motion(Frame& frame, const Context& c
   Found by_image = locate_by_image(frame, context);
   const bool is_better = by_image && (!wide || by_image->num_inliers > wide->num_inliers);
   return is_better ? by_image : wide;
+}
+
+std::optional<LocatedFrame> PoseSearch::by_dead_reckoning(Frame& frame, const Context& context) {
+  const std::optional<ReckonedPose> reckoned =
+      frame.dead_reckon ? frame.dead_reckon() : std::nullopt;
+  if (!reckoned) return std::nullopt;
+  const Map& map = *context.visible.map;
+  context.last.carry_over(map);
+  const Rigid3 predicted = reckoned->rig_from_rig_then * context.last.rig_from_world();
+  check_.begin(predicted);
+  Found found = locate_near(frame, context, predicted, search_radii_px(frame, options()).back());
+  if (!found || found->num_inliers < settings_.min_inliers) {
+    const KeyframeId reference = map.resolve(context.last.reference());
+    const std::vector<KeyframeId> near =
+        keyframes_near(map,
+                       map.keyframes().at(reference).submap,
+                       *frame.features->rig,
+                       predicted,
+                       static_cast<std::size_t>(options().recovery_keyframes));
+    found = relocalizer_.locate_among(frame, map, near, LastPlace{reference, predicted});
+  }
+  if (!found) return std::nullopt;
+  local_map_.forget();
+  context.last.forget_motion();
+  return found;
 }
 
 std::optional<LocatedFrame> PoseSearch::near_last_pose(Frame& frame, const Context& context) {

@@ -24,9 +24,9 @@
 namespace waymark {
 
 /// Finds the pose of a frame in the map. There is a list of ways to it (kSteps in the source):
-/// by motion from the last frame, near the last pose after a loss, by keyframes nearby, by the
-/// patches of the images, and anywhere in the map. The first pose that the local map around it
-/// confirms is the one of the frame. Keeps its buffers.
+/// by motion from the last frame, where an IMU has it, near the last pose after a loss, by
+/// keyframes nearby, by the patches of the images, and anywhere in the map. The first pose that the
+/// local map around it confirms is the one of the frame. Keeps its buffers.
 class PoseSearch {
  public:
   /// What is known beforehand.
@@ -61,11 +61,12 @@ class PoseSearch {
  private:
   using Found = std::optional<LocatedFrame>;
   struct Step;
-  static const std::array<Step, 5> kSteps;
+  static const std::array<Step, 6> kSteps;
 
   const PoseSearchOptions& options() const { return settings_.options.pose_search; }
 
   Found by_motion(Frame& frame, const Context& context);
+  Found by_dead_reckoning(Frame& frame, const Context& context);
   Found near_last_pose(Frame& frame, const Context& context);
   Found by_keyframes_nearby(Frame& frame, const Context& context);
   Found by_patches(Frame& frame, const Context& context);

@@ -13,6 +13,9 @@ namespace {
 
 /// Frames after a loss until a single one with range may start a new sub-map.
 constexpr int kMinLost = 5;
+/// Where an IMU tells where the rig is, so many frames that show something must not be found before
+/// that is believed to be a place not seen before.
+constexpr int kMaxUnfound = 10;
 
 }  // namespace
 
@@ -109,8 +112,8 @@ std::optional<MapperMessage> Tracker::accept(const Frame& frame,
   result.pose = pose;
   std::optional<MapperMessage> message;
   if (result.is_keyframe) {
-    const RigMotion motion = last_.motion_in(
-        *visible_.map, frame.timestamp_ns, located.rig_from_world, located.landmarks);
+    const RigMotion motion =
+        last_.motion_in(*visible_.map, frame, located.rig_from_world, located.landmarks);
     message = NewKeyframe{frame.id,
                           frame.timestamp_ns,
                           pose,
@@ -133,13 +136,17 @@ std::optional<MapperMessage> Tracker::lose(const Frame& frame,
                                            TrackingResult& result) {
   if (mode_ != Mode::kLost) {
     mode_ = Mode::kLost;
-    num_lost_ = 0;
+    num_lost_ = num_unfound_ = 0;
     initializer_.reset();
   }
   ++num_lost_;
+  if (why.reason != FrameReason::kNoFeatures) ++num_unfound_;
+  const std::optional<ReckonedPose> reckoned =
+      frame.dead_reckon ? frame.dead_reckon() : std::nullopt;
   // With keyframes outstanding a new sub-map could not show in the next frame.
-  const bool may_start =
-      ids_.num_pending(*visible_.map) == 0 && (!has_range_ || num_lost_ > kMinLost);
+  const bool may_start = ids_.num_pending(*visible_.map) == 0 &&
+                         (!has_range_ || num_lost_ > kMinLost) &&
+                         (!reckoned || num_unfound_ > kMaxUnfound);
   if (may_start) {
     if (auto started = start_submap(frame, result)) return started;
   }
@@ -147,7 +154,22 @@ std::optional<MapperMessage> Tracker::lose(const Frame& frame,
   if (result.reason == FrameReason::kNone) result.reason = FrameReason::kTooFewInliers;
   result.frame_in_map = frame.id;
   result.features = frame.features;
+  if (reckoned) go_on_reckoned(*reckoned, result);
   return std::nullopt;
+}
+
+void Tracker::go_on_reckoned(const ReckonedPose& reckoned, TrackingResult& result) {
+  const Map& map = *visible_.map;
+  last_.carry_over(map);
+  const Rigid3 rig_from_world = reckoned.rig_from_rig_then * last_.rig_from_world();
+  const KeyframeId reference_id = map.resolve(last_.reference());
+  const Keyframe& reference = map.keyframes().at(reference_id);
+  result.state = FrameState::kFilled;
+  result.world_from_rig = rig_from_world.inverse();
+  result.covariance = reckoned.covariance;
+  result.submap = reference.submap;
+  result.pose = {
+      reference_id, reference.applied_scale, rig_from_world * reference.rig_from_world.inverse()};
 }
 
 std::optional<MapperMessage> Tracker::initialize(const Frame& frame, TrackingResult& result) {

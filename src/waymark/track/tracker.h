@@ -80,6 +80,8 @@ class Tracker {
   std::optional<MapperMessage> lose(const Frame& frame,
                                     const FrameStatus& why,
                                     TrackingResult& result);
+  /// The pose that an IMU tells of a frame that is not found.
+  void go_on_reckoned(const ReckonedPose& reckoned, TrackingResult& result);
   std::optional<MapperMessage> initialize(const Frame& frame, TrackingResult& result);
   /// The first pose of a new sub-map, if this frame completes one.
   std::optional<MapperMessage> start_submap(const Frame& frame, TrackingResult& result);
@@ -91,7 +93,8 @@ class Tracker {
   ScaleTransfer scale_keeper_;
   TrackingPurpose purpose_ = TrackingPurpose::kMapping;
   Mode mode_ = Mode::kInitializing;
-  int num_lost_ = 0;  ///< Frames since the loss.
+  int num_lost_ = 0;     ///< Frames since the loss.
+  int num_unfound_ = 0;  ///< Of them, those that show something.
   MapSnapshot visible_;
   LastFrame last_;
   PredictedIds ids_;

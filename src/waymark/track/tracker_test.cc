@@ -4,7 +4,9 @@
 
 #include <gtest/gtest.h>
 
+#include <functional>
 #include <memory>
+#include <optional>
 #include <variant>
 
 #include "waymark/track/testing/map.h"
@@ -30,10 +32,13 @@ class TrackerTest : public ::testing::Test {
     return std::make_unique<Tracker>(true, TrackingSettings{}, 1);
   }
 
-  Tracked track(std::uint32_t number, const Features& features) {
-    const Frame frame{FrameId{number},
-                      50'000'000 * std::int64_t{number},
-                      std::make_shared<const Features>(features)};
+  Tracked track(std::uint32_t number,
+                const Features& features,
+                const std::function<std::optional<ReckonedPose>()>& dead_reckon = nullptr) {
+    Frame frame{FrameId{number},
+                50'000'000 * std::int64_t{number},
+                std::make_shared<const Features>(features)};
+    frame.dead_reckon = dead_reckon;
     Tracked outcome;
     outcome.message = tracker_->track(frame, {map_, places_}, outcome);
     return outcome;
@@ -247,6 +252,45 @@ TEST_F(TrackerTest, GoesOnWithTheMotionWhereImagesShowedNothing) {
   const Tracked outcome = track(number, ahead);
   ASSERT_EQ(outcome.state, FrameState::kTracked);
   expect_pose(outcome, ahead);
+}
+
+TEST_F(TrackerTest, IsCarriedOnByAnImuWhereImagesShowNothing) {
+  follow_path(20);
+  const auto reckoned_at = [&](const Rigid3& world_from_rig) {
+    return [=] {
+      return std::optional(ReckonedPose{world_from_rig.inverse() * path(19), Matrix6d::Identity()});
+    };
+  };
+  for (std::uint32_t i = 20; i < 60; ++i) {
+    const Rigid3 there = pose_at(-0.2, 0.1, 0.0, 0.02 * (i - 20.0));
+    const Tracked outcome = track(i, Features{}, reckoned_at(there));
+    EXPECT_EQ(outcome.state, FrameState::kFilled);
+    EXPECT_EQ(outcome.submap, SubmapId{0});
+    EXPECT_EQ(outcome.covariance, Matrix6d::Identity());
+    EXPECT_FALSE(outcome.message);
+    expect_pose(outcome, there);
+  }
+  // The map is found from there, which is not where it was seen last.
+  const Rigid3 back = pose_at(-0.1, 0.1, 0.0, -0.2);
+  const auto features = scene_.look(back, 60).features;
+  const Tracked outcome = track(60, *features, reckoned_at(pose_at(-0.13, 0.12, 0.02, -0.18)));
+  EXPECT_EQ(outcome.state, FrameState::kTracked);
+  EXPECT_EQ(tracker_->found_by(), "inertial");
+  expect_pose(outcome, back);
+}
+
+TEST_F(TrackerTest, BeginsASubmapWhereAnImuIsButNothingIsKnown) {
+  follow_path(5);
+  scene_.cloud = scatter_in({-3, -2, 2}, {4, 2, 5}, 1500, 3.0, 99);
+  const auto dead_reckon = [] { return std::optional(ReckonedPose{}); };
+  std::uint32_t number = 5;
+  Tracked outcome;
+  do {
+    outcome = track(number, *scene_.look(path(number), number).features, dead_reckon);
+    EXPECT_TRUE(outcome.world_from_rig);
+  } while (outcome.submap == SubmapId{0} && ++number < 30);
+  EXPECT_EQ(outcome.submap, SubmapId{1});
+  EXPECT_GT(number, 10u);
 }
 
 TEST_F(TrackerTest, FollowsASuddenTurn) {

@@ -34,6 +34,7 @@ void TrajectoryMemory::Entry::set_pose(const RelativePose& pose) {
 
 void TrajectoryMemory::add(const Frame& frame, const TrackingResult& result, const Map& map) {
   entries_.emplace_back(frame.timestamp_ns, result.state, result.pose);
+  entries_.back().is_reckoned = result.state == FrameState::kFilled;
   if (result.is_keyframe) newest_sent_ = frame.id;
   num_relocalizations_ += result.is_relocalized;
   // Long after the map has changed last it has settled, and the frame with it.
@@ -44,13 +45,15 @@ void TrajectoryMemory::add(const Frame& frame, const TrackingResult& result, con
                           seen_landmarks(features, result.landmarks),
                           nullptr,
                           features.readout_s[0],
-                          features.inverse_depth_offset});
+                          features.inverse_depth_offset,
+                          frame.turn_rad_s});
   }
   if (result.state != FrameState::kTracked) unposed_.push_back({frame.id, frame.features});
   if (unposed_.size() > kMaxUnposed) unposed_.pop_front();
   for (const FilledPose& filled : result.filled) {
     Entry& entry = entry_of(filled.frame);
     entry.state = FrameState::kFilled;
+    entry.is_reckoned = false;
     entry.set_pose(filled.pose);
     unsettled_.push_back({filled.frame,
                           {},
@@ -84,7 +87,8 @@ void TrajectoryMemory::settle(const Unsettled& unsettled, const Rig& rig, const 
                                        ? refiner_.find(rig, map, living, *unsettled.features, guess)
                                        : unsettled.seen;
   const float readout_s = static_cast<float>(rig.cameras[0].readout_s) - unsettled.readout_s;
-  if (const auto motion = readout_s == 0.0f ? std::nullopt : motion_in(unsettled.frame, map)) {
+  if (auto motion = readout_s == 0.0f ? std::nullopt : motion_in(unsettled.frame, map)) {
+    if (unsettled.turn_rad_s) motion->turn_rad_s = *unsettled.turn_rad_s;
     seen = refiner_.seen_at_once(rig, map, seen, guess, *motion, readout_s);
   }
   const float offset =
@@ -119,9 +123,9 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Rig& rig, co
   Entry& entry = entry_of(unposed.frame);
   const std::int64_t neighbour =
       std::int64_t{unposed.frame.value} - std::int64_t{first_.value} + step;
-  if (has_pose(entry) || neighbour < 0 || neighbour >= std::ssize(entries_)) return;
+  if (entry.is_seen() || neighbour < 0 || neighbour >= std::ssize(entries_)) return;
   const Entry& known = entries_[static_cast<std::size_t>(neighbour)];
-  if (!has_pose(known)) return;
+  if (!known.is_seen()) return;
   const KeyframeId living = map.resolve(known.pose().reference);
   const Keyframe& keyframe = map.keyframes().at(living);
   const Rigid3 near = *rig_from_world(neighbour, keyframe.submap, map);
@@ -135,7 +139,24 @@ void TrajectoryMemory::fill(const Unposed& unposed, int step, const Rig& rig, co
   const double part = part_in_place(*unposed.features, map, alike, *found);
   if (part < PoseCheck::kMinPartInPlace) return;
   entry.state = FrameState::kFilled;
+  entry.is_reckoned = false;
   entry.set_pose({living, keyframe.applied_scale, *found * keyframe.rig_from_world.inverse()});
+}
+
+void TrajectoryMemory::set_inertial_pose(std::int64_t index,
+                                         std::int64_t beside,
+                                         const Rigid3& rig_from_world,
+                                         const Map& map) {
+  const KeyframeId living =
+      map.resolve(entries_[static_cast<std::size_t>(beside)].pose().reference);
+  const Keyframe& keyframe = map.keyframes().at(living);
+  Entry& entry = entries_[static_cast<std::size_t>(index)];
+  if (!entry.is_seen()) {
+    entry.state = FrameState::kFilled;
+    entry.is_reckoned = true;
+  }
+  entry.set_pose(
+      {living, keyframe.applied_scale, rig_from_world * keyframe.rig_from_world.inverse()});
 }
 
 std::optional<Rigid3> TrajectoryMemory::rig_from_world(std::int64_t index,

@@ -35,8 +35,14 @@ class TrajectoryMemory {
     RelativePose pose() const;
     void set_pose(const RelativePose& pose);
 
+    /// Whether it has a pose by what it shows, not by an IMU alone.
+    bool is_seen() const {
+      return !is_reckoned && (state == FrameState::kTracked || state == FrameState::kFilled);
+    }
+
     std::int64_t timestamp_ns;
     FrameState state;
+    bool is_reckoned = false;  ///< Whether it is filled by what an IMU told.
 
    private:
     KeyframeId reference_;
@@ -64,6 +70,16 @@ class TrajectoryMemory {
   /// it; nothing where neither has one.
   std::optional<RigMotion> motion_in(FrameId frame, const Map& map) const;
 
+  /// The frame of an index (of entries()) has this pose by what an IMU told, too, or alone if it is
+  /// not seen. beside: the index of one that is seen, whose keyframe it refers to.
+  void set_inertial_pose(std::int64_t index,
+                         std::int64_t beside,
+                         const Rigid3& rig_from_world,
+                         const Map& map);
+
+  /// Pose of an entry in a sub-map; nothing where there is none.
+  std::optional<Rigid3> rig_from_world(std::int64_t index, SubmapId submap, const Map& map) const;
+
   /// In the order of the frames.
   const std::deque<Entry>& entries() const { return entries_; }
   /// Frames that were found again after a loss.
@@ -77,6 +93,7 @@ class TrajectoryMemory {
     std::shared_ptr<const Features> features;  ///< Of a frame filled in later.
     float readout_s = 0.0f;                    ///< That pixels are corrected for.
     float inverse_depth_offset = 0.0f;         ///< That depths are freed of, in 1/m.
+    std::optional<Eigen::Vector3f> turn_rad_s = std::nullopt;  ///< By a gyroscope.
   };
 
   /// A frame that had no pose when it was tracked.
@@ -89,8 +106,6 @@ class TrajectoryMemory {
   void settle(const Unsettled& unsettled, const Rig& rig, const Map& map);
   /// Looks for a frame near its neighbour, one step (1 or -1 frames) away.
   void fill(const Unposed& unposed, int step, const Rig& rig, const Map& map);
-  /// index: of an entry.
-  std::optional<Rigid3> rig_from_world(std::int64_t index, SubmapId submap, const Map& map) const;
 
   const FrameId first_;
   FrameId newest_sent_;  ///< To the map.
