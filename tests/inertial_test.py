@@ -12,6 +12,7 @@ from cli_support import CliTest, waymark
 
 DATA = pathlib.Path(os.environ.get("WAYMARK_DATA", ""))
 EUROC, PHONE = DATA / "euroc_mh01_stereo", DATA / "phone_lowlight_mono"
+GOPRO = DATA / "gopro_max_imu"
 WRONG = """cam0:
   T_cam_imu:
   - [0.0, -1.0, 0.0, 0.1]
@@ -59,6 +60,16 @@ class Recorded(CliTest):
         _, scale, summary = self.figures("--imu", "none")
         self.assertNotIn("imu", summary)
         self.assertGreater(scale, 2.0)
+
+    @unittest.skipUnless(GOPRO.is_dir(), "needs gopro_max_imu in WAYMARK_DATA")
+    def test_a_video_that_the_camera_stabilised(self):
+        done = self.run_on(GOPRO)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = self.summary()
+        self.assertEqual(summary["coverage"], 1.0)
+        self.assertTrue(summary["imu"]["used"])
+        length_by_gps = 13.6
+        self.assertLess(abs(summary["quality"]["length"] / length_by_gps - 1.0), 0.15)
 
     @unittest.skipUnless(PHONE.is_dir(), "needs phone_lowlight_mono in WAYMARK_DATA")
     def test_samples_of_two_devices(self):

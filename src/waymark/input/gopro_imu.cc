@@ -132,16 +132,42 @@ std::vector<SensorReading> read_sensor(const std::vector<Piece>& pieces,
   return readings;
 }
 
-/// Whether images were turned against the camera (IORI), as those of a stabilised video are.
-bool is_stabilized(std::span<const TelemetryPacket> packets) {
-  constexpr double kCosHalfDegree = 0.99996;
-  for (const Piece& piece : pieces_of(packets, "IORI")) {
+/// Quaternions of a stream, of which there is one per image, w first: camera_from_start (CORI) or
+/// image_from_camera (IORI), in axes of the camera.
+std::vector<StampedRotation> read_rotations(std::span<const TelemetryPacket> packets,
+                                            std::string_view key) {
+  std::vector<StampedRotation> rotations;
+  const std::vector<Piece> pieces = pieces_of(packets, key);
+  if (pieces.empty()) return rotations;
+  const Eigen::Vector2d line = fit_times(pieces);
+  for (const Piece& piece : pieces) {
     for (std::size_t k = 0; k < piece.stream.num_samples(); ++k) {
-      const double cosine = piece.stream.values[k * piece.stream.num_values];
-      if (std::abs(cosine) < kCosHalfDegree) return true;
+      const double time_s = line[0] + line[1] * (piece.first + static_cast<double>(k));
+      const double* values = &piece.stream.values[k * piece.stream.num_values];
+      constexpr double kMaxSeconds = 1e9;
+      if (piece.stream.num_values != 4 || !(std::abs(time_s) < kMaxSeconds)) continue;
+      const Eigen::Quaterniond rotation(values[0], values[1], values[2], values[3]);
+      if (!(std::abs(rotation.norm() - 1.0) < 0.01) || rotations.size() == kMaxImuSamples) continue;
+      const std::int64_t time_ns = std::llround(1e9 * time_s);
+      if (!rotations.empty() && time_ns <= rotations.back().timestamp_ns) continue;
+      rotations.push_back({time_ns, rotation.normalized()});
     }
   }
-  return false;
+  return rotations;
+}
+
+/// A video that the camera stabilised: images were turned against it.
+void follow_stabilization(std::span<const TelemetryPacket> packets, ImuStream& stream) {
+  constexpr double kHalfDegree = 0.009;
+  const std::vector<StampedRotation> images = read_rotations(packets, "IORI");
+  const bool is_stabilized = std::ranges::any_of(images, [](const StampedRotation& image) {
+    return image.rotation.angularDistance(Eigen::Quaterniond::Identity()) > kHalfDegree;
+  });
+  if (!is_stabilized) return;
+  const bool is_turned = turn_with_images(read_rotations(packets, "CORI"), images, stream.samples);
+  stream.notes.emplace_back(
+      is_turned ? "the video is stabilised: samples are turned as its images are"
+                : "note: the video is stabilised: its images do not turn as the camera did");
 }
 
 }  // namespace
@@ -176,7 +202,9 @@ std::vector<GpmfStream> parse_gpmf(std::string_view payload) {
     if (key == "ORIN") stream.axes = text;
     if (key == "SCAL") scales = numbers_of(type, data);
     if (key == "TSMP") stream.num_total = big_endian(data.substr(0, 8));
-    if (key != "ACCL" && key != "GYRO" && key != "GRAV" && key != "IORI") continue;
+    if (key != "ACCL" && key != "GYRO" && key != "GRAV" && key != "CORI" && key != "IORI") {
+      continue;
+    }
     stream.key = key;
     stream.values = numbers_of(type, data);
     if (stream.values.empty()) continue;
@@ -203,10 +231,8 @@ std::optional<ImuStream> imu_of_gopro(std::span<const TelemetryPacket> packets,
                   device.empty() ? "a GoPro" : printable(device)),
       fmt::format("axes {} turned into x right, y down, z forward of the camera",
                   axes.empty() ? fmt::format("{} (assumed)", kUsualAxes) : printable(axes))};
-  if (is_stabilized(packets)) {
-    stream.notes.emplace_back(
-        "note: the video is stabilised: its images do not turn as the camera did");
-  }
+  follow_stabilization(packets, stream);
+  if (stream.samples.size() < 2) return std::nullopt;
   return stream;
 }
 

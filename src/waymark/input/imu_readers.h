@@ -78,9 +78,23 @@ std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder);
 std::optional<ImuStream> imu_of_bag(const Bag& bag,
                                     const std::function<std::int64_t(const BagMessage&)>& time_of);
 
+/// How something was turned at one moment.
+struct StampedRotation {
+  std::int64_t timestamp_ns = 0;
+  Eigen::Quaterniond rotation;
+};
+
+/// Makes samples in axes of the camera those of an IMU that turns with the images, which a camera
+/// that stabilises them turns against itself; by their clock, of which the orientations are. Those
+/// of the camera tell how far the samples' clock is from it. In the order of time. False, and
+/// nothing is changed, where the camera's orientations do not turn as the gyroscope does.
+bool turn_with_images(const std::vector<StampedRotation>& camera_from_start,
+                      const std::vector<StampedRotation>& image_from_camera,
+                      std::vector<ImuSample>& samples);
+
 /// Measurements of one kind, in one payload of GPMF, the telemetry of GoPro cameras.
 struct GpmfStream {
-  std::string key;             ///< "ACCL", "GYRO", "GRAV", "IORI".
+  std::string key;             ///< "ACCL", "GYRO", "GRAV", "CORI", "IORI".
   std::string device;          ///< The model (DVNM).
   std::size_t num_values = 1;  ///< Of a sample.
   std::vector<double> values;  ///< Scaled (SCAL), sample after sample.
@@ -91,14 +105,14 @@ struct GpmfStream {
   std::size_t num_samples() const { return values.size() / num_values; }
 };
 
-/// The streams ACCL, GYRO, GRAV and IORI of a payload, of numbers of 16 or 32 bits, with what is
-/// said of them before. What is cut off or malformed ends it: what came before is given.
+/// The streams ACCL, GYRO, GRAV, CORI and IORI of a payload, of numbers of 16 or 32 bits, with what
+/// is said of them before. What is cut off or malformed ends it: what came before is given.
 std::vector<GpmfStream> parse_gpmf(std::string_view payload);
 
 /// The IMU of a GoPro camera, of the packets of a file's telemetry (GPMF); nothing where they have
 /// none. Axes are those of the camera held upright: x right, y down, z forward. Times are those of
-/// the file, which begins with its first image. Throws InputError at `source` for axes that make no
-/// frame.
+/// the file, which begins with its first image. Of a stabilised video they are those of the images.
+/// Throws InputError at `source` for axes that make no frame.
 std::optional<ImuStream> imu_of_gopro(std::span<const TelemetryPacket> packets,
                                       const std::string& source);
 
