@@ -10,6 +10,7 @@
 #include "waymark/loop/join_by_markers.h"
 #include "waymark/loop/loop_pose_graph.h"
 #include "waymark/loop/spatial_neighbours.h"
+#include "waymark/map/align.h"
 #include "waymark/optimize/outlier_edges.h"
 
 namespace waymark {
@@ -68,6 +69,14 @@ void GlobalMapper::add(const NewKeyframe& message) {
   if (!settings_.enabled || close_alike(changes.added.back())) return;
   if (!has_loop_task())
     consolidate_some(static_cast<std::size_t>(settings_.options.num_consolidated));
+}
+
+void GlobalMapper::place(const SubmapPlacement& placement) {
+  const SubmapId submap = mapper_.map().resolve(placement.submap);
+  mapper_.change(
+      [&](Map& map, DirtyLandmarks&) { transform_submap(map, submap, placement.new_from_old); });
+  schedule_.note_placement(submap);
+  placement_ = placement;
 }
 
 void GlobalMapper::update_places(const Mapper::Changes& changes) {

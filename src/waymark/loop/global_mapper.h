@@ -42,6 +42,8 @@ class GlobalMapper {
   void keep_in(const std::shared_ptr<std::pmr::memory_resource>& memory);
   void add(const NewSubmap& message);
   void add(const NewKeyframe& message);
+  /// Moves a part of the map.
+  void place(const SubmapPlacement& placement);
   /// The adjustment that a loop made necessary, see AdjustmentInterval, or that may tell the
   /// calibration; nothing where there is none.
   std::optional<AdjustmentTask> take_task() { return schedule_.take(mapper_); }
@@ -73,6 +75,8 @@ class GlobalMapper {
   /// Of the sub-map with most keyframes, as surveyed last; empty where no markers are looked for.
   const MarkerSurvey& marker_survey() const { return markers_.survey(); }
   int num_joins() const { return num_joins_; }
+  /// The last part that was moved.
+  const std::optional<SubmapPlacement>& placement() const { return placement_; }
 
  private:
   using Moved = std::vector<KeyframeId>;  ///< By a loop or a join, ascending.
@@ -100,6 +104,7 @@ class GlobalMapper {
   MarkerPlacement markers_;
   SnapshotsInUse in_use_;
   int num_joins_ = 0;
+  std::optional<SubmapPlacement> placement_;
 };
 
 }  // namespace waymark

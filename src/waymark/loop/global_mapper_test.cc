@@ -141,6 +141,24 @@ TEST_F(GlobalMapperTest, CarriesAnAdjustmentOverIfSomethingWasClosedMeanwhile) {
   EXPECT_EQ(mapper.map().broken_invariants(), "");
 }
 
+TEST_F(GlobalMapperTest, PutsAPartElsewhereAndDropsWhatWasAdjustedBefore) {
+  take_over_round();
+  mapper_->add(last_of(walk({{0, kRound + 1}})));
+  const std::optional<AdjustmentTask> task = mapper_->take_task();
+  ASSERT_TRUE(task);
+  const std::vector<Rigid3> before = poses_of(mapper_->map());
+  const Sim3 new_from_old(so3_exp({0.3, -1.0, 0.2}), {1.0, 2.0, 3.0}, 2.5);
+  mapper_->place({SubmapId{0}, new_from_old});
+  mapper_->apply(*task, adjust_globally(*task->map, task->submap));
+  const std::vector<Rigid3> after = poses_of(mapper_->map());
+  for (std::size_t i = 0; i < before.size(); ++i) {
+    const Eigen::Vector3d moved = new_from_old * before[i].origin_in_source();
+    EXPECT_LT((after[i].origin_in_source() - moved).norm(), 1e-6) << i;
+  }
+  EXPECT_EQ(mapper_->placement()->submap, SubmapId{0});
+  EXPECT_TRUE(mapper_->take_task());  // Of the part as it is now.
+}
+
 TEST_F(GlobalMapperTest, ConsolidatesAtTheEnd) {
   // The way goes on beside its beginning. Closed at its last keyframe, it hangs loose elsewhere.
   LoopScene scene = walk({{0, kRound + 8}});

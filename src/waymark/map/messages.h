@@ -10,6 +10,7 @@
 #include "waymark/base/id.h"
 #include "waymark/features/features.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/geometry/sim3.h"
 #include "waymark/marker/marker.h"
 
 namespace waymark {
@@ -66,6 +67,12 @@ struct NewSubmap {
   bool is_metric = false;                  ///< Whether lengths are in metres.
   std::vector<InitialKeyframe> keyframes;  ///< By time.
   std::vector<InitialLandmark> landmarks;  ///< In no order.
+};
+
+/// A part of the map is to be in another frame and other units, as an IMU tells them.
+struct SubmapPlacement {
+  SubmapId submap;    ///< Which one.
+  Sim3 new_from_old;  ///< Of its frames.
 };
 
 /// What the tracker sends to the mapper.

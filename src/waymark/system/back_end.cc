@@ -33,7 +33,7 @@ void BackEnd::update(FrameId frame, PublishedMap& visible) {
   // In real time it is due once it is there.
   if (timing_ == Timing::kRealtime ? !adjuster_.has_result() : due > frame) return;
   last_due_ = due;
-  worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt});
+  worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt, std::nullopt});
 }
 
 bool BackEnd::waits_for(const MapperMessage& message) const {
@@ -46,13 +46,21 @@ void BackEnd::send(FrameId frame, MapperMessage message) {
   // A new sub-map is what the next frame is tracked in; a keyframe shows its effect later.
   const bool is_submap = std::holds_alternative<NewSubmap>(message);
   const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
-  worker_.send(FrameId{frame.value + latency}, {frame, std::move(message)});
+  worker_.send(FrameId{frame.value + latency}, {frame, std::move(message), std::nullopt});
   if (is_submap && timing_ == Timing::kRealtime) worker_.wait();
+}
+
+void BackEnd::place(FrameId frame, const SubmapPlacement& placement) {
+  const auto latency = static_cast<std::uint32_t>(settings_.map_latency);
+  worker_.send(FrameId{frame.value + latency}, {frame, std::nullopt, placement});
 }
 
 std::shared_ptr<const PublishedMap> BackEnd::process(const MapTask& task) {
   if (task.message) {
     add(*task.message);
+    published_ = mapper_.snapshot();
+  } else if (task.placement) {
+    mapper_.place(*task.placement);
     published_ = mapper_.snapshot();
   } else if (is_due(task.frame)) {
     finish_adjustment();
@@ -91,7 +99,12 @@ void BackEnd::finish_adjustment() {
 }
 
 PublishedMap BackEnd::publish() const {
-  return {published_, mapper_.calibration(), adjustment_due_, mapper_.num_loops(), mapping_ms_};
+  return {published_,
+          mapper_.calibration(),
+          adjustment_due_,
+          mapper_.num_loops(),
+          mapping_ms_,
+          mapper_.placement()};
 }
 
 void BackEnd::end_threads() {

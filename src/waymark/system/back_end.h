@@ -33,6 +33,8 @@ class BackEnd {
   void update(FrameId frame, PublishedMap& visible);
   /// Sends what a frame gave.
   void send(FrameId frame, MapperMessage message);
+  /// Has a part of the map moved after what was sent before.
+  void place(FrameId frame, const SubmapPlacement& placement);
   /// Whether send() waits for what the mapper does with such a message.
   bool waits_for(const MapperMessage& message) const;
 

@@ -37,6 +37,8 @@ constexpr double kMetricSigma = 0.01;
 /// A scale is told where its logarithm has a smaller standard deviation, and a turn of the
 /// gyroscope where that of its mounting, in rad, has.
 constexpr double kFirmScale = 0.05;
+/// Of the scale with which the map is put into metres while it grows, once.
+constexpr double kSureScale = 0.01;
 constexpr double kFirmRotation = 0.02;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
@@ -134,16 +136,39 @@ InertialEstimator InertialEstimator::begin_anew() const {
   return anew;
 }
 
-void InertialEstimator::update(const TrajectoryMemory& memory, const Map& map) {
+std::optional<SubmapPlacement> InertialEstimator::update(const TrajectoryMemory& memory,
+                                                         const Map& map) {
   const std::size_t num_frames = memory.entries().size();
-  if (!has_samples() || num_frames < std::max(next_look_, kFirstFrames)) return;
+  if (!has_samples() || num_frames < std::max(next_look_, kFirstFrames)) return std::nullopt;
   next_look_ = static_cast<std::size_t>(kGrowth * static_cast<double>(num_frames));
   const std::vector<TrajectoryFrame> frames = list_poses(memory, map);
-  if (frames.empty()) return;
-  look(choose_poses(frames, frames.back().submap, kMaxPoses), frames.back().submap, map);
-  if (metric_from_ || !report_->is_used || report_->scale_sigma > kFirmScale) return;
-  if (map.submaps()[frames.back().submap.value].is_metric) return;
-  metric_from_ = report_->metric_from = FrameId{static_cast<std::uint32_t>(num_frames - 1)};
+  if (frames.empty()) return std::nullopt;
+  const SubmapId submap = frames.back().submap;
+  look(choose_poses(frames, submap, kMaxPoses), submap, map);
+  if (!report_->is_used || report_->scale_sigma > kSureScale) return std::nullopt;
+  if (is_placement_sent_ || map.submaps()[submap.value].is_metric) return std::nullopt;
+  is_placement_sent_ = true;
+  return SubmapPlacement{submap, level_and_metric()};
+}
+
+/// Of the map as it was looked at last.
+Sim3 InertialEstimator::level_and_metric() const {
+  return Sim3(turn_upright(-found_->setup.gravity),
+              Eigen::Vector3d::Zero(),
+              std::exp(found_->setup.log_scale));
+}
+
+void InertialEstimator::note_placement(const SubmapPlacement& placement, FrameId frame) {
+  if (metric_from_) return;
+  metric_from_ = frame;
+  reckoning_.reset();
+  const auto& [rotation, translation, scale] = placement.new_from_old;
+  if (report_) report_->metric_from = frame;
+  if (report_) report_->gravity_in_world = rotation * report_->gravity_in_world;
+  if (!found_ || found_in_ != placement.submap) return;
+  found_->setup.gravity = rotation * found_->setup.gravity;
+  found_->setup.log_scale -= std::log(scale);
+  options_.pose_position_sigma *= scale;
 }
 
 void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap, const Map& map) {
@@ -230,9 +255,8 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
   if (!report_->is_used || !is_frame_free) return map;
   const bool is_metric = map->submaps()[submap.value].is_metric;
   const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
-  const Sim3 level(turn_upright(-report_->gravity_in_world),
-                   Eigen::Vector3d::Zero(),
-                   is_scaled ? std::exp(found_->setup.log_scale) : 1.0);
+  Sim3 level = level_and_metric();
+  if (!is_scaled) level.scale = 1.0;
   report_->gravity_in_world = level.rotation * report_->gravity_in_world;
   if (is_scaled && !report_->metric_from) {
     report_->metric_from = FrameId{static_cast<std::uint32_t>(memory.entries().size() - 1)};

@@ -34,8 +34,12 @@ class InertialEstimator {
   /// The same IMU, of a session that begins anew.
   InertialEstimator begin_anew() const;
 
-  /// Looks at the way so far, if it has grown enough since the last time.
-  void update(const TrajectoryMemory& memory, const Map& map);
+  /// Looks at the way so far, if it has grown enough since the last time. Gives once what puts the
+  /// map into metres, level, where these are known well.
+  std::optional<SubmapPlacement> update(const TrajectoryMemory& memory, const Map& map);
+
+  /// The map that is seen from this frame on was put there.
+  void note_placement(const SubmapPlacement& placement, FrameId frame);
 
   /// How the rig turned from one image to another by the gyroscope: rig_end_from_rig_begin. Nothing
   /// before that is known well, and where samples are missing.
@@ -62,7 +66,9 @@ class InertialEstimator {
   const std::optional<InertialReport>& report() const { return report_; }
 
  private:
-  /// Where something was found.
+  /// What puts the map into metres, level; where something was found.
+  Sim3 level_and_metric() const;
+  /// The same.
   InertialKnowledge knowledge() const;
   /// Whether all but the states is known well.
   bool is_firm() const;
@@ -76,6 +82,7 @@ class InertialEstimator {
   InertialStartOptions options_;            ///< That it was found with.
   std::optional<DeadReckoning> reckoning_;  ///< From the newest frame that had a pose when asked.
   std::optional<InertialReport> report_;
+  bool is_placement_sent_ = false;
   std::optional<FrameId> metric_from_;
   std::size_t next_look_ = 0;  ///< Number of frames.
 };

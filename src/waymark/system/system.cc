@@ -27,6 +27,7 @@ class System::Impl {
         num_threads_(num_threads),
         preparation_(given_rig_, settings, timing == Timing::kLockstep ? num_threads : 0),
         memory_(frame_after(map.get())),
+        is_frame_free_(!map && !markers_to_look_for(settings.markers)),
         back_end_(given_rig_, settings, timing) {
     if (!map) return;
     check_cameras(*map);
@@ -77,6 +78,7 @@ class System::Impl {
   FramePreparation preparation_;
   std::optional<Tracker> tracker_;
   TrajectoryMemory memory_;
+  const bool is_frame_free_;  ///< Neither a map made before nor markers tell where things are.
   InertialEstimator inertial_;
   PublishedMap visible_;
   TrackingResult result_;
@@ -112,11 +114,13 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
     StageTimer timer(result_.stages, Stage::kWait);
     back_end_.update(id, visible_);
   }
+  if (visible_.placement) inertial_.note_placement(*visible_.placement, result_.frame);
   std::optional<MapperMessage> message = tracker_->track(frame, visible_.snapshot, result_);
   preparation_.watch(images.image0, result_);
   memory_.add(frame, result_, *map());
-  inertial_.update(memory_, *map());
+  const std::optional<SubmapPlacement> placement = inertial_.update(memory_, *map());
   if (message) hand_over(frame, images, *std::move(message));
+  if (placement && is_frame_free_) back_end_.place(frame.id, *placement);
   return result_;
 }
 
@@ -175,8 +179,8 @@ void System::Impl::finish() {
   back_end_.end_threads();
   visible_ = back_end_.finish(motions());
   memory_.settle(*rig(), *map());
-  const bool is_frame_free = memory_.first() == FrameId{0} && !back_end_.marker_survey().frame;
-  visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free);
+  const bool is_placed = back_end_.marker_survey().frame.has_value();
+  visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free_ && !is_placed);
 }
 
 /// How the rig moved at the keyframes, where that matters.

@@ -18,11 +18,12 @@
 
 namespace waymark {
 
-/// What the mapper is to do at a frame: take in a message or, without one, the global adjustment
-/// that is due.
+/// What the mapper is to do at a frame: take in a message, or move a part of the map, or, without
+/// either, take in the global adjustment that is due.
 struct MapTask {
   FrameId frame;
   std::optional<MapperMessage> message;
+  std::optional<SubmapPlacement> placement = std::nullopt;
 };
 
 /// What the mapper shows after a task.
@@ -31,7 +32,8 @@ struct PublishedMap {
   KnownCalibration calibration;  ///< That the map is measured with.
   FrameId adjustment_due;  ///< When a global adjustment is to be taken in; invalid if none runs.
   int num_loops = 0;       ///< Closed so far.
-  std::vector<double> mapping_ms;  ///< Of each message so far.
+  std::vector<double> mapping_ms;            ///< Of each message so far.
+  std::optional<SubmapPlacement> placement;  ///< By an IMU, where there was one.
 };
 
 /// Takes tasks to the mapper, in a thread of its own unless the timing is kInline,
