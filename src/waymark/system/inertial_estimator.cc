@@ -24,6 +24,8 @@ constexpr std::size_t kMaxPoses = 100;
 constexpr std::size_t kMaxPosesInTheEnd = 300;
 /// Poses of vision are that good: in rad, and as a part of how far away things are.
 constexpr double kPoseSigma = 0.001;
+/// Errors of a pose in standard deviations that count fully.
+constexpr double kPoseHuber = 2.0;
 /// What was told is wrong where vision and IMU are off by so many standard deviations.
 constexpr double kFarFromTold = 5.0;
 /// Poses of vision err alike for long, which no number of them averages out.
@@ -174,6 +176,7 @@ void InertialEstimator::note_placement(const SubmapPlacement& placement, FrameId
 void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap, const Map& map) {
   InertialStartOptions& options = options_ = {};
   found_in_ = submap;
+  options.pose_huber = kPoseHuber;
   options.pose_rotation_sigma = kPoseSigma;
   options.pose_position_sigma = kPoseSigma * distance_of_things(map, submap);
   if (map.submaps()[submap.value].is_metric) options.log_scale_sigma = kMetricSigma;

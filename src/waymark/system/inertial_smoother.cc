@@ -26,8 +26,6 @@ constexpr double kSureAngle = 0.1;
 /// Poses of neighbouring frames err alike, so that each by itself tells less than its own standard
 /// deviation does: by this factor.
 constexpr double kLooser = 3.0;
-/// Errors of a pose in standard deviations that count fully.
-constexpr double kPoseHuber = 2.0;
 
 /// A frame of the trajectory that is smoothed.
 struct SmoothedFrame {
@@ -135,7 +133,6 @@ std::optional<InertialStart> start_again(const InertialKnowledge& known,
   options.told_time_shift_sigma_s = found.sigma(kTimeShiftAt);
   options.pose_position_sigma *= kLooser;
   options.pose_rotation_sigma *= kLooser;
-  options.pose_huber = kPoseHuber;
   return start_inertial(known.samples, poses, told, known.noise, options);
 }
 
