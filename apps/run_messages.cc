@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <string>
 
 #include "input_command.h"
@@ -33,19 +34,20 @@ void report_markers(Reporter& reporter, const MarkerSummary& markers) {
   }
 }
 
-void report_imu(Reporter& reporter, const ImuSummary& imu) {
+void report_imu(Reporter& reporter, const InertialReport& imu) {
   if (!imu.is_used) {
     reporter.warning(fmt::format("the inertial data is not used: {}", imu.reason));
     return;
   }
+  constexpr double kDegrees = 180.0 / M_PI;
   reporter.info(fmt::format(
       "inertial data: {}level to {:.2g} degrees; clock {:+.1f} +- {:.2g} ms, mounting known to "
       "{:.2g} degrees",
       imu.metric_from ? fmt::format("metres known to {:.2g} %, ", 100.0 * imu.scale_sigma) : "",
-      imu.gravity_sigma_deg,
-      imu.time_shift_ms,
-      imu.time_shift_sigma_ms,
-      imu.rotation_sigma_deg));
+      kDegrees * imu.gravity_sigma_rad,
+      1e3 * imu.time_shift_s,
+      1e3 * imu.time_shift_sigma_s,
+      kDegrees * imu.rotation_sigma_rad));
 }
 
 }  // namespace

@@ -15,6 +15,7 @@
 #include "waymark/base/atomic_file.h"
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
+#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 namespace {
@@ -155,22 +156,26 @@ Json with_sigma(const Json& value, double sigma) {
   return {{"value", value}, {"sigma", rounded(sigma)}};
 }
 
-Json to_json(const ImuSummary& summary) {
+Json to_json(const InertialReport& report) {
   Json json;
-  json["used"] = summary.is_used;
-  if (!summary.is_used) {
-    json["reason"] = summary.reason;
+  json["used"] = report.is_used;
+  if (!report.is_used) {
+    json["reason"] = report.reason;
     return json;
   }
-  json["metric_from_frame"] = summary.metric_from ? Json(*summary.metric_from) : Json(nullptr);
-  json["scale_sigma"] = rounded(summary.scale_sigma);
-  json["gravity_in_world"] = to_json(summary.gravity_in_world);
-  json["gravity_sigma_deg"] = rounded(summary.gravity_sigma_deg);
-  json["time_shift_ms"] = with_sigma(rounded(summary.time_shift_ms), summary.time_shift_sigma_ms);
-  json["rotation_deg"] = with_sigma(to_json(summary.rotation_deg), summary.rotation_sigma_deg);
-  json["lever_arm_m"] = with_sigma(to_json(summary.lever_arm_m), summary.lever_arm_sigma_m);
-  json["gyro_bias"] = to_json(summary.gyro_bias);
-  json["accel_bias"] = to_json(summary.accel_bias);
+  constexpr double kDegrees = 180.0 / M_PI;
+  const auto& [rotation, translation] = report.imu_from_rig;
+  json["metric_from_frame"] = report.metric_from ? Json(report.metric_from->value) : Json(nullptr);
+  json["scale_sigma"] = rounded(report.scale_sigma);
+  json["gravity_in_world"] = to_json(report.gravity_in_world);
+  json["gravity_sigma_deg"] = rounded(kDegrees * report.gravity_sigma_rad);
+  json["time_shift_ms"] =
+      with_sigma(rounded(1e3 * report.time_shift_s), 1e3 * report.time_shift_sigma_s);
+  json["rotation_deg"] =
+      with_sigma(to_json(kDegrees * so3_log(rotation)), kDegrees * report.rotation_sigma_rad);
+  json["lever_arm_m"] = with_sigma(to_json(translation), report.lever_arm_sigma_m);
+  json["gyro_bias"] = to_json(report.biases.gyroscope);
+  json["accel_bias"] = to_json(report.biases.accelerometer);
   return json;
 }
 

@@ -27,6 +27,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/image/image_statistics.h"
+#include "waymark/imu/inertial_report.h"
 #include "waymark/results/trajectory.h"
 
 namespace waymark {
@@ -141,24 +142,6 @@ struct MarkerSummary {
   std::vector<Entry> markers;  ///< By number.
 };
 
-/// What an inertial measurement unit gave in a run; see InertialReport.
-struct ImuSummary {
-  bool is_used = false;                    ///< Whether the images agree with it.
-  std::string reason;                      ///< Why it is not, in words.
-  std::optional<std::size_t> metric_from;  ///< Index of the frame.
-  double scale_sigma = 0.0;                ///< As a part of lengths.
-  Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();  ///< m/s^2.
-  double gravity_sigma_deg = 0.0;    ///< Standard deviation of its direction.
-  double time_shift_ms = 0.0;        ///< Added to times of images for the clock of the IMU.
-  double time_shift_sigma_ms = 0.0;  ///< Its standard deviation.
-  Eigen::Vector3d rotation_deg = Eigen::Vector3d::Zero();  ///< Rotation vector, imu_from_cam0.
-  double rotation_sigma_deg = 0.0;                         ///< Its standard deviation, per axis.
-  Eigen::Vector3d lever_arm_m = Eigen::Vector3d::Zero();   ///< Of camera 0 in the axes of the IMU.
-  double lever_arm_sigma_m = 0.0;                          ///< Its standard deviation, per axis.
-  Eigen::Vector3d gyro_bias = Eigen::Vector3d::Zero();     ///< rad/s.
-  Eigen::Vector3d accel_bias = Eigen::Vector3d::Zero();    ///< m/s^2.
-};
-
 /// summary.json.
 struct RunSummary {
   FrameCounts counts;                    ///< Of the rows of frames.csv.
@@ -196,7 +179,8 @@ struct RunSummary {
   std::vector<std::string> settings;
   std::vector<RunAdvice> advice;                        ///< Empty where all went well.
   std::optional<MarkerSummary> markers = std::nullopt;  ///< Where some were looked for.
-  std::optional<ImuSummary> imu = std::nullopt;         ///< Where there was one.
+  /// Where there was an IMU; frames are those of the table.
+  std::optional<InertialReport> imu = std::nullopt;
 };
 
 /// Statistics per stage over all rows, in the order of the table.

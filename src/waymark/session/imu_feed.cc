@@ -2,10 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/session/imu_feed.h"
 
-#include <cmath>
 #include <utility>
-
-#include "waymark/geometry/rigid3.h"
 
 namespace waymark {
 
@@ -25,30 +22,16 @@ void ImuFeed::feed_until(std::int64_t timestamp_ns) {
   }
 }
 
-std::optional<ImuSummary> ImuFeed::summarize(const FedFrames& frames) const {
-  ImuSummary summary;
-  summary.reason = fault_;
-  if (!fault_.empty()) return summary;
-  const std::optional<InertialReport>& report = system_.inertial();
-  if (!report) return std::nullopt;
-  constexpr double kDegrees = 180.0 / M_PI;
-  summary.is_used = report->is_used;
-  summary.reason = report->reason;
-  if (report->metric_from && report->metric_from->value < frames.fed.size()) {
-    summary.metric_from = frames.table.frames[frames.fed[report->metric_from->value]].index;
+std::optional<InertialReport> ImuFeed::report(const FedFrames& frames) const {
+  InertialReport report;
+  report.reason = fault_;
+  if (!fault_.empty()) return report;
+  if (!system_.inertial()) return std::nullopt;
+  report = *system_.inertial();
+  if (report.metric_from && report.metric_from->value < frames.fed.size()) {
+    report.metric_from->value = frames.table.frames[frames.fed[report.metric_from->value]].index;
   }
-  summary.scale_sigma = report->scale_sigma;
-  summary.gravity_in_world = report->gravity_in_world;
-  summary.gravity_sigma_deg = kDegrees * report->gravity_sigma_rad;
-  summary.time_shift_ms = 1e3 * report->time_shift_s;
-  summary.time_shift_sigma_ms = 1e3 * report->time_shift_sigma_s;
-  summary.rotation_deg = kDegrees * so3_log(report->imu_from_rig.rotation);
-  summary.rotation_sigma_deg = kDegrees * report->rotation_sigma_rad;
-  summary.lever_arm_m = report->imu_from_rig.translation;
-  summary.lever_arm_sigma_m = report->lever_arm_sigma_m;
-  summary.gyro_bias = report->biases.gyroscope;
-  summary.accel_bias = report->biases.accelerometer;
-  return summary;
+  return report;
 }
 
 }  // namespace waymark

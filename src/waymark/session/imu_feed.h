@@ -24,8 +24,9 @@ class ImuFeed {
   /// All before an image, and as much more as clocks may be apart.
   void feed_until(std::int64_t timestamp_ns);
 
-  /// What became of it; after System::finish(). frames: which rows those of the system have.
-  std::optional<ImuSummary> summarize(const FedFrames& frames) const;
+  /// What became of it; after System::finish(). frames: which rows those of the system have, by
+  /// which metric_from is then.
+  std::optional<InertialReport> report(const FedFrames& frames) const;
 
  private:
   System& system_;

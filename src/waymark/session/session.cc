@@ -229,7 +229,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   results.summary = summarize(system, frames);
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.summary.loop_frames = list_loops(system, frames);
-  results.summary.imu = imu.summarize(frames);
+  results.summary.imu = imu.report(frames);
   for (const TransferredScale& kept : system.kept_scales()) {
     results.summary.scales.push_back({kept.submap.value, kept.before.value});
   }

@@ -31,6 +31,7 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/imu/imu.h"
+#include "waymark/imu/inertial_report.h"
 #include "waymark/map/map.h"
 #include "waymark/marker/survey.h"
 #include "waymark/system/settings.h"
@@ -63,25 +64,6 @@ struct MarkerReport {
   std::string family;                   ///< As it was asked for; empty: none were looked for.
   std::vector<SurveyedMarker> markers;  ///< Of the sub-map with most keyframes, by number.
   std::optional<MarkerFrame> frame;     ///< Of the map, where they define one.
-};
-
-/// What vision and an inertial measurement unit told of each other.
-struct InertialReport {
-  bool is_used = false;  ///< Whether vision agrees with it; the rest is nothing where it does not.
-  std::string reason;    ///< Why it is not used; empty where it is.
-  /// In mono from which frame on it told the unit of length; nothing where it did not, or where
-  /// that is known otherwise.
-  std::optional<FrameId> metric_from;
-  double scale_sigma = 0.0;  ///< Of the logarithm of metres per map unit.
-  /// Acceleration of free fall in the frame of the map, m/s^2.
-  Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();
-  double gravity_sigma_rad = 0.0;   ///< Of its direction.
-  double time_shift_s = 0.0;        ///< What is added to the time of an image for the IMU's clock.
-  double time_shift_sigma_s = 0.0;  ///< Its standard deviation.
-  Rigid3 imu_from_rig;              ///< In metres; the rig's frame is that of camera 0.
-  double rotation_sigma_rad = 0.0;  ///< Of its rotation, about each axis.
-  double lever_arm_sigma_m = 0.0;   ///< Of its translation, along each axis.
-  ImuBiases biases;                 ///< At the end.
 };
 
 /// Visual SLAM on a stream of frames. One thread feeds; mapping runs beside it unless the timing is
