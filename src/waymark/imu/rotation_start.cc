@@ -3,6 +3,7 @@
 #include <Eigen/SVD>
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 #include <limits>
 
 #include "waymark/geometry/robust_loss.h"
@@ -11,6 +12,8 @@
 namespace waymark {
 namespace {
 
+/// Poses further apart may be more than half a turn apart, and then show another one.
+constexpr std::int64_t kMaxPairNs = 1'000'000'000;
 constexpr int kRounds = 3;           ///< In which the bias is integrated with.
 constexpr int kReweightings = 4;     ///< Of outliers among turns.
 constexpr double kShiftStep = 0.01;  ///< s. Motion of a hand or vehicle is slower.
@@ -53,6 +56,7 @@ TurnRates turn_rates(const StartProblem& problem, const Eigen::Vector3d& bias, d
     const VisionPose& first = problem.poses[i - 1];
     const VisionPose& second = problem.poses[i];
     if (!first.is_seen || !second.is_seen) continue;
+    if (second.timestamp_ns - first.timestamp_ns > kMaxPairNs) continue;
     const std::int64_t begin = first.timestamp_ns + shift_ns;
     const std::int64_t end = second.timestamp_ns + shift_ns;
     const std::vector<ImuSample> samples = problem.samples.between(begin, end);

@@ -41,7 +41,8 @@ struct RotationStart {
 /// The rotation imu_from_rig and the bias that explain how the rig turned from pose to pose by how
 /// the IMU did, from mean angular velocities (alignment of vectors, Umeyama 1991), robustly
 /// (Huber). A time shift that is not told is where they agree best. What does not show remains as
-/// told, or is near identity and 0. Nothing if no two neighbouring poses that are seen have all
+/// told, or is near identity and 0. Nothing if no two neighbouring poses that are seen, at most 1 s
+/// apart, have all
 /// samples between them.
 std::optional<RotationStart> rotation_start(const StartProblem& problem);
 

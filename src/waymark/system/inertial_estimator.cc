@@ -19,9 +19,11 @@ namespace {
 /// Looks at the way begin with as many frames, and come again when it is half as long again.
 constexpr std::size_t kFirstFrames = 20;
 constexpr double kGrowth = 1.5;
-/// Of a longer way every second, third, ... frame is looked at; of the whole of it more.
-constexpr std::size_t kMaxPoses = 100;
-constexpr std::size_t kMaxPosesInTheEnd = 300;
+/// Of a longer way every second, third, ... frame is looked at.
+constexpr std::size_t kMaxPoses = 200;
+/// Neighbours among them are so near in time; in bursts of so many where the way is too long.
+constexpr std::int64_t kMaxStepNs = 500'000'000;
+constexpr std::size_t kBurst = 20;
 /// Poses of vision are that good: in rad, and as a part of how far away things are.
 constexpr double kPoseSigma = 0.001;
 /// Errors of a pose in standard deviations that count fully.
@@ -45,20 +47,34 @@ constexpr double kFirmRotation = 0.02;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
 
-/// Frames of one part of the map, as far apart as their number asks.
-std::vector<VisionPose> choose_poses(std::span<const TrajectoryFrame> frames,
-                                     SubmapId submap,
-                                     std::size_t max_count) {
+/// Poses evenly over the way; where these would be too far apart, in bursts.
+std::vector<VisionPose> spread_out(std::span<const VisionPose> poses) {
+  const std::size_t step = 1 + poses.size() / kMaxPoses;
+  const auto step_ns = [&](std::size_t i) {
+    return poses[std::min(i, poses.size() - 1)].timestamp_ns - poses[0].timestamp_ns;
+  };
+  std::vector<VisionPose> chosen;
+  if (step_ns(step) <= kMaxStepNs) {
+    for (std::size_t i = 0; i < poses.size(); i += step) chosen.push_back(poses[i]);
+    return chosen;
+  }
+  std::size_t near_step = 1;
+  while (step_ns(near_step + 1) <= kMaxStepNs) ++near_step;
+  for (std::size_t burst = 0; burst < poses.size(); burst += step * kBurst) {
+    const std::size_t end = std::min(poses.size(), burst + near_step * kBurst);
+    for (std::size_t i = burst; i < end; i += near_step) chosen.push_back(poses[i]);
+  }
+  return chosen;
+}
+
+/// Frames of one part of the map, as many as are looked at.
+std::vector<VisionPose> choose_poses(std::span<const TrajectoryFrame> frames, SubmapId submap) {
   std::vector<VisionPose> poses;
   for (const TrajectoryFrame& frame : frames) {
     if (frame.submap != submap || frame.state != FrameState::kTracked) continue;
     poses.push_back({frame.timestamp_ns, frame.world_from_rig.inverse()});
   }
-  const std::size_t step = 1 + poses.size() / max_count;
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < poses.size(); i += step) poses[count++] = poses[i];
-  poses.resize(count);
-  return poses;
+  return spread_out(poses);
 }
 
 /// How far away things are, in map units: the median over keyframes of the median of each.
@@ -146,7 +162,7 @@ std::optional<SubmapPlacement> InertialEstimator::update(const TrajectoryMemory&
   const std::vector<TrajectoryFrame> frames = list_poses(memory, map);
   if (frames.empty()) return std::nullopt;
   const SubmapId submap = frames.back().submap;
-  look(choose_poses(frames, submap, kMaxPoses), submap, map);
+  look(choose_poses(frames, submap), submap, map);
   if (!report_->is_used || report_->scale_sigma > kSureScale) return std::nullopt;
   if (is_placement_sent_ || map.submaps()[submap.value].is_metric) return std::nullopt;
   is_placement_sent_ = true;
@@ -251,7 +267,7 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
                                                      bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
   const SubmapId submap = submaps_by_size(*map).front();
-  look(choose_poses(list_poses(memory, *map), submap, kMaxPosesInTheEnd), submap, *map);
+  look(choose_poses(list_poses(memory, *map), submap), submap, *map);
   if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
     smooth_trajectory(knowledge(), submap, *map, memory);
   }
