@@ -16,6 +16,9 @@ namespace {
 constexpr std::size_t kBeside = 15;
 constexpr std::size_t kAround = 25;
 constexpr std::int64_t kAroundNs = 20'000'000'000;
+/// What axes of a gyroscope that are not quite square and not of quite the same scale, and poses
+/// that err alike, leave in rad.
+constexpr double kSystematicTurn = 1e-3;
 /// Of poses in the order of how near they are, all of those beside and some of those around.
 std::vector<VisionPose> thin_out(std::span<const VisionPose> poses) {
   const std::size_t num_beside = std::min(kBeside, poses.size());
@@ -51,9 +54,11 @@ std::optional<ReckonedPose> DeadReckoning::to(const InertialKnowledge& known,
                                               std::int64_t timestamp_ns) const {
   if (!first_) return std::nullopt;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * time_shift_s_));
-  const auto now = predict(
+  auto now = predict(
       *first_, known.samples, begin_ns_ + shift_ns, timestamp_ns + shift_ns, known.noise, setup_);
-  if (!now || !is_sure(known, now->covariance)) return std::nullopt;
+  if (!now) return std::nullopt;
+  now->covariance.diagonal().segment<3>(kStateAt + 3).array() += kSystematicTurn * kSystematicTurn;
+  if (!is_sure(known, now->covariance)) return std::nullopt;
   return ReckonedPose{now->state.rig_from_world * first_->state.rig_from_world.inverse(),
                       now->covariance.block<6, 6>(kStateAt, kStateAt)};
 }
