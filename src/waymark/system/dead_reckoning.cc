@@ -52,7 +52,7 @@ DeadReckoning::DeadReckoning(const InertialKnowledge& known,
 
 std::optional<ReckonedPose> DeadReckoning::to(const InertialKnowledge& known,
                                               std::int64_t timestamp_ns) const {
-  if (!first_) return std::nullopt;
+  if (!first_ || timestamp_ns - begin_ns_ > kMaxBridgedNs) return std::nullopt;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * time_shift_s_));
   auto now = predict(
       *first_, known.samples, begin_ns_ + shift_ns, timestamp_ns + shift_ns, known.noise, setup_);

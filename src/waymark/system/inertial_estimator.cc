@@ -245,7 +245,7 @@ std::optional<ReckonedPose> InertialEstimator::dead_reckon(const TrajectoryMemor
 
 std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
                                                           std::int64_t end_ns) const {
-  if (!is_firm()) return std::nullopt;
+  if (!is_firm() || end_ns - begin_ns > kMaxBridgedNs) return std::nullopt;
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * found_->time_shift_s));
   std::vector<ImuSample> samples = samples_.between(begin_ns + shift_ns, end_ns + shift_ns);
   if (samples.empty()) return std::nullopt;

@@ -16,8 +16,6 @@ namespace {
 /// Frames that are solved for at a time, and of them those at either end that only lead there.
 constexpr std::size_t kWindow = 600;
 constexpr std::size_t kOverlap = 100;
-/// Longer stretches without a pose stay without.
-constexpr std::int64_t kMaxGapNs = 10'000'000'000;
 /// What is reckoned is not sure where it may be off by this part of how far away things are, or
 /// by this angle in rad: then what is seen again is not found from there.
 constexpr double kSurePart = 0.15;
@@ -66,7 +64,7 @@ class Stretches {
   /// Frames after the last one that is seen begin there.
   static void end_gap(std::vector<SmoothedFrame>& stretch) {
     const VisionPose last = last_seen(stretch)->pose;
-    while (stretch.back().pose.timestamp_ns - last.timestamp_ns > kMaxGapNs) stretch.pop_back();
+    while (stretch.back().pose.timestamp_ns - last.timestamp_ns > kMaxBridgedNs) stretch.pop_back();
     for (auto frame = stretch.rbegin(); !frame->pose.is_seen; ++frame) {
       frame->pose.rig_from_world = last.rig_from_world;
     }
@@ -80,7 +78,7 @@ class Stretches {
     const auto last = last_seen(stretch);
     const VisionPose before = last->pose;
     const std::int64_t gap_ns = timestamp_ns - before.timestamp_ns;
-    if (gap_ns > kMaxGapNs) return false;
+    if (gap_ns > kMaxBridgedNs) return false;
     const Vector6d motion = (rig_from_world * before.rig_from_world.inverse()).log();
     for (auto frame = last + 1; frame != stretch.end(); ++frame) {
       const double part = static_cast<double>(frame->pose.timestamp_ns - before.timestamp_ns) /

@@ -2,11 +2,18 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <cstdint>
+#include <optional>
+#include <span>
+
 #include "waymark/imu/inertial_start.h"
 #include "waymark/map/map.h"
 #include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
+
+/// Nothing is bridged for longer, whose errors grow beyond use.
+inline constexpr std::int64_t kMaxBridgedNs = 10'000'000'000;
 
 /// What is known of an IMU in a part of the map.
 struct InertialKnowledge {
