@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/track/trajectory_memory.h"
 
+#include "waymark/track/pose_check.h"
+
 namespace waymark {
 namespace {
 
