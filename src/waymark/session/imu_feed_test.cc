@@ -186,6 +186,14 @@ TEST(ImuFeed, LeavesOutWhatContradictsTheImages) {
   EXPECT_FALSE(results.summary.quality->is_metric);
 }
 
+TEST(ImuFeed, LeavesOutAnAccelerometerWithLengthsOfItsOwn) {
+  ImuStream long_units = imu_recording().imu;
+  for (ImuSample& sample : long_units.samples) sample.acceleration *= 1.15;
+  const SessionResults results = run_with(long_units);
+  EXPECT_FALSE(results.summary.imu->is_used);
+  EXPECT_THAT(results.summary.imu->reason, HasSubstr("its accelerometer is off"));
+}
+
 TEST(ImuFeed, DoesNotUseWhatIsWrongInItself) {
   ImuStream constant = imu_recording().imu;
   for (ImuSample& sample : constant.samples) sample.angular_velocity.setZero();

@@ -30,6 +30,8 @@ constexpr double kPoseSigma = 0.001;
 constexpr double kPoseHuber = 2.0;
 /// What was told is wrong where vision and IMU are off by so many standard deviations.
 constexpr double kFarFromTold = 5.0;
+/// Larger biases of an accelerometer, in m/s^2, are those of one that measures wrong lengths.
+constexpr double kMaxAccelerometerBias = 0.8;
 /// Poses of vision err alike for long, which no number of them averages out.
 constexpr double kSystematicScale = 0.002;    // As a part.
 constexpr double kSystematicRotation = 5e-4;  // rad
@@ -209,6 +211,9 @@ void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap,
     report_->reason = "too little was seen and measured at the same time";
   } else if (found_->is_contradicted()) {
     report_->reason = "it contradicts the images";
+    found_.reset();
+  } else if (found_->states.back().biases.accelerometer.norm() > kMaxAccelerometerBias) {
+    report_->reason = "its accelerometer is off by more than one has";
     found_.reset();
   } else {
     describe(*found_, *report_);
