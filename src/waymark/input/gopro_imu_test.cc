@@ -4,6 +4,7 @@
 
 #include <cmath>
 #include <cstdlib>
+#include <vector>
 
 #include "waymark/base/testing/errors.h"
 #include "waymark/geometry/rigid3.h"
@@ -108,14 +109,18 @@ TEST(GoproImu, AgreesWithGravityOfTheCamera) {
   for (const ImuSample& sample : stream->samples) up += sample.acceleration;
   Eigen::Vector3d down = Eigen::Vector3d::Zero();  // x right, y down, z forward.
   for (const TelemetryPacket& packet : read_telemetry(video)) {
+    std::vector<double> gravity, images;
     for (const GpmfStream& of : parse_gpmf(packet.bytes)) {
-      for (std::size_t i = 0; of.key == "GRAV" && i + 2 < of.values.size(); i += 3) {
-        down += Eigen::Vector3d(of.values[i], of.values[i + 1], of.values[i + 2]);
-      }
+      if (of.key == "GRAV") gravity = of.values;
+      if (of.key == "IORI") images = of.values;
+    }
+    ASSERT_EQ(gravity.size() / 3, images.size() / 4);
+    for (std::size_t i = 0; 3 * i < gravity.size(); ++i) {
+      const double* q = &images[4 * i];
+      down += Eigen::Quaterniond(q[0], q[1], q[2], q[3]) * Eigen::Vector3d(&gravity[3 * i]);
     }
   }
-  // Of the camera, against which images are turned by 1.6 degrees in the mean.
-  EXPECT_GT(-up.normalized().dot(down.normalized()), std::cos(0.035));
+  EXPECT_GT(-up.normalized().dot(down.normalized()), std::cos(0.02));
 }
 
 }  // namespace

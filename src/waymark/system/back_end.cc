@@ -33,7 +33,7 @@ void BackEnd::update(FrameId frame, PublishedMap& visible) {
   // In real time it is due once it is there.
   if (timing_ == Timing::kRealtime ? !adjuster_.has_result() : due > frame) return;
   last_due_ = due;
-  worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt, std::nullopt});
+  worker_.send(FrameId{frame.value + 1}, {frame, std::nullopt});
 }
 
 bool BackEnd::waits_for(const MapperMessage& message) const {
@@ -46,7 +46,7 @@ void BackEnd::send(FrameId frame, MapperMessage message) {
   // A new sub-map is what the next frame is tracked in; a keyframe shows its effect later.
   const bool is_submap = std::holds_alternative<NewSubmap>(message);
   const auto latency = is_submap ? 1u : static_cast<std::uint32_t>(settings_.map_latency);
-  worker_.send(FrameId{frame.value + latency}, {frame, std::move(message), std::nullopt});
+  worker_.send(FrameId{frame.value + latency}, {frame, std::move(message)});
   if (is_submap && timing_ == Timing::kRealtime) worker_.wait();
 }
 

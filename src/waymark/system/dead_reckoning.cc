@@ -19,6 +19,7 @@ constexpr std::int64_t kAroundNs = 20'000'000'000;
 /// What axes of a gyroscope that are not quite square and not of quite the same scale, and poses
 /// that err alike, leave in rad.
 constexpr double kSystematicTurn = 1e-3;
+
 /// Of poses in the order of how near they are, all of those beside and some of those around.
 std::vector<VisionPose> thin_out(std::span<const VisionPose> poses) {
   const std::size_t num_beside = std::min(kBeside, poses.size());

@@ -7,11 +7,9 @@
 #include <span>
 
 #include "waymark/imu/inertial_start.h"
-#include "waymark/map/map.h"
 #include "waymark/system/inertial_smoother.h"
 #include "waymark/system/system.h"
 #include "waymark/track/frame.h"
-#include "waymark/track/trajectory_memory.h"
 
 namespace waymark {
 

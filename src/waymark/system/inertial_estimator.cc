@@ -43,9 +43,9 @@ constexpr double kMetricSigma = 0.01;
 /// A scale is told where its logarithm has a smaller standard deviation, and a turn of the
 /// gyroscope where that of its mounting, in rad, has.
 constexpr double kFirmScale = 0.05;
+constexpr double kFirmRotation = 0.02;
 /// Of the scale with which the map is put into metres while it grows, once.
 constexpr double kSureScale = 0.01;
-constexpr double kFirmRotation = 0.02;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
 
