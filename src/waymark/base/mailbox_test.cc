@@ -4,10 +4,13 @@
 
 #include <gmock/gmock.h>
 
+#include <array>
 #include <memory>
 #include <string>
 #include <thread>
 #include <vector>
+
+#include "waymark/base/testing/allocation_count.h"
 
 namespace waymark {
 namespace {
@@ -67,6 +70,22 @@ TEST(Mailbox, NoMessageIsLostOrDoubledBetweenThreads) {
   std::sort(all.begin(), all.end());
   ASSERT_EQ(all.size(), static_cast<std::size_t>(kNumWriters * kNumMessages));
   for (std::size_t i = 0; i < all.size(); ++i) ASSERT_EQ(all[i], static_cast<int>(i));
+}
+
+// A thread that has run out of memory has to say so.
+TEST(Mailbox, TakesNoMemoryForMessages) {
+  struct Large {
+    std::array<char, 2000> bytes;
+  };
+  Mailbox<Large> mailbox(3);
+  const long before = testing::num_allocations();
+  for (int i = 0; i < 10; ++i) {
+    mailbox.push({});
+    mailbox.push({});
+    mailbox.pop();
+    mailbox.pop();
+  }
+  EXPECT_EQ(testing::num_allocations(), before);
 }
 
 TEST(Mailbox, NeedsRoom) { EXPECT_THROW(Mailbox<int>(0), CheckError); }

@@ -57,12 +57,7 @@ class Prefetch {
   void give(Work work) {
     WAYMARK_CHECK(!is_full());
     given_.push_back(std::make_shared<Piece>(std::move(work)));
-    try {
-      to_do_.push(given_.back());
-    } catch (...) {  // No memory is left: nobody would ever do it.
-      given_.pop_back();
-      throw;
-    }
+    to_do_.push(given_.back());
   }
 
   /// Waits for the result of the oldest piece, of which there must be one. Rethrows what it threw.

@@ -7,7 +7,7 @@
 #include <cmath>
 #include <functional>
 
-#include "waymark/features/testing/allocation_count.h"
+#include "waymark/base/testing/allocation_count.h"
 
 namespace waymark {
 namespace {

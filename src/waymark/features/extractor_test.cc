@@ -11,8 +11,8 @@
 #include "waymark/base/check.h"
 #include "waymark/base/median.h"
 #include "waymark/base/rng.h"
+#include "waymark/base/testing/allocation_count.h"
 #include "waymark/features/corners.h"
-#include "waymark/features/testing/allocation_count.h"
 #include "waymark/image/image_testing.h"
 
 namespace waymark {

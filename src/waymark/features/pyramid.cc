@@ -113,7 +113,7 @@ namespace {
 // Room for a row and for what the vectors of the last pixels read beyond it.
 void reserve(int width, DownscaleWorkspace& workspace) {
   const auto size = static_cast<std::size_t>(width + 2 * PaddedImage::kPadding);
-  if (workspace.row.size() >= size) return;
+  if (workspace.weights.size() >= size) return;  // The last one for which memory could run out.
   workspace.row.resize(size);
   workspace.with_gaps.resize(size);
   workspace.weights.resize(size);

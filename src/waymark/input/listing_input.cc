@@ -6,6 +6,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <new>
 #include <utility>
 
 #include "waymark/base/check.h"
@@ -223,6 +224,7 @@ void ListingInput::check_first_frame(std::size_t index) {
   const ListedFrame& listed = listing_.frames[index];
   InputFrame frame;
   read_images(listed, frame);
+  if (frame.images.empty()) throw std::bad_alloc();  // It could be read a moment ago.
   for (std::size_t i = 0; i < frame.images.size(); ++i) {
     const ImageSize size{frame.images[i].width_px, frame.images[i].height_px};
     if (info_.calibration) fit_first_image(*info_.calibration, i, size, listed.images[i]);

@@ -2,7 +2,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <gtest/gtest.h>
 
-#include "waymark/features/testing/allocation_count.h"
+#include "waymark/base/testing/allocation_count.h"
 #include "waymark/optimize/pose.h"
 #include "waymark/solver/testing/scene.h"
 

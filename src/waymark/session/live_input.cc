@@ -3,6 +3,7 @@
 #include "waymark/session/live_input.h"
 
 #include <algorithm>
+#include <iterator>
 #include <thread>
 #include <utility>
 
@@ -85,7 +86,7 @@ std::optional<InputFrame> LiveInput::next() {
     std::optional<Arrival> arrival = arrivals_.pop();
     if (!arrival && failure_) std::rethrow_exception(std::exchange(failure_, nullptr));
     if (!arrival) return std::nullopt;
-    ready_ = *std::move(arrival);
+    std::move(arrival->begin(), arrival->end(), std::back_inserter(ready_));
   }
   const std::unique_ptr<InputFrame> frame = std::move(ready_.front());
   ready_.pop_front();

@@ -10,6 +10,7 @@
 #include <memory>
 #include <optional>
 #include <thread>
+#include <vector>
 
 #include "waymark/base/mailbox.h"
 #include "waymark/input/input.h"
@@ -71,7 +72,7 @@ class LiveInput : public Input {
 
  private:
   /// A frame, after those dropped before it.
-  using Arrival = std::deque<std::unique_ptr<InputFrame>>;
+  using Arrival = std::vector<std::unique_ptr<InputFrame>>;
 
   void read();
 
@@ -79,7 +80,7 @@ class LiveInput : public Input {
   const std::function<bool()> should_stop_;
   const std::function<bool()> is_paused_;
   Mailbox<Arrival> arrivals_;
-  Arrival ready_;
+  std::deque<std::unique_ptr<InputFrame>> ready_;
   std::exception_ptr failure_;  // Of the reader; set before the mailbox is closed.
   std::atomic<bool> is_closed_{false};
   std::jthread thread_;

@@ -5,6 +5,7 @@
 #include <Eigen/Cholesky>
 #include <algorithm>
 #include <atomic>
+#include <new>
 
 #include "waymark/base/check.h"
 
@@ -40,6 +41,7 @@ BlockCholesky::BlockCholesky(std::size_t num_blocks, const BlockPattern& pattern
     first_value_.push_back(first_value_.back() + num_strips(panel) * strip_size(panel));
   }
   values_ = hwy::AllocateAligned<double>(std::max<std::size_t>(first_value_.back(), 1));
+  if (!values_) throw std::bad_alloc();
   set_zero();
 }
 

@@ -1,6 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
-#include "waymark/features/testing/allocation_count.h"
+#include "waymark/base/testing/allocation_count.h"
 
 #include <atomic>
 #include <cstdlib>
