@@ -44,6 +44,7 @@ struct RunOptions {
   std::string viewer;                   ///< [HOST:]PORT; empty: off.
   std::filesystem::path overlay;        ///< Video to make; empty: none.
   std::optional<double> max_memory_gb;  ///< Nothing: no limit.
+  bool has_imu_rate = false;            ///< Whether trajectory.txt has a pose per sample.
   bool has_report = false;              ///< Whether a page on it is among the results.
 };
 
@@ -53,6 +54,7 @@ FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, R
              const FrameRecord& record, const std::string& warning) mutable {
     report(record, warning);
     if (live) live->show(record);
+    autosave.set_imu(session.system->inertial());
     if (const auto failure = autosave.update(session.system->map())) {
       reporter.warning("autosave: " + *failure);
     }
@@ -107,6 +109,7 @@ void save_final_map(const System& system,
                                  options.map_out.string()));
     return;
   }
+  autosave.set_imu(system.inertial());
   autosave.save(system.map());
   reporter.info(fmt::format("map in {}", options.map_out.string()));
 }
@@ -204,6 +207,9 @@ std::optional<int> finish(const RunOptions& options,
     if (!results.summary.mistakes) results.summary.mistakes.emplace();
     results.summary.mistakes->push_back(again->mistake);
   }
+  if (options.has_imu_rate && results.at_imu_rate.empty()) {
+    reporter.warning("--rate imu: no IMU told the way in metres, poses are those of images");
+  }
   results.summary.advice = advise(results.table, results.summary);
   const auto last = [&] {
     if (!again) report(results);
@@ -243,6 +249,7 @@ std::optional<int> map_once(const RunOptions& options,
   KeyframeImageCache images([&] { return session.system->map(); }, std::move(session.images));
   SessionHooks hooks;
   hooks.is_paced = options.pace > 0.0;
+  hooks.wants_imu_rate = options.has_imu_rate;
   hooks.on_decoded = [&images](InputFrame& frame) { images.add(frame); };
   Autosave autosave(options.map_out,
                     has_map_out && !first ? options.autosave_s : 0.0,  // There is a whole map.
@@ -295,6 +302,15 @@ void add_pace_option(CLI::App& command, RunOptions& options) {
       ->check(number_between(1e-3, 1e3));
 }
 
+void add_rate_option(CLI::App& command, RunOptions& options) {
+  command
+      .add_option_function<std::string>(
+          "--rate",
+          [&options](const std::string& rate) { options.has_imu_rate = rate == "imu"; },
+          "Poses in trajectory.txt: one per image, or with an IMU in use one per sample [image]")
+      ->check(CLI::IsMember({"image", "imu"}));
+}
+
 void add_map_options(CLI::App& command, RunOptions& options) {
   command.option_defaults()->group("Map");
   reads(command.add_option(
@@ -334,6 +350,7 @@ void add_run_command(CLI::App& program, Command& command) {
   add_fov_option(run_command, options->calibrate);
   run_command.option_defaults()->group("How it runs");
   add_pace_option(run_command, *options);
+  add_rate_option(run_command, *options);
   add_choice<std::optional<Timing>>(
       run_command,
       "--timing",

@@ -25,6 +25,7 @@
 #include "waymark/base/text.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/input/decode.h"
+#include "waymark/input/imu_camchain.h"
 #include "waymark/report/documentation.h"
 
 namespace waymark {
@@ -225,13 +226,15 @@ void write_calibration(const std::filesystem::path& folder,
                        const Rig& rig,
                        const RunSummary& summary) {
   const std::filesystem::path file = folder / "calibration.yaml";
-  const bool is_news = prepared.estimated || !summary.refined_calibration.empty();
+  const bool has_imu = summary.imu && summary.imu->is_used && !prepared.reading.rotate_deg;
+  const bool is_news = has_imu || prepared.estimated || !summary.refined_calibration.empty();
   const auto chain = is_news ? chain_of(rig, summary.refined_calibration) : std::nullopt;
   if (!chain) {
     std::filesystem::remove(file);  // Of an earlier run.
     return;
   }
-  std::string text = format_camchain(prepared.input->of_unchanged_images(*chain));
+  const ImuCalibration imu = has_imu ? summary.imu->calibration() : ImuCalibration();
+  std::string text = format_camchain_imu(prepared.input->of_unchanged_images(*chain), imu);
   if (prepared.input->info().setup == Setup::kRgbd) {
     const DepthSettings& depth = prepared.settings.depth;
     text += fmt::format("depth: {{factor: {:.6g}, lag_ms: {:.6g}, inverse_offset: {:.6g}}}\n",

@@ -70,6 +70,7 @@ int align(const AlignOptions& options) {
   AlignedMap aligned = align_as_asked(*stored.map, options);
   for (const std::string& line : aligned.report) print_result("{}\n", line);
   stored.map = aligned.map.freeze();
+  if (stored.imu) stored.imu->gravity_in_world.setZero();  // In another frame now.
   save_map(options.out, stored);
   return kDone;
 }

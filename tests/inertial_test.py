@@ -49,6 +49,21 @@ class Recorded(CliTest):
         imu = self.check()
         self.assertLess(abs(imu["rotation_deg"]["value"][2] - 89.15), 0.3)
 
+    def test_what_is_found_is_kept(self):
+        kept = self.folder / "kept.wmap"
+        done = self.run_on(EUROC, "--setup", "mono", "--frames", 200, "--map-out", kept, "--rate", "imu")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        rows = (self.out / "inertial.csv").read_text().splitlines()
+        self.assertEqual(len(rows), 1 + self.summary()["tracked"])
+        self.assertGreater(len((self.out / "trajectory.txt").read_text().splitlines()), 9 * len(rows))
+        self.assertIn("T_cam_imu", (self.out / "calibration.yaml").read_text())
+        first = self.summary()["imu"]
+        ate_m, _, summary = self.figures("--map-in", kept, "--first", 150)
+        self.assertLess(ate_m, 0.008)
+        self.assertEqual(summary["submaps"], 1)
+        for of_axis, before in zip(summary["imu"]["rotation_deg"]["value"], first["rotation_deg"]["value"]):
+            self.assertAlmostEqual(of_axis, before, delta=0.3)
+
     def test_a_wrong_description(self):
         calibration = self.folder / "wrong.yaml"
         intrinsics = (EUROC / "camchain.yaml").read_text().split("cam0:\n")[1].split("cam1:")[0]

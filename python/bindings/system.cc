@@ -60,6 +60,11 @@ class PythonSystem {
     return system_.inertial();
   }
 
+  std::vector<InertialMoment> inertial_path() {
+    const Turn turn = take();
+    return system_.inertial_path();
+  }
+
   void finish() {
     const Turn turn = take();
     {
@@ -156,9 +161,10 @@ class PythonSystem {
   }
 
   void save(const std::filesystem::path& path) {
-    const std::shared_ptr<PythonMap> newest = map();
+    StoredMap stored = map()->stored;
+    if (const auto imu = inertial(); imu && imu->is_used) stored.imu = imu;
     const ReleasedGil released;
-    save_map(path, newest->stored);
+    save_map(path, stored);
   }
 
   bool is_finished() const { return is_finished_; }
@@ -260,7 +266,12 @@ angular_velocity, acceleration: array (3,) or (N, 3), rad/s and m/s^2, gravity i
       .def("inertial", &PythonSystem::inertial, R"(inertial(self)
 --
 
-What the IMU told so far: an InertialReport, or None without samples. Final after finish().)");
+What the IMU told so far: an InertialReport, or None without samples. Final after finish().)")
+      .def("inertial_path", &PythonSystem::inertial_path, R"(inertial_path(self)
+--
+
+Poses, velocities and biases of the frames of the largest part of the map, after finish(): a list of
+InertialMoment; empty where lengths are not known in metres.)");
 }
 
 void bind_control(SystemClass& system) {

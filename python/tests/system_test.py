@@ -205,6 +205,7 @@ class Results(Test):
                 system.feed(frame.timestamp_ns, frame.image0, frame.image1)
             system.finish()
             reports.append(system.inertial())
+            self.assertEqual(system.inertial_path(), [])
         # The camera does turn, and this says that it does not.
         self.assertFalse(reports[0].is_used)
         self.assertNotEqual(reports[0].reason, "")

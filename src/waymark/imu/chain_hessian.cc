@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "waymark/imu/chain_hessian.h"
 
+#include <limits>
+
 namespace waymark {
 namespace {
 
@@ -79,6 +81,24 @@ Eigen::VectorXd ChainHessian::solve(const Eigen::VectorXd& right) const {
     left.segment<15>(row_of(i)) = done.states[i].solve(own);
   }
   return left;
+}
+
+std::vector<Matrix25d> ChainHessian::covariances() const {
+  const Elimination done = eliminate();
+  constexpr double kNothing = std::numeric_limits<double>::quiet_NaN();
+  std::vector<Matrix25d> all(states_.size(), Matrix25d::Constant(kNothing));
+  const Eigen::LLT<Matrix25d> last(done.last);
+  if (last.info() != Eigen::Success) return all;
+  all.back() = last.solve(Matrix25d::Identity());
+  for (std::size_t i = done.states.size(); i-- > 0;) {
+    const ByRest gain = done.states[i].solve(done.by_rest[i]);
+    const ByRest with_rest = -gain * all[i + 1];
+    const Matrix15d own =
+        done.states[i].solve(Matrix15d::Identity()) - with_rest * gain.transpose();
+    all[i] << all[i + 1].topLeftCorner<10, 10>(), with_rest.leftCols<10>().transpose(),
+        with_rest.leftCols<10>(), own;
+  }
+  return all;
 }
 
 }  // namespace waymark

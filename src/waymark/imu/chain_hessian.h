@@ -34,9 +34,9 @@ class ChainHessian {
   const ChainHessian& ldlt() const { return *this; }
   /// NaN where it is not positive definite.
   Eigen::VectorXd solve(const Eigen::VectorXd& right) const;
-  /// What is left of it for the setup and the last state where all others follow these (the Schur
-  /// complement).
-  Matrix25d of_setup_and_last() const { return eliminate().last; }
+  /// Of the setup and each state: blocks of its inverse (Rauch, Tung and Striebel 1965). NaN where
+  /// it is not positive definite.
+  std::vector<Matrix25d> covariances() const;
 
  private:
   using ByRest = Eigen::Matrix<double, 15, 25>;  ///< By the setup and the next state.

@@ -38,10 +38,15 @@ TEST(ChainHessian, IsSolvedAsADenseOne) {
   EXPECT_TRUE(chain.solve(right).isApprox(dense.lu().solve(right), 1e-9));
 
   const Eigen::MatrixXd inverse = dense.inverse();
-  Matrix25d covariance;
-  covariance << inverse.topLeftCorner(10, 10), inverse.topRightCorner(10, 15),
-      inverse.bottomLeftCorner(15, 10), inverse.bottomRightCorner(15, 15);
-  EXPECT_TRUE(chain.of_setup_and_last().inverse().isApprox(covariance, 1e-9));
+  const std::vector<Matrix25d> covariances = chain.covariances();
+  ASSERT_EQ(covariances.size(), kNumStates);
+  for (std::size_t i = 0; i < kNumStates; ++i) {
+    const auto at = 10 + 15 * static_cast<Eigen::Index>(i);
+    Matrix25d covariance;
+    covariance << inverse.topLeftCorner(10, 10), inverse.block(0, at, 10, 15),
+        inverse.block(at, 0, 15, 10), inverse.block(at, at, 15, 15);
+    EXPECT_TRUE(covariances[i].isApprox(covariance, 1e-9));
+  }
 }
 
 }  // namespace

@@ -2,8 +2,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <Eigen/Cholesky>
 #include <cmath>
-#include <limits>
+#include <span>
 #include <utility>
+#include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/geometry/robust_loss.h"
@@ -143,18 +144,18 @@ UnknownsEquations linearize_unknowns(const StartProblem& problem,
   return equations;
 }
 
-/// Of the setup and the last state, by the last equations; none where rounding has left them
-/// singular.
-Matrix25d covariance_of(const ChainHessian& hessian, const Eigen::Vector3d& last_velocity) {
-  const Eigen::LLT<Matrix25d> factor(hessian.of_setup_and_last());
-  if (factor.info() != Eigen::Success) {
-    return Matrix25d::Constant(std::numeric_limits<double>::quiet_NaN());
+/// By the last equations, of the tangent vectors themselves, in which velocities do not grow with
+/// the scale.
+std::vector<Matrix25d> covariances_of(const ChainHessian& hessian,
+                                      std::span<const InertialState> states) {
+  std::vector<Matrix25d> covariances = hessian.covariances();
+  for (std::size_t i = 0; i < states.size(); ++i) {
+    Matrix25d by_step = Matrix25d::Identity();
+    by_step.block<3, 1>(16, 2) = states[i].velocity;
+    const Matrix25d covariance = by_step * covariances[i] * by_step.transpose();
+    covariances[i] = 0.5 * (covariance + covariance.transpose());
   }
-  // Of the tangent vectors themselves, in which velocities do not grow with the scale.
-  Matrix25d by_step = Matrix25d::Identity();
-  by_step.block<3, 1>(16, 2) = last_velocity;
-  const Matrix25d covariance = by_step * factor.solve(Matrix25d::Identity()) * by_step.transpose();
-  return 0.5 * (covariance + covariance.transpose());
+  return covariances;
 }
 
 }  // namespace
@@ -174,8 +175,8 @@ InertialRefinement refine_inertial_start(const StartProblem& problem,
       kMaxRefinements,
       kNegligibleError,
       num_iterations);
-  const Matrix25d covariance = covariance_of(last.hessian, stepped.states.back().velocity);
-  return {std::move(stepped), covariance, last.cost};
+  std::vector<Matrix25d> covariances = covariances_of(last.hessian, stepped.states);
+  return {std::move(stepped), std::move(covariances), last.cost};
 }
 
 }  // namespace waymark

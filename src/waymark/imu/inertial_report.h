@@ -29,6 +29,9 @@ struct InertialReport {
   double rotation_sigma_rad = 0.0;  ///< Of its rotation, about each axis.
   double lever_arm_sigma_m = 0.0;   ///< Of its translation, along each axis.
   ImuBiases biases;                 ///< At the end.
+
+  /// As far as it is known as well as one that somebody states: to tell of the same IMU.
+  ImuCalibration calibration() const;
 };
 
 }  // namespace waymark

@@ -124,10 +124,12 @@ InertialRefinement refine_at_believed_scale(const StartProblem& problem,
   unknowns.setup.log_scale = problem.options.log_scale;
   InertialRefinement refined =
       refine_inertial_start(problem, chain, std::move(unknowns), kHeldSigma);
-  const double held = refined.covariance(2, 2);
   const double variance = problem.options.log_scale_sigma * problem.options.log_scale_sigma;
-  const Eigen::Matrix<double, 25, 1> by_scale = refined.covariance.col(2) / held;
-  refined.covariance += (variance - held) * by_scale * by_scale.transpose();
+  for (Matrix25d& covariance : refined.covariances) {
+    const double held = covariance(2, 2);
+    const Eigen::Matrix<double, 25, 1> by_scale = covariance.col(2) / held;
+    covariance += (variance - held) * by_scale * by_scale.transpose();
+  }
   return refined;
 }
 
@@ -150,18 +152,18 @@ std::optional<InertialStart> start_inertial(const ImuSamples& samples,
       cut_chain(problem, rotation->time_shift_s, std::vector(poses.size(), still));
   InertialRefinement refined =
       refine_with_cuts(problem, first_guess(problem, chain, *rotation), chain);
-  if (std::sqrt(refined.covariance(2, 2)) > kWeakScale) {
+  if (std::sqrt(refined.covariances.back()(2, 2)) > kWeakScale) {
     const double squared_error = refined.squared_error;
     refined = refine_at_believed_scale(problem, chain, std::move(refined.unknowns));
     refined.squared_error = squared_error;
   }
-  if (!refined.covariance.allFinite()) return std::nullopt;
+  if (!refined.covariances.back().allFinite()) return std::nullopt;
   InertialStart start;
   start.time_shift_s =
       chain.time_shift_s + std::exchange(refined.unknowns.setup.time_shift_change_s, 0.0);
   start.setup = refined.unknowns.setup;
   start.states = std::move(refined.unknowns.states);
-  start.covariance = refined.covariance;
+  start.covariances = std::move(refined.covariances);
   start.squared_error = refined.squared_error;
   start.degrees_of_freedom = degrees_of_freedom(chain, poses);
   return start;

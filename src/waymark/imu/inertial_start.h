@@ -3,6 +3,7 @@
 #pragma once
 
 #include <Eigen/Core>
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <limits>
@@ -46,7 +47,7 @@ struct InertialStartOptions {
   double time_shift_sigma_s = 0.1;  ///< s.
 };
 
-/// Where components of the tangent vectors of (setup 10, last state 15) begin.
+/// Where components of the tangent vectors of (setup 10, state 15) begin.
 inline constexpr int kGravityAt = 0;
 inline constexpr int kLogScaleAt = 2;
 inline constexpr int kLeverArmAt = 3;
@@ -65,16 +66,24 @@ struct InertialStart {
   InertialSetup setup;
   double time_shift_s = 0.0;          ///< What is added to the time of an image.
   std::vector<InertialState> states;  ///< One per pose, at its time.
-  /// Of the tangent vectors of (setup 10, last state 15). What cannot be told has about the
-  /// standard deviation that was believed before; a rotation of imu_from_rig that was not told, pi.
-  Matrix25d covariance;
+  /// Of the tangent vectors of (setup 10, state 15), one per state. What cannot be told has about
+  /// the standard deviation that was believed before; a rotation of imu_from_rig that was not told,
+  /// pi.
+  std::vector<Matrix25d> covariances;
   double squared_error = 0.0;       ///< In standard deviations; at the scale that fits best.
   double degrees_of_freedom = 0.0;  ///< What squared_error is in the mean.
 
   /// Whether vision and IMU do not agree: residuals are thrice as large as expected, squared.
   bool is_contradicted() const { return squared_error > 3.0 * degrees_of_freedom; }
-  /// Standard deviation of a component of the tangent vector.
-  double sigma(int component) const { return std::sqrt(covariance(component, component)); }
+  /// Residuals that are larger than expected make all as much less sure: the factor of standard
+  /// deviations.
+  double less_sure() const {
+    return std::sqrt(std::max(1.0, squared_error / std::max(1.0, degrees_of_freedom)));
+  }
+  /// With the last state.
+  const Matrix25d& covariance() const { return covariances.back(); }
+  /// Standard deviation of a component of the tangent vector, with the last state.
+  double sigma(int component) const { return std::sqrt(covariance()(component, component)); }
 };
 
 /// Finds gravity, scale, velocities, biases, and what is not told of the calibration, from poses in

@@ -241,7 +241,7 @@ TEST(InertialStart, AMetricMapTellsMore) {
     const Eigen::Vector3d velocity = found->states.back().velocity;
     EXPECT_LT((velocity - scene.motion.drift).norm(), 0.03 * scene.motion.drift.norm());
     // The velocity is as unsure as the scale.
-    const Eigen::Matrix3d covariance = found->covariance.block<3, 3>(16, 16);
+    const Eigen::Matrix3d covariance = found->covariance().block<3, 3>(16, 16);
     EXPECT_NEAR(std::sqrt(covariance.trace()), 0.01 * scene.motion.drift.norm(), 0.02);
   }
 }

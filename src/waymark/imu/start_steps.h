@@ -61,7 +61,8 @@ struct InertialUnknowns {
 /// The most likely unknowns, how sure they are and how well they fit.
 struct InertialRefinement {
   InertialUnknowns unknowns;
-  Matrix25d covariance;  ///< Of (setup, last state); not finite where the equations are singular.
+  /// Of the setup and each state; not finite where the equations are singular.
+  std::vector<Matrix25d> covariances;
   double squared_error = 0.0;
 };
 

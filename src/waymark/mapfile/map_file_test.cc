@@ -150,6 +150,31 @@ StoredMap map_with_markers() {
   return stored;
 }
 
+TEST(MapFile, HoldsTheImu) {
+  const TemporaryFolder folder;
+  StoredMap saved = map_with_markers();
+  InertialReport& imu = saved.imu.emplace();
+  imu.imu_from_rig = Rigid3::exp((Vector6d() << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6).finished());
+  imu.rotation_sigma_rad = 0.001;
+  imu.lever_arm_sigma_m = 0.002;
+  imu.time_shift_s = -0.01;
+  imu.time_shift_sigma_s = 1e-4;
+  imu.biases = {{0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}};
+  imu.gravity_in_world = {0.0, 0.0, -kStandardGravity};
+  save_map(folder / "a.wmap", saved);
+  const StoredMap loaded = load_map(folder / "a.wmap");
+  ASSERT_TRUE(loaded.imu && loaded.imu->is_used);
+  EXPECT_EQ(loaded.imu->biases.accelerometer, imu.biases.accelerometer);
+  EXPECT_EQ(loaded.imu->gravity_in_world, imu.gravity_in_world);
+  const ImuCalibration told = loaded.imu->calibration();
+  EXPECT_EQ(told.imu_from_rig->matrix(), imu.imu_from_rig.matrix());
+  EXPECT_EQ(told.time_shift_s, imu.time_shift_s);
+  save_map(folder / "b.wmap", loaded);
+  EXPECT_EQ(read_text_file(folder / "a.wmap", "a map"), read_text_file(folder / "b.wmap", "a map"));
+  saved.imu->time_shift_s = 1e9;
+  EXPECT_THROW(save_map(folder / "c.wmap", saved), OutputError);
+}
+
 TEST(MapFile, HoldsMarkers) {
   const TemporaryFolder folder;
   const StoredMap saved = map_with_markers();

@@ -3,6 +3,7 @@
 #include "waymark/mapfile/map_journal.h"
 
 #include "waymark/base/check.h"
+#include "waymark/mapfile/map_imu.h"
 #include "waymark/mapfile/map_odometry.h"
 #include "waymark/mapfile/map_writer.h"
 
@@ -89,6 +90,7 @@ void MapJournal::write_change(MapRecordWriter& writer,
   write_loop_edges(writer, map);
   write_odometry(writer, map, difference.noted);
   write_markers(writer, map);
+  if (stored.imu) write_imu(writer, *stored.imu);
 }
 
 }  // namespace waymark

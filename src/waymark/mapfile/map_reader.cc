@@ -11,6 +11,7 @@
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
 #include "waymark/image/image_header.h"
+#include "waymark/mapfile/map_imu.h"
 #include "waymark/mapfile/map_layout.h"
 #include "waymark/mapfile/map_odometry.h"
 
@@ -73,6 +74,7 @@ const std::vector<MapReader::Kind>& MapReader::kinds() {
       {"loop_edge", true, &MapReader::read_loop_edge},
       {"odometry", true, &MapReader::read_odometry},
       {"marker", true, &MapReader::read_marker},
+      {"imu", true, &MapReader::read_imu},
       {"image", false, &MapReader::read_image}};
   return kKinds;
 }
@@ -308,6 +310,11 @@ void MapReader::read_odometry(MapRecord& record) {
        waymark::read_odometry(record, parts_.end_keyframe, last_noted_)) {
     put(record, parts_.odometry, noted);
   }
+}
+
+void MapReader::read_imu(MapRecord& record) {
+  if (counts_["imu"] > 1) record.fail("is a second one, expected one at most");
+  stored_.imu = waymark::read_imu(record);
 }
 
 void MapReader::read_marker(MapRecord& record) {

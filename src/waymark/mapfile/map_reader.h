@@ -57,6 +57,7 @@ class MapReader {
   void read_loop_edge(MapRecord& record);
   void read_odometry(MapRecord& record);
   void read_marker(MapRecord& record);
+  void read_imu(MapRecord& record);
   void read_image(MapRecord& record);
   std::vector<LandmarkId> read_landmark_ids(MapRecord& record, LandmarkId& last) const;
   template <class Stored>

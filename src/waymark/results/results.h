@@ -27,6 +27,7 @@
 #include "waymark/base/frame_state.h"
 #include "waymark/camera/calibration.h"
 #include "waymark/image/image_statistics.h"
+#include "waymark/imu/inertial_path.h"
 #include "waymark/imu/inertial_report.h"
 #include "waymark/results/trajectory.h"
 
@@ -200,6 +201,9 @@ bool holds_results(const std::filesystem::path& folder);
 /// trajectories. For tables with names.
 std::string format_poses_csv(const FrameTable& table,
                              std::span<const std::vector<StampedPose>> trajectories);
+
+/// The text of inertial.csv: what vision and an IMU tell together of each frame.
+std::string format_inertial_csv(std::span<const InertialMoment> moments);
 
 /// Writes frames.csv into the folder; throws OutputError.
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table);

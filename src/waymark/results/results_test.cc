@@ -184,6 +184,17 @@ TEST(Results, OfImagesWithoutTimesHaveNamesInstead) {
   EXPECT_FALSE(std::filesystem::exists(folder / "trajectory.txt"));
 }
 
+TEST(Results, TellVelocityAndBiasesOfEachFrame) {
+  InertialMoment moment;
+  moment.timestamp_ns = 5000;
+  moment.velocity = {1.0, -2.5, 0.0};
+  moment.covariance.diagonal() << 1.0, 4.0, 4.0, 9.0, 9.0, 9.0, 16.0, 0.0, 32.0;
+  moment.biases = {{0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}};
+  const std::string text = format_inertial_csv(std::vector{moment});
+  EXPECT_THAT(text,
+              ::testing::HasSubstr("accel_bias_z\n5000,1,-2.5,0,1.73205,3,4,0.01,0.02,0.03,"));
+}
+
 TEST(Results, AreKnownByTheirFiles) {
   for (const char* name : {"trajectory.txt", "trajectory_12.txt", "poses.csv", "frames.csv"}) {
     EXPECT_TRUE(is_result_name(name)) << name;

@@ -45,6 +45,10 @@ std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& ma
   return std::nullopt;
 }
 
+void Autosave::set_imu(const std::optional<InertialReport>& imu) {
+  imu_ = imu && imu->is_used ? imu : std::nullopt;
+}
+
 void Autosave::save_soon(std::function<void(const std::string& error)> on_done) {
   wanted_.push_back(std::move(on_done));
 }
@@ -71,6 +75,7 @@ StoredMap Autosave::prepare(const std::shared_ptr<const Map>& map) const {
   stored.map = map;
   stored.settings = settings_;
   stored.images = images_.images_of(*map);
+  stored.imu = imu_;
   return stored;
 }
 

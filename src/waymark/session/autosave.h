@@ -36,6 +36,8 @@ class Autosave {
   /// To be called often: saves the map when it is time, unless it is empty or the last save is
   /// still under way. Gives what went wrong with an earlier one; the next one will be tried.
   std::optional<std::string> update(const std::shared_ptr<const Map>& map);
+  /// What is known of the IMU from now on, which is saved with the map where it is used.
+  void set_imu(const std::optional<InertialReport>& imu);
   /// The next update() saves the map as soon as it can, the file by itself; on_done hears, from a
   /// later update() or the last save(), what went wrong, or nothing.
   void save_soon(std::function<void(const std::string& error)> on_done);
@@ -54,6 +56,7 @@ class Autosave {
   const Clock::duration interval_;
   const std::string settings_;
   const KeyframeImageCache& images_;
+  std::optional<InertialReport> imu_;
   Clock::time_point last_start_ = Clock::now();
   MapJournal journal_;  // Of the save under way as long as there is one.
   std::future<void> under_way_;

@@ -168,6 +168,19 @@ void write_poses(const std::filesystem::path& path, const SessionResults& result
   }
 }
 
+/// Or removes that of an earlier run.
+void write_inertial(const std::filesystem::path& folder, const SessionResults& results) {
+  std::error_code error;
+  if (results.inertial.empty()) {
+    std::filesystem::remove(folder / "inertial.csv", error);
+  } else {
+    write_file_atomically(folder / "inertial.csv", format_inertial_csv(results.inertial));
+  }
+  if (!results.at_imu_rate.empty()) {
+    write_trajectory(folder / "trajectory.txt", results.at_imu_rate, TrajectoryFormat::kTum);
+  }
+}
+
 /// Throws InputError for files that results would take the place of.
 void expect_no_results(const std::filesystem::path& folder) {
   for (const auto& entry : std::filesystem::directory_iterator(folder)) {
@@ -192,6 +205,22 @@ void add_trajectories(const Map& map,
   }
   if (!results.trajectories.empty()) {
     results.summary.num_trajectory_lines = results.trajectories.front().size();
+  }
+}
+
+/// Where the first trajectory is the one that it is of: that with most frames and with most of the
+/// map are hardly ever two.
+void add_inertial_path(const System& system, bool wants_imu_rate, SessionResults& results) {
+  const std::vector<InertialMoment>& path = system.inertial_path();
+  if (path.empty() || results.trajectories.empty()) return;
+  const auto is_first = [&](const StampedPose& pose) {
+    return pose.timestamp_ns == path.front().timestamp_ns;
+  };
+  if (std::ranges::none_of(results.trajectories.front(), is_first)) return;
+  results.inertial = path;
+  if (!wants_imu_rate) return;
+  for (const InertialMoment& moment : system.inertial_path_at_imu_rate()) {
+    results.at_imu_rate.push_back({moment.timestamp_ns, moment.world_from_rig});
   }
 }
 
@@ -230,6 +259,7 @@ SessionResults run_session(Input& input, System& system, const SessionHooks& hoo
   add_trajectories(*system.map(), list_poses(system, frames), results);
   results.summary.loop_frames = list_loops(system, frames);
   results.summary.imu = imu.report(frames);
+  add_inertial_path(system, hooks.wants_imu_rate, results);
   for (const TransferredScale& kept : system.kept_scales()) {
     results.summary.scales.push_back({kept.submap.value, kept.before.value});
   }
@@ -261,6 +291,7 @@ bool prepare_results(const std::filesystem::path& folder) {
 void write_results(const std::filesystem::path& folder, const SessionResults& results) {
   save_each(
       {[&] { write_trajectories(folder, results.trajectories, results.table.has_times); },
+       [&] { write_inertial(folder, results); },
        [&] { write_poses(folder / "poses.csv", results); },
        [&] {
          write_trajectory(folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);

@@ -33,6 +33,10 @@ struct SessionResults {
   std::vector<StampedPose> keyframes;  ///< All of the sub-map of the first trajectory.
   /// Some landmarks of the same, in its frame: see kMaxShownPoints.
   std::vector<Eigen::Vector3f> points;
+  /// Frames of the first trajectory as an IMU and vision tell them; empty without.
+  std::vector<InertialMoment> inertial;
+  /// What trajectory.txt has for the first trajectory where it is asked for at the IMU's rate.
+  std::vector<StampedPose> at_imu_rate;
   RunSummary summary;
   Image ego_mask;  ///< What was found to move along with camera 0, see System::ego_mask().
   /// What ended the session before its input did; the rest is what there was until then.
@@ -48,6 +52,7 @@ struct SessionHooks {
   std::function<void(const FrameImages&, const TrackingResult&)> on_result;
   std::function<void()> on_input_end;
   CalibrationMonitor* watch = nullptr;  ///< Its mistakes become part of the summary.
+  bool wants_imu_rate = false;          ///< Whether results have at_imu_rate.
   bool is_paced = false;  ///< Frames come at their own pace: none is read before its turn.
 };
 

@@ -179,10 +179,12 @@ PreparedInput prepare_input(const SessionOptions& options) {
 Session open_session(const SessionOptions& options) {
   Session session{prepare_input(options), {}, nullptr};
   std::shared_ptr<const Map> map;
+  std::optional<InertialReport> imu;
   if (!options.map_in.empty()) {
     StoredMap stored = load_map(options.map_in);
     map = std::move(stored.map);
     session.images = std::move(stored.images);
+    imu = stored.imu;
     if (session.input->info().setup != Setup::kMono && !is_metric(*map)) {
       throw InputError(
           options.map_in.string(),
@@ -192,6 +194,7 @@ Session open_session(const SessionOptions& options) {
   }
   session.system =
       std::make_unique<System>(session.rig, session.settings, options.timing, std::move(map));
+  if (imu) session.system->set_imu(imu->calibration());
   return session;
 }
 

@@ -15,6 +15,7 @@
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/image/opencv_image.h"
+#include "waymark/input/imu_camchain.h"
 #include "waymark/results/trajectory.h"
 #include "waymark/simulate/video_compression.h"
 
@@ -79,21 +80,6 @@ std::string comma_separated(const Eigen::Vector3d& vector) {
       "{},{},{}", unsigned_zero(vector.x()), unsigned_zero(vector.y()), unsigned_zero(vector.z()));
 }
 
-/// The lines of a camera that say how the IMU is mounted to it.
-std::string format_mounting(const ChainCamera& camera, const ImuCalibration& told) {
-  std::string text;
-  if (told.imu_from_rig) {
-    const Eigen::Matrix4d cam_from_imu =
-        (camera.cam_from_rig * told.imu_from_rig->inverse()).matrix().unaryExpr(&unsigned_zero);
-    text += "  T_cam_imu:\n";
-    for (int row = 0; row < 4; ++row) {
-      text += fmt::format("  - [{}]\n", fmt::join(cam_from_imu.row(row), ", "));
-    }
-  }
-  if (told.time_shift_s) text += fmt::format("  timeshift_cam_imu: {}\n", *told.time_shift_s);
-  return text;
-}
-
 /// Samples as EuRoC's imu0/data.csv.
 std::string format_imu_samples(std::span<const ImuSample> samples) {
   std::string text =
@@ -126,16 +112,6 @@ std::string format_imu_noise(const ImuNoise& noise, double rate_hz) {
       noise.accelerometer,
       noise.accelerometer_walk,
       rate_hz);
-}
-
-/// With T_cam_imu and timeshift_cam_imu of each camera, as far as they are told.
-std::string format_camchain_imu(const CameraChain& chain, const ImuCalibration& told) {
-  std::string text = format_camchain(chain);
-  for (std::size_t i = 0; i < chain.cameras.size(); ++i) {
-    const std::string section = fmt::format("cam{}:\n", i);
-    text.insert(text.find(section) + section.size(), format_mounting(chain.cameras[i], told));
-  }
-  return text;
 }
 
 /// Writes frames of one layout and gathers its lists.

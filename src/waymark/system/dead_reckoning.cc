@@ -48,7 +48,7 @@ DeadReckoning::DeadReckoning(const InertialKnowledge& known,
   if (!told) return;
   time_shift_s_ = told->time_shift_s;
   setup_ = told->setup;
-  first_ = {told->states.back(), told->covariance};
+  first_ = {told->states.back(), told->covariance()};
 }
 
 std::optional<ReckonedPose> DeadReckoning::to(const InertialKnowledge& known,

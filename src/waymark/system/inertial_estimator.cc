@@ -33,7 +33,6 @@ constexpr double kFarFromTold = 5.0;
 /// Larger biases of an accelerometer, in m/s^2, are those of one that measures wrong lengths.
 constexpr double kMaxAccelerometerBias = 0.8;
 /// Poses of vision err alike for long, which no number of them averages out.
-constexpr double kSystematicScale = 0.002;    // As a part.
 constexpr double kSystematicRotation = 5e-4;  // rad
 constexpr double kSystematicTimeShift_s = 2e-4;
 /// So many samples show their noise.
@@ -112,10 +111,10 @@ bool is_far_from_told(const InertialStart& start,
       found.origin_in_source() - told.imu_from_rig->origin_in_source();
   return is_far(found.rotation.angularDistance(told.imu_from_rig->rotation),
                 options.told_rotation_sigma,
-                largest_sigma(start.covariance, kRotationAt)) ||
+                largest_sigma(start.covariance(), kRotationAt)) ||
          is_far(lever_arm.norm(),
                 options.told_lever_arm_sigma,
-                largest_sigma(start.covariance, kLeverArmAt));
+                largest_sigma(start.covariance(), kLeverArmAt));
 }
 
 /// As told, but not less than the samples themselves show, and than biases usually walk.
@@ -129,26 +128,30 @@ ImuNoise noise_of(const ImuCalibration& told, std::span<const ImuSample> samples
           std::max(noise.accelerometer_walk, usual.accelerometer_walk)};
 }
 
-/// Residuals that are larger than expected make all as much less sure.
 void describe(const InertialStart& start, InertialReport& report) {
-  const double less_sure =
-      std::sqrt(std::max(1.0, start.squared_error / std::max(1.0, start.degrees_of_freedom)));
+  const double less_sure = start.less_sure();
   report.is_used = true;
   report.scale_sigma = std::hypot(less_sure * start.sigma(kLogScaleAt), kSystematicScale);
   report.gravity_in_world = start.setup.gravity;
   report.gravity_sigma_rad =
-      std::hypot(less_sure * largest_sigma(start.covariance, kGravityAt, 2), kSystematicRotation);
+      std::hypot(less_sure * largest_sigma(start.covariance(), kGravityAt, 2), kSystematicRotation);
   report.time_shift_s = start.time_shift_s;
   report.time_shift_sigma_s =
       std::hypot(less_sure * start.sigma(kTimeShiftAt), kSystematicTimeShift_s);
   report.imu_from_rig = start.setup.imu_from_rig;
   report.rotation_sigma_rad =
-      std::hypot(less_sure * largest_sigma(start.covariance, kRotationAt), kSystematicRotation);
-  report.lever_arm_sigma_m = less_sure * largest_sigma(start.covariance, kLeverArmAt);
+      std::hypot(less_sure * largest_sigma(start.covariance(), kRotationAt), kSystematicRotation);
+  report.lever_arm_sigma_m = less_sure * largest_sigma(start.covariance(), kLeverArmAt);
   report.biases = start.states.back().biases;
 }
 
 }  // namespace
+
+void InertialEstimator::set_calibration(const ImuCalibration& told) {
+  if (told.imu_from_rig) told_.imu_from_rig = told.imu_from_rig;
+  if (told.time_shift_s) told_.time_shift_s = told.time_shift_s;
+  if (told.noise) told_.noise = told.noise;
+}
 
 InertialEstimator InertialEstimator::begin_anew() const {
   InertialEstimator anew;
@@ -225,8 +228,8 @@ InertialKnowledge InertialEstimator::knowledge() const {
 }
 
 bool InertialEstimator::is_firm() const {
-  return found_ && largest_sigma(found_->covariance, kRotationAt) < kFirmRotation &&
-         largest_sigma(found_->covariance, kGyroscopeBiasAt) < kFirmBias;
+  return found_ && largest_sigma(found_->covariance(), kRotationAt) < kFirmRotation &&
+         largest_sigma(found_->covariance(), kGyroscopeBiasAt) < kFirmBias;
 }
 
 std::optional<ReckonedPose> InertialEstimator::dead_reckon(const TrajectoryMemory& memory,
@@ -274,18 +277,23 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
   const SubmapId submap = submaps_by_size(*map).front();
   look(choose_poses(list_poses(memory, *map), submap), submap, *map);
   if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
-    smooth_trajectory(knowledge(), submap, *map, memory);
+    path_ = smooth_trajectory(knowledge(), submap, *map, memory);
   }
-  if (!report_->is_used || !is_frame_free) return map;
   const bool is_metric = map->submaps()[submap.value].is_metric;
+  if (!report_->is_used || !is_frame_free) {
+    if (!is_metric) path_.clear();
+    return map;
+  }
   const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
   Sim3 level = level_and_metric();
   if (!is_scaled) level.scale = 1.0;
   report_->gravity_in_world = level.rotation * report_->gravity_in_world;
+  move_path(level);
   if (is_scaled && !report_->metric_from) {
     report_->metric_from = FrameId{static_cast<std::uint32_t>(memory.entries().size() - 1)};
   }
   if (!is_scaled) report_->metric_from.reset();
+  if (!is_metric && !is_scaled) path_.clear();
   Map next = Map::thaw(*map);
   if (is_scaled) {
     next = put_into_metres(std::move(next), submap, level);
@@ -293,6 +301,20 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
     transform_submap(next, submap, level);
   }
   return next.freeze();
+}
+
+std::vector<InertialMoment> InertialEstimator::path_at_imu_rate() const {
+  return path_.empty() ? path_ : at_imu_rate(path_, samples_, *report_);
+}
+
+void InertialEstimator::move_path(const Sim3& new_from_old) {
+  for (InertialMoment& moment : path_) {
+    const Rigid3& old = moment.world_from_rig;
+    moment.world_from_rig = {new_from_old.rotation * old.rotation, new_from_old * old.translation};
+    moment.velocity = new_from_old.rotation * moment.velocity;
+    moment.covariance.topRows<3>() *= new_from_old.scale;
+    moment.covariance.leftCols<3>() *= new_from_old.scale;
+  }
 }
 
 }  // namespace waymark

@@ -12,6 +12,7 @@
 #include <vector>
 
 #include "waymark/imu/imu_samples.h"
+#include "waymark/imu/inertial_path.h"
 #include "waymark/imu/inertial_start.h"
 #include "waymark/map/map.h"
 #include "waymark/system/dead_reckoning.h"
@@ -26,8 +27,9 @@ namespace waymark {
 /// contradicts is left out.
 class InertialEstimator {
  public:
-  /// Of the samples to come: what is known of their IMU.
-  void set_calibration(const ImuCalibration& told) { told_ = told; }
+  /// Of the samples to come: what is known of their IMU. What it does not tell stays as told
+  /// before.
+  void set_calibration(const ImuCalibration& told);
   void add(const ImuSample& sample) { samples_.add(sample); }
   bool has_samples() const { return samples_.all().size() > 2; }
 
@@ -65,6 +67,11 @@ class InertialEstimator {
   /// Empty without samples.
   const std::optional<InertialReport>& report() const { return report_; }
 
+  /// The frames of the largest part, after finish(); empty where lengths in metres are not told.
+  const std::vector<InertialMoment>& path() const { return path_; }
+  /// The same at the rate of the samples.
+  std::vector<InertialMoment> path_at_imu_rate() const;
+
  private:
   /// What puts the map into metres, level; where something was found.
   Sim3 level_and_metric() const;
@@ -72,6 +79,7 @@ class InertialEstimator {
   InertialKnowledge knowledge() const;
   /// Whether all but the states is known well.
   bool is_firm() const;
+  void move_path(const Sim3& new_from_old);
   void look(std::span<const VisionPose> poses, SubmapId submap, const Map& map);
 
   ImuCalibration told_;
@@ -82,6 +90,7 @@ class InertialEstimator {
   InertialStartOptions options_;            ///< That it was found with.
   std::optional<DeadReckoning> reckoning_;  ///< From the newest frame that had a pose when asked.
   std::optional<InertialReport> report_;
+  std::vector<InertialMoment> path_;
   bool is_placement_sent_ = false;
   std::optional<FrameId> metric_from_;
   std::size_t next_look_ = 0;  ///< Number of frames.

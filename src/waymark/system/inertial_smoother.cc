@@ -94,26 +94,47 @@ class Stretches {
   std::int64_t at_ = 0;
 };
 
+/// Of pose and velocity. Poses of vision err alike for long, which no number of them averages out.
+Eigen::Matrix<double, 9, 9> covariance_of(const InertialKnowledge& known,
+                                          const InertialStart& told,
+                                          std::size_t i) {
+  const double less_sure = told.less_sure() * told.less_sure();
+  Eigen::Matrix<double, 9, 9> covariance =
+      less_sure * told.covariances[i].block<9, 9>(kStateAt, kStateAt);
+  const Eigen::Vector3d by_scale = kSystematicScale * told.states[i].velocity;
+  covariance.diagonal().head<3>().array() += std::pow(known.options.pose_position_sigma, 2);
+  covariance.diagonal().segment<3>(3).array() += std::pow(known.options.pose_rotation_sigma, 2);
+  covariance.bottomRightCorner<3, 3>() += by_scale * by_scale.transpose();
+  return covariance;
+}
+
 void smooth_window(const InertialKnowledge& known,
                    std::span<const SmoothedFrame> window,
                    std::size_t first_wanted,
                    std::size_t end_wanted,
                    const Map& map,
-                   TrajectoryMemory& memory) {
+                   TrajectoryMemory& memory,
+                   std::vector<InertialMoment>& path) {
   std::vector<VisionPose> poses;
   for (const SmoothedFrame& frame : window) poses.push_back(frame.pose);
   const auto told = start_again(known, poses);
   if (!told) return;
   if (told->is_contradicted()) return;
   // What follows the last frame that is seen is only as good as it is at the end.
-  while (!is_sure(known, told->covariance) && end_wanted > 0 && !poses[end_wanted - 1].is_seen) {
+  while (!is_sure(known, told->covariance()) && end_wanted > 0 && !poses[end_wanted - 1].is_seen) {
     --end_wanted;
   }
   std::optional<std::int64_t> beside;
   for (std::size_t i = 0; i < end_wanted; ++i) {
     if (poses[i].is_seen) beside = window[i].index;
     if (i < first_wanted || !beside) continue;
-    memory.set_inertial_pose(window[i].index, *beside, told->states[i].rig_from_world, map);
+    const InertialState& state = told->states[i];
+    memory.set_inertial_pose(window[i].index, *beside, state.rig_from_world, map);
+    path.push_back({poses[i].timestamp_ns,
+                    state.rig_from_world.inverse(),
+                    state.velocity,
+                    covariance_of(known, *told, i),
+                    state.biases});
   }
 }
 
@@ -126,8 +147,8 @@ std::optional<InertialStart> start_again(const InertialKnowledge& known,
   InertialStartOptions options = known.options;
   options.log_scale = found.setup.log_scale;
   options.log_scale_sigma = found.sigma(kLogScaleAt);
-  options.told_lever_arm_sigma = largest_sigma(found.covariance, kLeverArmAt);
-  options.told_rotation_sigma = largest_sigma(found.covariance, kRotationAt);
+  options.told_lever_arm_sigma = largest_sigma(found.covariance(), kLeverArmAt);
+  options.told_rotation_sigma = largest_sigma(found.covariance(), kRotationAt);
   options.told_time_shift_sigma_s = found.sigma(kTimeShiftAt);
   options.pose_position_sigma *= kLooser;
   options.pose_rotation_sigma *= kLooser;
@@ -139,14 +160,15 @@ bool is_sure(const InertialKnowledge& known, const Matrix25d& covariance) {
          largest_sigma(covariance, kStateAt + 3) < kSureAngle;
 }
 
-void smooth_trajectory(const InertialKnowledge& known,
-                       SubmapId submap,
-                       const Map& map,
-                       TrajectoryMemory& memory) {
+std::vector<InertialMoment> smooth_trajectory(const InertialKnowledge& known,
+                                              SubmapId submap,
+                                              const Map& map,
+                                              TrajectoryMemory& memory) {
+  std::vector<InertialMoment> path;
   Stretches stretches(submap, map, memory);
   while (true) {
     const std::vector<SmoothedFrame> stretch = stretches.next();
-    if (stretch.empty()) return;
+    if (stretch.empty()) return path;
     for (std::size_t first = 0; first < stretch.size(); first += kWindow - 2 * kOverlap) {
       const std::size_t count = std::min(kWindow, stretch.size() - first);
       const bool is_last = first + count == stretch.size();
@@ -155,7 +177,8 @@ void smooth_trajectory(const InertialKnowledge& known,
                     first == 0 ? 0 : kOverlap,
                     is_last ? count : count - kOverlap,
                     map,
-                    memory);
+                    memory,
+                    path);
       if (is_last) break;
     }
   }

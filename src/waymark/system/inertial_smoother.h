@@ -5,7 +5,9 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <vector>
 
+#include "waymark/imu/inertial_path.h"
 #include "waymark/imu/inertial_start.h"
 #include "waymark/map/map.h"
 #include "waymark/track/trajectory_memory.h"
@@ -14,6 +16,9 @@ namespace waymark {
 
 /// Nothing is bridged for longer, whose errors grow beyond use.
 inline constexpr std::int64_t kMaxBridgedNs = 10'000'000'000;
+
+/// What a scale may be off by as a part, however many poses tell it.
+inline constexpr double kSystematicScale = 0.002;
 
 /// What is known of an IMU in a part of the map.
 struct InertialKnowledge {
@@ -33,10 +38,11 @@ std::optional<InertialStart> start_again(const InertialKnowledge& known,
 bool is_sure(const InertialKnowledge& known, const Matrix25d& covariance);
 
 /// Makes the poses of all frames in a part of the map those that vision and IMU tell together, and
-/// gives those to frames that vision did not find, as long as stretches without are short.
-void smooth_trajectory(const InertialKnowledge& known,
-                       SubmapId submap,
-                       const Map& map,
-                       TrajectoryMemory& memory);
+/// gives those to frames that vision did not find, as long as stretches without are short. Gives
+/// the moments of these frames, in map units.
+std::vector<InertialMoment> smooth_trajectory(const InertialKnowledge& known,
+                                              SubmapId submap,
+                                              const Map& map,
+                                              TrajectoryMemory& memory);
 
 }  // namespace waymark

@@ -42,7 +42,7 @@ class System::Impl {
   std::size_t max_prepared() const { return preparation_.max_prepared(); }
   void set_imu(const ImuCalibration& calibration) { inertial_.set_calibration(calibration); }
   void feed_imu(const ImuSample& sample) { inertial_.add(sample); }
-  const std::optional<InertialReport>& inertial() const { return inertial_.report(); }
+  const InertialEstimator& inertial() const { return inertial_; }
   void finish();
   void keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory);
   void set_mapping(bool is_on);
@@ -223,7 +223,13 @@ void System::prepare(const FrameImages& images, std::shared_ptr<const void> owne
 }
 void System::set_imu(const ImuCalibration& calibration) { impl_->set_imu(calibration); }
 void System::feed_imu(const ImuSample& sample) { impl_->feed_imu(sample); }
-const std::optional<InertialReport>& System::inertial() const { return impl_->inertial(); }
+const std::optional<InertialReport>& System::inertial() const { return impl_->inertial().report(); }
+const std::vector<InertialMoment>& System::inertial_path() const {
+  return impl_->inertial().path();
+}
+std::vector<InertialMoment> System::inertial_path_at_imu_rate() const {
+  return impl_->inertial().path_at_imu_rate();
+}
 std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
 void System::keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory) {

@@ -31,6 +31,7 @@
 #include "waymark/camera/rig.h"
 #include "waymark/image/image.h"
 #include "waymark/imu/imu.h"
+#include "waymark/imu/inertial_path.h"
 #include "waymark/imu/inertial_report.h"
 #include "waymark/map/map.h"
 #include "waymark/marker/survey.h"
@@ -92,13 +93,19 @@ class System {
   /// result stays valid until the next call.
   const TrackingResult& feed(const FrameImages& images);
 
-  /// What is known of the IMU whose samples come; before the first of them. Nothing need be.
+  /// What is known of the IMU whose samples come; before the first of them. Nothing need be; what
+  /// this does not tell stays as it was told before.
   void set_imu(const ImuCalibration& calibration);
   /// One measurement of an IMU; times must increase, others are left out. Before or after the image
   /// of its time: a frame makes use of what was fed before it, the whole way of all.
   void feed_imu(const ImuSample& sample);
   /// What it told so far, nothing without samples. After finish(): final.
   const std::optional<InertialReport>& inertial() const;
+  /// What it and vision tell together of the frames of the largest part of the map, after finish();
+  /// empty where lengths are not known in metres. Its poses are those of trajectory().
+  const std::vector<InertialMoment>& inertial_path() const;
+  /// The same at the rate of its samples.
+  std::vector<InertialMoment> inertial_path_at_imu_rate() const;
 
   /// Has other threads find the features of a frame that is fed later, while those before it are
   /// tracked: with the images of max_prepared() frames at hand all cores are busy. Only time

@@ -1,0 +1,88 @@
+// Copyright the Waymark authors.
+// SPDX-License-Identifier: Apache-2.0
+#include "waymark/imu/inertial_path.h"
+
+#include <cmath>
+#include <optional>
+#include <utility>
+
+#include "waymark/imu/imu_health.h"
+#include "waymark/imu/inertial_residual.h"
+
+namespace waymark {
+namespace {
+
+constexpr std::int64_t kMaxIntegratedNs = 10'000'000'000;
+
+/// Moments of the samples between two others, without what is missing to the second one; the last
+/// is that of the second one. Empty where samples are missing.
+std::vector<InertialMoment> integrate(const InertialMoment& first,
+                                      std::int64_t end_ns,
+                                      const ImuSamples& samples,
+                                      const InertialReport& report) {
+  const InertialSetup setup{report.gravity_in_world, 0.0, report.imu_from_rig, 0.0};
+  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * report.time_shift_s));
+  const std::vector<ImuSample> between =
+      samples.between(first.timestamp_ns + shift_ns, end_ns + shift_ns);
+  std::vector<InertialMoment> moments;
+  InertialEstimate estimate{{first.world_from_rig.inverse(), first.velocity, first.biases}, {}};
+  for (std::size_t i = 1; i < between.size(); ++i) {
+    const auto next = predict(estimate,
+                              samples,
+                              between[i - 1].timestamp_ns,
+                              between[i].timestamp_ns,
+                              default_imu_noise(),
+                              setup);
+    if (!next) return {};
+    estimate.state = next->state;
+    moments.push_back({between[i].timestamp_ns - shift_ns,
+                       estimate.state.rig_from_world.inverse(),
+                       estimate.state.velocity,
+                       first.covariance,
+                       first.biases});
+  }
+  return moments;
+}
+
+}  // namespace
+
+ImuCalibration InertialReport::calibration() const {
+  constexpr double kToldRotation = 0.01;  // rad
+  constexpr double kToldLeverArm_m = 0.02;
+  constexpr double kToldTimeShift_s = 1e-3;
+  ImuCalibration told;
+  if (!is_used) return told;
+  if (rotation_sigma_rad < kToldRotation && lever_arm_sigma_m < kToldLeverArm_m) {
+    told.imu_from_rig = imu_from_rig;
+  }
+  if (time_shift_sigma_s < kToldTimeShift_s) told.time_shift_s = time_shift_s;
+  return told;
+}
+
+std::vector<InertialMoment> at_imu_rate(std::span<const InertialMoment> moments,
+                                        const ImuSamples& samples,
+                                        const InertialReport& report) {
+  std::vector<InertialMoment> all;
+  for (std::size_t i = 0; i < moments.size(); ++i) {
+    all.push_back(moments[i]);
+    if (i + 1 == moments.size()) break;
+    const InertialMoment& second = moments[i + 1];
+    const std::int64_t duration_ns = second.timestamp_ns - moments[i].timestamp_ns;
+    if (duration_ns > kMaxIntegratedNs) continue;
+    auto between = integrate(moments[i], second.timestamp_ns, samples, report);
+    if (between.empty()) continue;
+    const InertialMoment end = between.back();
+    between.pop_back();
+    const Vector6d missing = (end.world_from_rig.inverse() * second.world_from_rig).log();
+    for (InertialMoment& moment : between) {
+      const double part = static_cast<double>(moment.timestamp_ns - moments[i].timestamp_ns) /
+                          static_cast<double>(duration_ns);
+      moment.world_from_rig = moment.world_from_rig * Rigid3::exp(part * missing);
+      moment.velocity += part * (second.velocity - end.velocity);
+      all.push_back(moment);
+    }
+  }
+  return all;
+}
+
+}  // namespace waymark
