@@ -6,6 +6,8 @@
 #include <thread>
 #include <utility>
 
+#include "waymark/input/imu_stream.h"
+
 namespace waymark {
 namespace {
 
@@ -43,6 +45,7 @@ void LiveControl::begin(const ControlledParts& parts, const InputInfo& input) {
   parts_.emplace(parts);
   const bool is_again = publisher_.has_value();
   publisher_.emplace(viewer_, input.num_frames, info_);
+  if (input.imu) publisher_->leave_out_imu(fault_of(*input.imu));
   if (is_again) publisher_->reset();
 }
 

@@ -59,6 +59,7 @@ export class MockServer {
     this.doing = "";
     this.requests = [];
     this.calibration = [];
+    this.imu = undefined;
     this.dots = random(11);
     this.reset();
     for (let i = 0; i < skip; ++i) this.world.step();
@@ -140,7 +141,7 @@ export class MockServer {
       stages_ms: [0.45 * t, 0.2 * t, 0, 0.08 * t, 0.25 * t, 0, 0, 0.02 * t], tracking_ms: t, tracking_ms_median: 12.4,
       frames: world.frames.length, frames_total: 3682, tracked: world.frames.filter((each) => each.state === 1).length, unreadable: 0, dropped: 0,
       lost_count: 1, keyframes: world.keyframes.length, landmarks: world.landmarks.size, submaps: world.submaps.length, loops: world.loops.length,
-      frames_per_s: 20, calibration: this.calibration, clients: this.sockets?.clients.size ?? 0,
+      frames_per_s: 20, calibration: this.calibration, imu: this.imu, clients: this.sockets?.clients.size ?? 0,
     };
   }
 

@@ -12,6 +12,7 @@ import { CameraPanel } from "./ui/camera_panel";
 import { Controls } from "./ui/controls";
 import { AxesFigure } from "./ui/axes_figure";
 import { byId, Choice, setIcon, setText } from "./ui/dom";
+import { ImuPanel } from "./ui/imu_panel";
 import { Inspector } from "./ui/inspector";
 import { Legend } from "./ui/legend";
 import { Measure } from "./ui/measure";
@@ -40,6 +41,7 @@ export class App implements Listener {
   private readonly controls = new Controls(this.connection);
   private readonly camera = new CameraPanel();
   private readonly calibration = new CalibrationPanel();
+  private readonly imu = new ImuPanel();
   private readonly legend = new Legend(this.scene, this.measure);
   private readonly axes = new AxesFigure(this.scene);
   private readonly places = new Places(this.store, {
@@ -102,6 +104,10 @@ export class App implements Listener {
     this.session.setStatus(status);
     this.controls.setStatus(status);
     this.calibration.show(status.calibration);
+    this.imu.show(status.imu);
+    this.measure.metricPart = status.imu?.metric_submap ?? null;
+    // What was known goes on while a new part is compared.
+    if (status.imu?.gravity || status.keyframes === 0) this.scene.setGravity(status.imu?.gravity ?? null);
     this.report.statusTaken(status);
   }
 

@@ -53,6 +53,22 @@ export interface Status {
   frames_per_s: number;
   calibration: CalibrationChange[];
   clients: number;
+  /** Not there in a session without one, nor from older programs. */
+  imu?: ImuStatus;
+}
+
+/** What an IMU measures beside the camera, and tells of the map. */
+export interface ImuStatus {
+  rate_hz: number | null;
+  is_used: boolean;
+  /** Why it is not used; empty: it was not compared with the images yet. */
+  reason: string;
+  submap: number | null;
+  /** In metres since the IMU told these, whatever the message of sub-maps says. */
+  metric_submap: number | null;
+  /** Unit vector in the frame of the sub-map. */
+  gravity: number[] | null;
+  velocity_m_s: number[] | null;
 }
 
 /** A number of the calibration that the images changed; in px or rad, or without a unit. */

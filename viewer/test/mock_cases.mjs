@@ -161,7 +161,7 @@ async function helps(context) {
   await page.click("#help");
   await page.click("#help-panel form button");
   assert.ok(await page.isHidden("#help-panel"));
-  const lengths = await page.$$eval("#axes line", (lines) => lines.map((line) => Math.hypot(line.x2.baseVal.value, line.y2.baseVal.value)));
+  const lengths = await page.$$eval("#axes g:not([hidden]) line", (lines) => lines.map((line) => Math.hypot(line.x2.baseVal.value, line.y2.baseVal.value)));
   assert.ok(lengths.length === 3 && Math.max(...lengths) > 10, "the axes are drawn");
   assert.deepEqual(page.problems, []);
 }
@@ -269,6 +269,36 @@ async function tellsOfTheCalibration(context) {
   await picture(page, `${context.pictures}/desktop_calibration.png`);
   mock.calibration = [];
   await page.waitForSelector("#calibration", { state: "hidden" });
+  assert.deepEqual(page.problems, []);
+}
+
+/** What the IMU of a session tells, and nothing of a session without; gravity is downwards in the picture. */
+async function tellsOfTheImu(context) {
+  const { mock, page } = await serve(context, { world: "walk", skip: 200, isFree: true });
+  await until(page, isOpen);
+  assert.ok(await page.isHidden("#imu") && (await page.isHidden("#axes .gravity")));
+  const saysSoon = (words) => page.waitForFunction((text) => document.querySelector("#imu").innerText.includes(text), words);
+  mock.imu = { rate_hz: 199.96, is_used: false, reason: "", submap: null, metric_submap: null, gravity: null, velocity_m_s: null };
+  await page.waitForSelector("#imu:not([hidden])");
+  await saysSoon("Not compared with the images yet");
+  assert.ok(await page.isHidden("#imu-facts"));
+  mock.imu = { ...mock.imu, reason: "it contradicts the images" };
+  await saysSoon("Not used: it contradicts the images");
+  mock.imu = { ...mock.imu, is_used: true, reason: "", submap: 0, gravity: [0, 0.8, 0.6] };
+  await saysSoon("not yet");
+  assert.equal(await page.innerText("#imu-speed"), "–");
+  assert.match(await page.innerText("#scale"), / map units?$/);
+  mock.imu = { ...mock.imu, metric_submap: 0, gravity: [0, 0, -1], velocity_m_s: [0.3, 0, -0.4] };
+  await saysSoon("yes, z up");
+  assert.deepEqual([await page.innerText("#imu-speed"), await page.innerText("#imu-rate")], ["0.50 m/s", "200 Hz"]);
+  await page.waitForFunction(() => {
+    const [x, y] = ["x2", "y2"].map((name) => Number(document.querySelector("#axes .gravity line").getAttribute(name)));
+    return Math.abs(x) < 1 && y > 10;
+  });
+  await page.waitForFunction(() => document.querySelector("#scale").textContent.endsWith(" m"));
+  await picture(page, `${context.pictures}/desktop_imu.png`);
+  mock.imu = undefined;
+  await page.waitForSelector("#imu", { state: "hidden" });
   assert.deepEqual(page.problems, []);
 }
 
@@ -442,6 +472,6 @@ async function drawsLargeMaps(context) {
 
 export const mockCases = [
   growsAndAgrees, controlsAct, looksFromEverywhere, showsWhatIsClicked, goesToKeyframesAndParts, helps, playsTheSession, connectsAgain, remembersTheEnd,
-  measuresAndScales, measuresOnly, showsKeyframeImages, showsMarkersAndEdges, saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, followsItsWindow, followsItsScreen,
-  drawsLargeMaps,
+  measuresAndScales, measuresOnly, showsKeyframeImages, showsMarkersAndEdges, saysWhatIsMissing, worksWithoutWebGl, tellsOfTheCalibration, tellsOfTheImu,
+  followsItsWindow, followsItsScreen, drawsLargeMaps,
 ];

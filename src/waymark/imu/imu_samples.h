@@ -30,6 +30,9 @@ class ImuSamples {
 
   std::span<const ImuSample> all() const { return samples_; }
 
+  /// Median of the last hundred or so; 0 before there are two samples.
+  std::int64_t period_ns() const { return period_ns_; }
+
   /// Whether samples tell all from begin_ns to end_ns (not before begin_ns).
   ImuCoverage coverage(std::int64_t begin_ns, std::int64_t end_ns) const;
   /// Linear between the neighbours; nothing outside of the samples and in gaps.
@@ -48,7 +51,7 @@ class ImuSamples {
   void update_period();
 
   std::vector<ImuSample> samples_;
-  std::int64_t period_ns_ = 0;  ///< Median of the last hundred or so.
+  std::int64_t period_ns_ = 0;
   std::size_t num_rejected_ = 0;
   std::size_t num_since_period_ = 0;
 };

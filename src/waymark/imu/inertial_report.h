@@ -19,8 +19,10 @@ struct InertialReport {
   /// In mono from which frame on it told the unit of length; nothing where it did not, or where
   /// that is known otherwise.
   std::optional<FrameId> metric_from;
+  SubmapId metric_submap;    ///< The part of the map that is in metres from then on.
+  SubmapId submap;           ///< The part of the map that it was compared with.
   double scale_sigma = 0.0;  ///< Of the logarithm of metres per map unit.
-  /// Acceleration of free fall in the frame of the map, m/s^2.
+  /// Acceleration of free fall in the frame of `submap`, m/s^2.
   Eigen::Vector3d gravity_in_world = Eigen::Vector3d::Zero();
   double gravity_sigma_rad = 0.0;   ///< Of its direction.
   double time_shift_s = 0.0;        ///< What is added to the time of an image for the IMU's clock.

@@ -159,6 +159,11 @@ InertialEstimator InertialEstimator::begin_anew() const {
   return anew;
 }
 
+std::optional<double> InertialEstimator::rate_hz() const {
+  if (samples_.period_ns() == 0) return std::nullopt;
+  return 1e9 / static_cast<double>(samples_.period_ns());
+}
+
 std::optional<SubmapPlacement> InertialEstimator::update(const TrajectoryMemory& memory,
                                                          const Map& map) {
   const std::size_t num_frames = memory.entries().size();
@@ -184,9 +189,11 @@ Sim3 InertialEstimator::level_and_metric() const {
 void InertialEstimator::note_placement(const SubmapPlacement& placement, FrameId frame) {
   if (metric_from_) return;
   metric_from_ = frame;
+  metric_submap_ = placement.submap;
   reckoning_.reset();
   const auto& [rotation, translation, scale] = placement.new_from_old;
   if (report_) report_->metric_from = frame;
+  if (report_) report_->metric_submap = placement.submap;
   if (report_) report_->gravity_in_world = rotation * report_->gravity_in_world;
   if (!found_ || found_in_ != placement.submap) return;
   found_->setup.gravity = rotation * found_->setup.gravity;
@@ -210,6 +217,8 @@ void InertialEstimator::look(std::span<const VisionPose> poses, SubmapId submap,
   }
   report_.emplace();
   report_->metric_from = metric_from_;
+  report_->metric_submap = metric_submap_;
+  report_->submap = submap;
   if (!found_) {
     report_->reason = "too little was seen and measured at the same time";
   } else if (found_->is_contradicted()) {

@@ -31,6 +31,8 @@ class InertialEstimator {
   /// before.
   void set_calibration(const ImuCalibration& told);
   void add(const ImuSample& sample) { samples_.add(sample); }
+  /// Samples per second of late; nothing before there are two.
+  std::optional<double> rate_hz() const;
   bool has_samples() const { return samples_.all().size() > 2; }
 
   /// The same IMU, of a session that begins anew.
@@ -93,6 +95,7 @@ class InertialEstimator {
   std::vector<InertialMoment> path_;
   bool is_placement_sent_ = false;
   std::optional<FrameId> metric_from_;
+  SubmapId metric_submap_;
   std::size_t next_look_ = 0;  ///< Number of frames.
 };
 

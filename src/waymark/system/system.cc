@@ -230,6 +230,7 @@ const std::vector<InertialMoment>& System::inertial_path() const {
 std::vector<InertialMoment> System::inertial_path_at_imu_rate() const {
   return impl_->inertial().path_at_imu_rate();
 }
+std::optional<double> System::imu_rate_hz() const { return impl_->inertial().rate_hz(); }
 std::size_t System::max_prepared() const { return impl_->max_prepared(); }
 void System::finish() { impl_->finish(); }
 void System::keep_map_in(std::shared_ptr<std::pmr::memory_resource> memory) {

@@ -106,6 +106,8 @@ class System {
   const std::vector<InertialMoment>& inertial_path() const;
   /// The same at the rate of its samples.
   std::vector<InertialMoment> inertial_path_at_imu_rate() const;
+  /// Samples per second of late; nothing before there are two.
+  std::optional<double> imu_rate_hz() const;
 
   /// Has other threads find the features of a frame that is fed later, while those before it are
   /// tracked: with the images of max_prepared() frames at hand all cores are busy. Only time

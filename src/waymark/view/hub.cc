@@ -117,6 +117,7 @@ bool ViewHub::take_updates() {
   if (update->info) greet(*std::move(update->info));
   status_ = update->status;
   const std::vector<Message> messages = scene_.advance(*update, !clients_.empty());
+  if (status_.imu) status_.imu->velocity_m_s = scene_.velocity(status_.imu->metric_submap);
   snapshot_.clear();
   for (const auto& [number, client] : clients_) {
     if (update->is_reset) {

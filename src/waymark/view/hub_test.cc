@@ -111,6 +111,23 @@ TEST_F(Hub, GreetsAndThenTellsTheStatusWhenItChanges) {
   EXPECT_EQ(json::parse(hub_.status()), status);
 }
 
+TEST_F(Hub, ASessionWithAnImuTellsTheVelocity) {
+  const auto reader = join();
+  Map map;
+  const SubmapId submap = map.add_submap(true);
+  ViewUpdate update;
+  update.map = map.freeze();
+  update.status.imu.emplace();
+  for (std::uint32_t i = 0; i < 2; ++i) {
+    const Rigid3 pose(Eigen::Quaterniond::Identity(), Eigen::Vector3d(0.0, 0.0, 0.5 * i));
+    update.frames.push_back(
+        {{.submap = submap}, FrameId{i}, 250'000'000 * std::int64_t{i}, 0.0f, {}, pose});
+  }
+  push(std::move(update));
+  tick();
+  EXPECT_EQ(reader->of_type("status").back()["imu"]["velocity_m_s"], json({0.0, 0.0, 2.0}));
+}
+
 /// While the input is opened and its calibration found: what is done, and who may be asked for
 /// what.
 TEST_F(Hub, TellsWhatIsDoneBeforeThereIsASession) {

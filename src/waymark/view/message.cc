@@ -51,6 +51,16 @@ json array_of(const std::vector<CalibrationEstimate>& calibration) {
   return list;
 }
 
+json describe(const ImuStatus& imu) {
+  return {{"rate_hz", imu.rate_hz ? json(rounded(*imu.rate_hz)) : json(nullptr)},
+          {"is_used", imu.is_used},
+          {"reason", imu.reason},
+          {"submap", id_or_null(imu.submap)},
+          {"metric_submap", id_or_null(imu.metric_submap)},
+          {"gravity", imu.gravity ? array_of(*imu.gravity) : json(nullptr)},
+          {"velocity_m_s", imu.velocity_m_s ? array_of(*imu.velocity_m_s) : json(nullptr)}};
+}
+
 /// Distance of a feature from where its landmark should be seen.
 double error_px(const Keyframe& keyframe, std::uint32_t feature, const Landmark& landmark) {
   const Features& features = *keyframe.features;
@@ -222,34 +232,36 @@ std::string format_status(const SessionStatus& status, const Map& map, std::size
   for (const double ms : status.stages.ms) stages.push_back(rounded(ms));
   std::size_t num_submaps = 0;
   for (const Submap& submap : map.submaps()) num_submaps += !submap.joined_into.is_valid();
-  return dump(
-      {{"type", "status"},
-       {"phase", kPhases.at(static_cast<std::size_t>(status.phase))},
-       {"doing", status.doing},
-       {"is_mapping", status.is_mapping},
-       {"frame", status.frame ? json(status.frame->value) : json(nullptr)},
-       {"time_s", rounded(status.time_s)},
-       {"state", to_string(status.newest.state)},
-       {"reason", to_string(status.newest.reason)},
-       {"submap", id_or_null(status.newest.submap)},
-       {"matches", status.newest.num_matches},
-       {"inliers", status.newest.num_inliers},
-       {"stages_ms", stages},
-       {"tracking_ms", rounded(status.stages.tracking_ms())},
-       {"tracking_ms_median", rounded(status.median_tracking_ms)},
-       {"frames", status.num_frames},
-       {"frames_total", status.num_frames_total ? json(*status.num_frames_total) : json(nullptr)},
-       {"tracked", status.num_tracked},
-       {"unreadable", status.num_unreadable},
-       {"dropped", status.num_dropped},
-       {"lost_count", status.lost_count},
-       {"keyframes", map.keyframes().size()},
-       {"landmarks", map.landmarks().size()},
-       {"submaps", num_submaps},
-       {"loops", map.measured_loop_edges().size()},
-       {"frames_per_s", rounded(status.frames_per_s)},
-       {"calibration", array_of(status.calibration)},
-       {"clients", num_clients}});
+  json object = {
+      {"type", "status"},
+      {"phase", kPhases.at(static_cast<std::size_t>(status.phase))},
+      {"doing", status.doing},
+      {"is_mapping", status.is_mapping},
+      {"frame", status.frame ? json(status.frame->value) : json(nullptr)},
+      {"time_s", rounded(status.time_s)},
+      {"state", to_string(status.newest.state)},
+      {"reason", to_string(status.newest.reason)},
+      {"submap", id_or_null(status.newest.submap)},
+      {"matches", status.newest.num_matches},
+      {"inliers", status.newest.num_inliers},
+      {"stages_ms", stages},
+      {"tracking_ms", rounded(status.stages.tracking_ms())},
+      {"tracking_ms_median", rounded(status.median_tracking_ms)},
+      {"frames", status.num_frames},
+      {"frames_total", status.num_frames_total ? json(*status.num_frames_total) : json(nullptr)},
+      {"tracked", status.num_tracked},
+      {"unreadable", status.num_unreadable},
+      {"dropped", status.num_dropped},
+      {"lost_count", status.lost_count},
+      {"keyframes", map.keyframes().size()},
+      {"landmarks", map.landmarks().size()},
+      {"submaps", num_submaps},
+      {"loops", map.measured_loop_edges().size()},
+      {"frames_per_s", rounded(status.frames_per_s)},
+      {"calibration", array_of(status.calibration)},
+      {"clients", num_clients}};
+  if (status.imu) object["imu"] = describe(*status.imu);
+  return dump(object);
 }
 
 std::string format_reply(std::optional<std::uint64_t> number,

@@ -165,10 +165,32 @@ TEST(Protocol, TextsHaveWhatTheDocumentPromises) {
   EXPECT_EQ(
       status["calibration"],
       json::parse(R"([{"name": "cam0.k1", "given": -0.283, "change": 2.5e-5, "sigma": 3e-6}])"));
+  EXPECT_FALSE(status.contains("imu")) << "this session has none";
   EXPECT_EQ(status["stages_ms"].size(), hello["stages"].size());
   const json reply = json::parse(format_keyframe(Map(), KeyframeId{3}, 5));
   EXPECT_EQ(reply["ok"], false);
   EXPECT_EQ(reply["request"], 5);
+}
+
+TEST(Protocol, AStatusTellsOfTheImuAsTheDocumentSays) {
+  const auto told = [](const ImuStatus& imu) {
+    SessionStatus now;
+    now.imu = imu;
+    return json::parse(format_status(now, Map(), 1)).at("imu");
+  };
+  ImuStatus imu = {.rate_hz = 200.0, .is_used = true, .submap = SubmapId{0}};
+  imu.gravity = -Eigen::Vector3d::UnitZ();
+  imu.velocity_m_s = Eigen::Vector3d(0.42, -0.1, 0.03);
+  std::ifstream file(WAYMARK_PROTOCOL_DOCUMENT);
+  std::string line;
+  while (std::getline(file, line) && !line.starts_with("\"imu\": ")) continue;
+  EXPECT_EQ(told(imu), json::parse("{" + line + "}").at("imu"));
+  const json left_out = told({.reason = "it always shows the same"});
+  EXPECT_EQ(left_out["reason"], "it always shows the same");
+  EXPECT_EQ(left_out["is_used"], false);
+  for (const char* name : {"rate_hz", "submap", "metric_submap", "gravity", "velocity_m_s"}) {
+    EXPECT_TRUE(left_out.at(name).is_null()) << name;
+  }
 }
 
 }  // namespace

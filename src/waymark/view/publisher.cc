@@ -78,6 +78,7 @@ void ViewPublisher::tell(const System& system,
   count(result);
   update_.map = system.map();
   note_calibration(system);
+  note_imu(system);
   note_frames(input, result);
   update_.colors.push_back(colors_of(result, input.image0));
   if (channel_.wants_image.exchange(false, std::memory_order_relaxed)) {
@@ -114,6 +115,21 @@ void ViewPublisher::note_calibration(const System& system) {
   std::vector<CalibrationEstimate>& calibration = update_.status.calibration;
   calibration = system.calibration();
   std::erase_if(calibration, [](const auto& estimate) { return !estimate.is_changed(); });
+}
+
+void ViewPublisher::note_imu(const System& system) {
+  ImuStatus imu = {.rate_hz = system.imu_rate_hz(), .reason = imu_fault_};
+  if (!imu.rate_hz && imu_fault_.empty()) return;
+  if (const std::optional<InertialReport>& report = system.inertial()) {
+    imu.is_used = report->is_used;
+    imu.reason = report->reason;
+    imu.submap = report->submap;
+    if (report->metric_from) imu.metric_submap = report->metric_submap;
+    // Where a part was joined to another it lies otherwise from then on.
+    const bool is_joined = update_.map->submaps()[imu.submap.value].joined_into.is_valid();
+    if (imu.is_used && !is_joined) imu.gravity = report->gravity_in_world.normalized();
+  }
+  update_.status.imu = std::move(imu);
 }
 
 void ViewPublisher::count(const FrameStatus& newest) {
@@ -179,6 +195,7 @@ void ViewPublisher::finish(const System& system) {
   status.num_tracked = 0;
   update_.map = system.map();
   note_calibration(system);
+  note_imu(system);
   for (const TrajectoryFrame& frame : system.trajectory()) {
     update_.frames.push_back({{.state = frame.state, .submap = frame.submap},
                               FrameId{first_frame_.value + frame.frame.value},

@@ -14,6 +14,7 @@
 #include <deque>
 #include <memory>
 #include <optional>
+#include <string>
 #include <utility>
 
 #include "waymark/system/system.h"
@@ -36,6 +37,8 @@ class ViewPublisher {
                 std::optional<SessionInfo> info = std::nullopt)
       : ViewPublisher(viewer.channel(), num_frames_total, std::move(info)) {}
 
+  /// The session has an IMU whose samples are not fed, for this reason.
+  void leave_out_imu(std::string reason) { imu_fault_ = std::move(reason); }
   /// A frame was fed; input is what was fed.
   void tell(const System& system, const FrameImages& input, const TrackingResult& result);
   /// A frame was not fed.
@@ -56,10 +59,12 @@ class ViewPublisher {
   void count(const FrameStatus& newest);
   void measure(const TrackingResult& result);
   void note_calibration(const System& system);
+  void note_imu(const System& system);
   void push();
 
   ViewChannel& channel_;
   ViewUpdate update_;  ///< Not taken in by the viewer yet.
+  std::string imu_fault_;
   FrameId first_frame_;
   std::shared_ptr<const Rig> rig_;          ///< That the status tells of.
   std::deque<std::int64_t> timestamps_ns_;  ///< Of all frames fed.

@@ -27,6 +27,15 @@ class PublishingSession {
     input.depth = depth_.view();
     return input;
   }
+  /// What the IMU measures until 50 ms after the next frame.
+  void feed_imu() {
+    const std::int64_t end_ns = 1'050'000'000 + 50'000'000 * std::int64_t{num_frames_};
+    for (; imu_ns_ <= end_ns; imu_ns_ += 5'000'000) {
+      const double way =
+          1e-6 * static_cast<double>(imu_ns_ % 15'000'000);  // It always shows a bit.
+      system_.feed_imu({imu_ns_, {1e-4 * way, 0.0, 0.0}, {0.0, -9.81, 1e-3 * way}});
+    }
+  }
   FrameImages black_input() {
     FrameImages black = input();
     black.image0 = black_.view();
@@ -52,6 +61,7 @@ class PublishingSession {
   DepthImage depth_;
   System system_;
   int num_frames_ = 0;
+  std::int64_t imu_ns_ = 950'000'000;
 };
 
 /// The viewer's side of the channel: keeps what it is told, and takes nothing in while it sleeps.
@@ -211,6 +221,45 @@ TEST_F(Publisher, TellsTheFinalPosesAtTheEnd) {
     const FrameSummary& note = listener_.last().frames[i];
     ASSERT_TRUE(note.final_pose);
     EXPECT_EQ(note.final_pose->matrix(), trajectory[i].world_from_rig.matrix());
+  }
+}
+
+TEST_F(Publisher, TellsOfAnImuWhereThereIsOne) {
+  feed(session_.input());
+  EXPECT_FALSE(listener_.status().imu);
+  session_.feed_imu();
+  feed(session_.input());
+  ASSERT_TRUE(listener_.status().imu);
+  EXPECT_EQ(listener_.status().imu->rate_hz, 200.0);
+  EXPECT_FALSE(listener_.status().imu->is_used);
+  EXPECT_EQ(listener_.status().imu->reason, "") << "not compared yet";
+  for (int i = 0; i < 40; ++i) {
+    session_.feed_imu();
+    feed(session_.input());
+  }
+  const std::optional<InertialReport>& report = session_.system().inertial();
+  ASSERT_TRUE(report && report->is_used) << report->reason;
+  const ImuStatus imu = *listener_.status().imu;
+  EXPECT_TRUE(imu.is_used);
+  EXPECT_EQ(imu.submap, SubmapId{0});
+  ASSERT_TRUE(imu.gravity);
+  EXPECT_LT((*imu.gravity - Eigen::Vector3d::UnitY()).norm(), 0.01);
+  session_.system().finish();
+  publisher_.finish(session_.system());
+  ASSERT_TRUE(listener_.status().imu->gravity);
+  EXPECT_LT((*listener_.status().imu->gravity + Eigen::Vector3d::UnitZ()).norm(), 0.01)
+      << "the map is level in the end";
+}
+
+TEST_F(Publisher, TellsWhyAnImuIsLeftOutAlsoAfterAReset) {
+  publisher_.leave_out_imu("it always shows the same");
+  for (int i = 0; i < 2; ++i) {
+    feed(session_.input());
+    ASSERT_TRUE(listener_.status().imu);
+    EXPECT_EQ(listener_.status().imu->reason, "it always shows the same");
+    EXPECT_FALSE(listener_.status().imu->rate_hz || listener_.status().imu->is_used);
+    session_.system().reset();
+    publisher_.reset();
   }
 }
 

@@ -12,6 +12,8 @@ namespace {
 
 /// A frame may become a keyframe long after it came: the first one of a monocular start.
 constexpr std::uint32_t kMaxFrames = 1000;
+/// That the velocity is a mean over: errors of poses are small by then.
+constexpr std::int64_t kVelocityNs = 200'000'000;
 /// Of the piece of an edge that is drawn, in pixels of the image that it was seen in.
 constexpr double kHalfEdgePx = 5.0;
 
@@ -243,6 +245,30 @@ Message TrajectoryLayer::encode(std::span<const std::uint32_t> indices, const Ma
     writer.add(static_cast<std::uint8_t>(notes_[index].reason));
   }
   return writer.finish();
+}
+
+std::optional<Eigen::Vector3d> TrajectoryLayer::velocity(const Map& map, SubmapId metric) const {
+  std::optional<Pose> last;
+  std::int64_t last_ns = 0;
+  std::optional<Eigen::Vector3d> velocity;
+  for (auto note = notes_.rbegin(); note != notes_.rend(); ++note) {
+    if (!note->pose && !note->final_pose) break;
+    const std::optional<Pose> pose = pose_of(*note, map);
+    if (!pose && !last) continue;  // Its keyframe is on its way to the map.
+    if (!pose) break;
+    if (pose->submap != metric && !map.submaps()[pose->submap.value].is_metric) break;
+    if (!last) {
+      last = pose;
+      last_ns = note->timestamp_ns;
+      continue;
+    }
+    if (pose->submap != last->submap) break;
+    const std::int64_t passed_ns = last_ns - note->timestamp_ns;
+    velocity = (last->world_from_rig.translation - pose->world_from_rig.translation) /
+               (1e-9 * static_cast<double>(passed_ns));
+    if (passed_ns >= kVelocityNs) break;
+  }
+  return velocity;
 }
 
 std::vector<Message> Scene::advance(ViewUpdate& update, bool is_watched) {

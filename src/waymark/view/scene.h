@@ -6,6 +6,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <span>
 #include <unordered_map>
 #include <vector>
@@ -106,6 +107,8 @@ class TrajectoryLayer {
   std::size_t size() const { return notes_.size(); }
   /// When the first frame came, 0 before.
   std::int64_t start_ns() const { return start_ns_; }
+  /// Of the newest frame, in m/s in the frame of its sub-map; see Scene.
+  std::optional<Eigen::Vector3d> velocity(const Map& map, SubmapId metric) const;
 
   /// Takes in new notes and the next state of the map; tells what became new by that.
   void advance(std::span<const FrameSummary> notes,
@@ -140,6 +143,12 @@ class Scene {
 
   const Map& map() const { return *map_; }
   std::int64_t start_ns() const { return trajectory_.start_ns(); }
+  /// Of the newest frame, in m/s in the frame of its sub-map, where that is metric: the mean over
+  /// about .2 s. Nothing while the camera is lost. metric: a sub-map that is, whatever the map
+  /// says.
+  std::optional<Eigen::Vector3d> velocity(SubmapId metric = {}) const {
+    return trajectory_.velocity(*map_, metric);
+  }
 
  private:
   std::shared_ptr<const Map> map_ = std::make_shared<const Map>();

@@ -299,6 +299,46 @@ TEST(Scene, GivesLandmarksTheColorOfTheirFeature) {
               ::testing::ElementsAre(10, 20, 30, 255));
 }
 
+/// A frame each 50 ms that goes .1 m along x.
+FrameSummary moving_frame(std::uint32_t number, KeyframeId reference) {
+  FrameSummary note;
+  note.state = FrameState::kTracked;
+  note.frame = FrameId{number};
+  note.timestamp_ns = 50'000'000 * std::int64_t{number};
+  note.pose = RelativePose{reference, 1.0, {}};
+  note.pose->rig_from_reference.translation.x() = -0.1 * number;
+  return note;
+}
+
+TEST(Scene, TellsTheVelocityWhereTheMapIsMetric) {
+  for (const bool is_metric : {true, false}) {
+    Map map;
+    Keyframe keyframe;
+    keyframe.submap = map.add_submap(is_metric);
+    const auto features = std::make_shared<Features>();
+    features->rig = std::make_shared<const Rig>();
+    keyframe.features = features;
+    const KeyframeId id = map.add_keyframe(keyframe);
+    Scene scene;
+    ViewUpdate update;
+    update.map = map.freeze();
+    for (std::uint32_t i = 0; i < 10; ++i) update.frames.push_back(moving_frame(i, id));
+    update.frames[2].pose->rig_from_reference.translation.y() = 7.0;  // Too long ago to matter.
+    scene.advance(update, true);
+    ASSERT_EQ(scene.velocity().has_value(), is_metric);
+    EXPECT_TRUE(scene.velocity(keyframe.submap)) << "an IMU told the metres";
+    if (!is_metric) continue;
+    EXPECT_LT((*scene.velocity() - Eigen::Vector3d(2.0, 0.0, 0.0)).norm(), 1e-9);
+    update.frames = {moving_frame(10, KeyframeId{id.value + 1})};
+    scene.advance(update, true);
+    EXPECT_TRUE(scene.velocity()) << "the keyframe of the newest is on its way to the map";
+    update.frames = {moving_frame(11, id)};
+    update.frames[0].pose.reset();
+    scene.advance(update, true);
+    EXPECT_FALSE(scene.velocity()) << "the camera is lost";
+  }
+}
+
 TEST(Scene, AResetForgetsEverything) {
   ChangingSession session(5);
   Scene scene;

@@ -66,6 +66,21 @@ struct SessionInfo {
 /// Where a session is in its course; kMap: there is none, a saved map is shown.
 enum class SessionPhase { kStarting, kRunning, kPaused, kFinishing, kDone, kMap };
 
+/// What an IMU measures beside the camera, and tells of the map.
+struct ImuStatus {
+  std::optional<double> rate_hz = {};  ///< Samples per second; nothing: none are taken.
+  bool is_used = false;                ///< Whether vision agrees with it.
+  std::string reason = {};             ///< Why it is not used; empty: not compared yet.
+  /// Where it points to in the frame of `submap`, unit.
+  std::optional<Eigen::Vector3d> gravity = {};
+  SubmapId submap = {};  ///< The part of the map that it was compared with.
+  /// The part of the map that is in metres since it told these, whatever its Submap says.
+  SubmapId metric_submap = {};
+  /// Of the newest frame, in m/s in the frame of its part of the map; nothing where that has no
+  /// metres.
+  std::optional<Eigen::Vector3d> velocity_m_s = {};
+};
+
 /// Numbers of the session, as the status message has them.
 struct SessionStatus {
   SessionPhase phase = SessionPhase::kStarting;  ///< Where the session is in its course.
@@ -84,6 +99,7 @@ struct SessionStatus {
   std::size_t lost_count = 0;                    ///< Transitions to lost.
   double frames_per_s = 0.0;                     ///< Of the recent frames.
   std::vector<CalibrationEstimate> calibration;  ///< What the images changed of it.
+  std::optional<ImuStatus> imu;                  ///< Nothing: the session has none.
 };
 
 /// What changed in the session since the update before.

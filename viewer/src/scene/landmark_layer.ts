@@ -1,7 +1,7 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
 import {
-  BufferAttribute, BufferGeometry, InstancedBufferGeometry, LineSegments, Points, ShaderMaterial, Vector2, type IUniform, type Texture,
+  BufferAttribute, BufferGeometry, InstancedBufferGeometry, LineSegments, Points, ShaderMaterial, Vector2, Vector3, type IUniform, type Texture,
 } from "three";
 import type { LandmarkTable } from "../store/landmark_table";
 import { NO_SUBMAP } from "../protocol";
@@ -34,6 +34,8 @@ export class LandmarkLayer {
   readonly edges: LineSegments<InstancedBufferGeometry, ShaderMaterial>;
   /** Between which values the ramp runs: height in map units, frame, or observations. */
   readonly low_high = { height: new Vector2(0, 1), age: new Vector2(0, 1), observations: new Vector2(0, 1) };
+  /** Of heights, a unit vector in the map's frame. */
+  readonly down = new Vector3(0, 1, 0);
   private readonly positions: Uploads;
   private readonly others: Uploads;
   private readonly ofEdges: Uploads;
@@ -58,7 +60,7 @@ export class LandmarkLayer {
     const uniforms: Record<string, IUniform> = {
       partPlaces: { value: partPlaces }, mode: { value: 1 }, range: { value: this.low_high.height },
       pointSize: { value: new Vector2() }, worldSize: { value: 0.02 }, viewHeight: { value: 1 }, fog: { value: new Vector2() },
-      ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, ground: { value: null }, dim: { value: 1 },
+      ramp: { value: [] }, parts: { value: [] }, ink: { value: null }, ground: { value: null }, dim: { value: 1 }, down: { value: this.down },
     };
     this.uniforms = uniforms;
     this.points = new Points(geometry, new ShaderMaterial({ vertexShader: pointVertex, fragmentShader: pointFragment, uniforms }));
@@ -117,8 +119,9 @@ export class LandmarkLayer {
 
   /** Measures again what the ramps run between, on a sample. */
   measure(): void {
-    const { table, low_high } = this;
-    this.percentiles((slot) => -table.position[3 * slot + 1]!, 0.03, 0.97, low_high.height);
+    const { table, low_high, down } = this;
+    const place = new Vector3();
+    this.percentiles((slot) => -place.fromArray(table.position, 3 * slot).dot(down), 0.03, 0.97, low_high.height);
     this.percentiles((slot) => table.frame[slot]!, 0, 1, low_high.age);
     this.percentiles((slot) => Math.log2(table.facts[2 * slot]!), 0.02, 0.98, low_high.observations);
   }

@@ -22,7 +22,10 @@ export type LayerName = (typeof LAYERS)[number];
 
 const MEASURE_EVERY_MS = 700;
 
-/** The map in three dimensions. The map's y points down; the group `world` turns it upright. */
+/** Which way is down in a map whose gravity is not known: that of its first camera. */
+const DOWN = new Vector3(0, 1, 0);
+
+/** The map in three dimensions. The group `world` turns it upright: the map's y points down, unless gravity tells. */
 export class Scene {
   readonly view: View;
   readonly extent = new Extent();
@@ -34,6 +37,8 @@ export class Scene {
   };
   palette!: Palette;
   needsRender = true;
+  /** Where it points to in the map's frame, unit; null where that is not known. */
+  gravity: Vector3 | null = null;
   /** Null where the browser has no WebGL. */
   private readonly renderer: WebGLRenderer | null;
   private readonly scene = new ThreeScene();
@@ -66,12 +71,11 @@ export class Scene {
     this.trail = new TrailLayer(store.trajectory, this.parts.texture);
     this.current = new CurrentCamera(this.shapes, this.parts.texture);
     const { covisibility, tree, loops } = this.keyframes.edges;
-    this.world.rotation.x = Math.PI;
     this.world.add(this.markers.squares, this.markers.signs, this.measurement.line, this.measurement.dots);
     this.world.add(this.landmarks.points, this.landmarks.edges, covisibility, tree, this.trail.mesh, loops, ...this.keyframes.glyphs.meshes);
     this.world.add(this.selection.lines, this.selection.dots, ...this.current.glyphs.meshes);
-    this.world.updateMatrixWorld();
     this.scene.add(this.ground.mesh, this.world);
+    this.turnUpright();
     this.setPalette();
     this.view.controls.addEventListener("change", () => (this.needsRender = true));
   }
@@ -103,6 +107,14 @@ export class Scene {
     this.landmarks.setColouring(colouring);
     this.keyframes.glyphs.set("byPart", colouring === "part");
     this.needsRender = true;
+  }
+
+  /** Shows the map with gravity downwards, a unit vector in its frame; null: that is not known. */
+  setGravity(gravity: readonly number[] | null): void {
+    if (gravity ? this.gravity?.equals(this.a.fromArray(gravity)) : !this.gravity) return;
+    this.gravity = gravity && new Vector3().fromArray(gravity);
+    this.turnUpright();
+    this.measure();
   }
 
   setView(name: ViewName): void {
@@ -185,6 +197,13 @@ export class Scene {
     if (!this.renderer) return Promise.resolve(null);
     this.renderer.render(this.scene, this.view.camera);
     return new Promise((resolve) => this.canvas.toBlob(resolve, "image/png"));
+  }
+
+  private turnUpright(): void {
+    const down = this.gravity ?? DOWN;
+    this.landmarks.down.copy(down);
+    this.world.quaternion.setFromUnitVectors(down, DOWN).premultiply(this.rotation.set(1, 0, 0, 0));
+    this.world.updateMatrixWorld();
   }
 
   private sync(now_ms: number): boolean {

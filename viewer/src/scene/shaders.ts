@@ -11,7 +11,7 @@ const partOffset = /* glsl */ `
   }`;
 const nowhere = "vec4(2.0, 2.0, 2.0, 1.0)";
 
-/** The colour of a landmark at a height and a distance from who looks. */
+/** The colour of a landmark at a place and a distance from who looks. */
 const landmarkTint = /* glsl */ `
   attribute float frame;
   attribute vec2 facts;
@@ -23,16 +23,17 @@ const landmarkTint = /* glsl */ `
   uniform vec3 ramp[${NUM_RAMP}];
   uniform vec3 parts[${NUM_PARTS}];
   uniform vec3 ink;
+  uniform vec3 down;
   varying vec3 tint;
   vec3 ramped(float value) {
     float x = clamp((value - range.x) / max(range.y - range.x, 1e-6), 0.0, 1.0) * ${NUM_RAMP - 1}.0;
     int i = min(int(x), ${NUM_RAMP - 2});
     return mix(ramp[i], ramp[i + 1], x - float(i));
   }
-  vec3 tint_at(float height, float distance) {
+  vec3 tint_at(vec3 place, float distance) {
     vec3 own = parts[int(mod(facts.y, ${NUM_PARTS}.0))];
     if (mode == 0) own = colour.a > 0.5 ? mix(ink, colour.rgb, 0.85) : mix(ink, ramp[2], 0.5);
-    else if (mode == 1) own = ramped(height);
+    else if (mode == 1) own = ramped(-dot(place, down));
     else if (mode == 2) own = ramped(frame);
     else if (mode == 3) own = ramped(log2(facts.x));
     return mix(own, ground, 0.6 * smoothstep(fog.x, fog.y, distance));
@@ -49,7 +50,7 @@ export const pointVertex = /* glsl */ `
     vec4 view = modelViewMatrix * vec4(position + part_offset(facts.y), 1.0);
     gl_Position = projectionMatrix * view;
     gl_PointSize = clamp(worldSize * projectionMatrix[1][1] * viewHeight / max(1e-6, -view.z), pointSize.x, pointSize.y);
-    tint = tint_at(-position.y, -view.z);
+    tint = tint_at(position, -view.z);
   }`;
 
 /** A piece of the edge that a landmark lies on: each instance is a landmark, `position.x` the end of it (-1 or 1). */
@@ -62,7 +63,7 @@ export const edgePointVertex = /* glsl */ `
     if (facts.x < 0.5 || half_ == vec3(0.0)) { gl_Position = ${nowhere}; return; }
     vec4 view = modelViewMatrix * vec4(place + position.x * half_ + part_offset(facts.y), 1.0);
     gl_Position = projectionMatrix * view;
-    tint = tint_at(-place.y, -view.z);
+    tint = tint_at(place, -view.z);
   }`;
 
 export const edgePointFragment = /* glsl */ `

@@ -19,6 +19,8 @@ interface Known {
 /** Lengths between two places that are clicked, and what scale a known one gives the map. */
 export class Measure {
   isOn = false;
+  /** That an IMU put into metres. */
+  metricPart: number | null = null;
   private readonly host = byId("measure-panel");
   private readonly button = byId("measure");
   private readonly length = make("strong", { role: "status" });
@@ -172,7 +174,7 @@ export class Measure {
   }
 
   private isMetric(part: number): boolean {
-    return this.store.submaps?.is_metric[part] !== 0;
+    return this.store.submaps?.is_metric[part] !== 0 || part === this.metricPart;
   }
 
   private units(): number | null {
