@@ -232,21 +232,27 @@ std::string format_transform(const ChainCamera& camera, const ChainCamera& previ
 
 }  // namespace
 
-Rigid3 read_transform(const ConfigNode& node, const std::string& key) {
+Eigen::MatrixXd read_square_matrix(const ConfigNode& node, const std::string& key, int size) {
   const auto fail_shape = [&] {
     throw InputError(
         node.where(),
-        fmt::format("{} is {}, expected 4 rows of 4 numbers", key, describe_value(node)));
+        fmt::format(
+            "{0} is {1}, expected {2} rows of {2} numbers", key, describe_value(node), size));
   };
-  if (node.kind != ConfigNode::Kind::kList || node.items.size() != 4) fail_shape();
-  Eigen::Matrix4d matrix;
-  for (int row = 0; row < 4; ++row) {
+  const auto count = static_cast<std::size_t>(size);
+  if (node.kind != ConfigNode::Kind::kList || node.items.size() != count) fail_shape();
+  Eigen::MatrixXd matrix(size, size);
+  for (int row = 0; row < size; ++row) {
     const std::vector<double> values =
         config_doubles(node.items[static_cast<std::size_t>(row)], fmt::format("{}[{}]", key, row));
-    if (values.size() != 4) fail_shape();
-    matrix.row(row) = Eigen::Map<const Eigen::RowVector4d>(values.data());
+    if (values.size() != count) fail_shape();
+    matrix.row(row) = Eigen::Map<const Eigen::RowVectorXd>(values.data(), size);
   }
-  return rigid_from_matrix(matrix, node.where(), key);
+  return matrix;
+}
+
+Rigid3 read_transform(const ConfigNode& node, const std::string& key) {
+  return rigid_from_matrix(read_square_matrix(node, key, 4), node.where(), key);
 }
 
 std::optional<CameraChain> read_camchain(const ConfigNode& config) {

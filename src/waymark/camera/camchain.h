@@ -55,6 +55,9 @@ std::string format_camchain(const CameraChain& chain);
 Rig make_rig(const CameraChain& chain,
              const CameraRegistry& registry = CameraRegistry::with_builtin_models());
 
+/// A matrix of so many rows of as many numbers. Throws InputError.
+Eigen::MatrixXd read_square_matrix(const ConfigNode& node, const std::string& key, int size);
+
 /// A rigid motion from 4 rows of 4 numbers of a document, as below. Throws InputError.
 Rigid3 read_transform(const ConfigNode& node, const std::string& key);
 

@@ -35,6 +35,15 @@ struct ImuBiases {
   Eigen::Vector3d accelerometer = Eigen::Vector3d::Zero();  ///< m/s^2.
 };
 
+/// Scale and misalignment of both sensors, as Kalibr models them: measured, but for bias and noise,
+/// are gyroscope * turn + by_acceleration * push and accelerometer * push, where turn (rad/s) and
+/// push (m/s^2) are the true ones in the axes of the IMU.
+struct ImuIntrinsics {
+  Eigen::Matrix3d gyroscope = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d by_acceleration = Eigen::Matrix3d::Zero();  ///< rad/s per m/s^2.
+  Eigen::Matrix3d accelerometer = Eigen::Matrix3d::Identity();
+};
+
 /// What is known of an IMU and of how it is mounted. What is not told is found.
 struct ImuCalibration {
   std::optional<Rigid3> imu_from_rig;  ///< The rig's frame is that of camera 0.
@@ -42,6 +51,8 @@ struct ImuCalibration {
   /// timeshift_cam_imu).
   std::optional<double> time_shift_s;
   std::optional<ImuNoise> noise;  ///< Of its samples.
+  /// What samples are corrected by when they are read.
+  std::optional<ImuIntrinsics> intrinsics = {};
 };
 
 }  // namespace waymark

@@ -8,6 +8,7 @@
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
 #include "waymark/input/datasets.h"
+#include "waymark/input/imu_readers.h"
 #include "waymark/input/pairing.h"
 
 namespace waymark {
@@ -178,6 +179,28 @@ Rigid3 euroc_sensor_from_camera0(const std::filesystem::path& csv_path) {
   const ConfigNode config = parse_config(source);
   if (config.find("T_BS") == nullptr) return body_from_camera0;
   return read_body_from_sensor(config, source).inverse() * body_from_camera0;
+}
+
+std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder) {
+  const std::filesystem::path mav0 = mav0_of(folder);
+  const std::filesystem::path table = mav0 / "imu0" / "data.csv";
+  if (!std::filesystem::is_regular_file(table)) return std::nullopt;
+  ImuStream stream = read_imu_file(table);
+  const std::filesystem::path sensor = mav0 / "imu0" / "sensor.yaml";
+  if (std::filesystem::exists(sensor) && std::filesystem::exists(mav0 / "cam0" / "sensor.yaml")) {
+    stream.calibration.imu_from_rig = euroc_sensor_from_camera0(table);
+  }
+  const auto take = [&](const std::filesystem::path& path, const char* section) {
+    if (!std::filesystem::exists(path)) return;
+    ConfigSource source = read_yaml(path);
+    source.key = section;
+    fill_in(stream.calibration, read_imu_calibration(parse_config(source)));
+  };
+  take(sensor, "imu0");
+  const std::filesystem::path dso = (mav0 / ".." / "dso").lexically_normal();  // Of TUM-VI.
+  take(dso / "camchain.yaml", "");
+  take(dso / "imu_config.yaml", "imu0");
+  return stream;
 }
 
 }  // namespace waymark

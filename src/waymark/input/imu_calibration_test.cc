@@ -1,5 +1,6 @@
 // Copyright the Waymark authors.
 // SPDX-License-Identifier: Apache-2.0
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 
 #include "waymark/base/settings.h"
@@ -52,6 +53,40 @@ TEST(ImuCalibration, IsReadFromFilesOfKalibr) {
   EXPECT_EQ(calibration.noise->gyroscope_walk, 2.0e-5);
   EXPECT_EQ(calibration.noise->accelerometer, 2.0e-3);
   EXPECT_EQ(calibration.noise->accelerometer_walk, 3.0e-3);
+}
+
+/// As Kalibr writes it for the model "scale-misalignment".
+TEST(ImuCalibration, CorrectsSamplesByScaleAndMisalignment) {
+  const ImuCalibration calibration = read_imu_calibration(
+      parse_config({"a.yaml",
+                    "model: scale-misalignment\n"
+                    "accelerometers:\n  M:\n  - [1.02, 0, 0]\n  - [0.01, 0.98, 0]\n  - [0, 0, 1]\n"
+                    "gyroscopes:\n  A:\n  - [0, 0, 0.01]\n  - [0, 0, 0]\n  - [0, 0, 0]\n"
+                    "  C_gyro_i:\n  - [0, -1, 0]\n  - [1, 0, 0]\n  - [0, 0, 1]\n"
+                    "  M:\n  - [1.1, 0, 0]\n  - [0, 1, 0]\n  - [0.1, 0, 0.9]\n",
+                    "imu0"}));
+  // Turning by 1, 2, 3 rad/s (in axes of the gyroscope -2, 1, 3) and pushed by 0.5, 1, 10 m/s^2.
+  const TemporaryFolder folder;
+  folder.write("imu.csv",
+               "t,wx,wy,wz,ax,ay,az\n0,-2.1,1,2.5,0.51,0.985,10\n0.01,-2.1,1,2.5,0.51,0.985,10\n");
+  InputInfo info;
+  take_imu(
+      {.imu = folder / "imu.csv", .imu_calibration = calibration},
+      [] { return std::nullopt; },
+      info);
+  ASSERT_TRUE(info.imu);
+  const ImuSample& sample = info.imu->samples.front();
+  EXPECT_LT((sample.angular_velocity - Eigen::Vector3d(1, 2, 3)).norm(), 1e-12);
+  EXPECT_LT((sample.acceleration - Eigen::Vector3d(0.5, 1, 10)).norm(), 1e-12);
+  const auto error_of = [](const std::string& matrix) {
+    const ConfigNode config =
+        parse_config({"a.yaml", fmt::format("imu0: {{gyroscopes: {{M: {}}}}}", matrix)});
+    return input_error_of([&] { read_imu_calibration(config); });
+  };
+  EXPECT_EQ(error_of("[[0, 0, 0], [0, 1, 0], [0, 0, 1]]"),
+            "a.yaml:1: imu0.gyroscopes.M is singular, expected scales of about 1");
+  EXPECT_EQ(error_of("[1, 2]"),
+            "a.yaml:1: imu0.gyroscopes.M is a list of 2, expected 3 rows of 3 numbers");
 }
 
 TEST(ImuCalibration, IsNeededNowhere) {

@@ -5,57 +5,84 @@
 #include <fmt/format.h>
 
 #include <Eigen/Geometry>
+#include <Eigen/LU>
 #include <array>
-#include <cstdint>
+#include <cmath>
 #include <memory>
 #include <numbers>
 #include <optional>
 #include <string>
 #include <utility>
+#include <vector>
 
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/base/config_value.h"
 #include "waymark/base/text.h"
 #include "waymark/camera/camchain.h"
-#include "waymark/input/datasets.h"
 #include "waymark/input/imu_readers.h"
 
 namespace waymark {
 namespace {
 
-struct NoiseKey {
-  const char* name;
-  double ImuNoise::*value;
-};
-constexpr std::array<NoiseKey, 4> kNoiseKeys = {
+constexpr std::array<std::pair<const char*, double ImuNoise::*>, 4> kNoiseKeys = {
     {{"gyroscope_noise_density", &ImuNoise::gyroscope},
      {"accelerometer_noise_density", &ImuNoise::accelerometer},
      {"gyroscope_random_walk", &ImuNoise::gyroscope_walk},
      {"accelerometer_random_walk", &ImuNoise::accelerometer_walk}}};
 
-}  // namespace
-
-std::optional<ImuNoise> read_imu_noise(const ConfigNode& node, const std::string& key) {
-  constexpr ConfigRange kRange{.low = 0.0, .high = 1e3};
+/// All four numbers or none.
+std::optional<ImuNoise> read_noise(const ConfigNode& imu) {
   ImuNoise noise;
-  std::size_t num_found = 0;
-  const char* missing = nullptr;
-  for (const NoiseKey& part : kNoiseKeys) {
-    const ConfigNode* const value = node.find(part.name);
-    if (!value) {
-      missing = part.name;
-      continue;
-    }
-    noise.*part.value = config_double(*value, fmt::format("{}.{}", key, part.name), kRange);
-    ++num_found;
+  std::vector<const char*> missing;
+  for (const auto& [name, value] : kNoiseKeys) {
+    const ConfigNode* const node = imu.find(name);
+    if (!node) missing.push_back(name);
+    if (node) noise.*value = config_double(*node, fmt::format("imu0.{}", name), {0.0, 1e3});
   }
-  if (num_found == 0) return std::nullopt;
-  if (!missing) return noise;
+  if (missing.empty()) return noise;
+  if (missing.size() == kNoiseKeys.size()) return std::nullopt;
   throw InputError(
-      node.where(),
-      fmt::format("{} has no {}, expected all four numbers of its noise", key, missing));
+      imu.where(),
+      fmt::format("imu0 has no {}, expected all four numbers of its noise", missing.back()));
 }
+
+/// A matrix of a sensor of the section imu0, else the usual one.
+Eigen::Matrix3d read_sensor_matrix(const ConfigNode& imu,
+                                   const std::string& sensor,
+                                   const std::string& name,
+                                   const Eigen::Matrix3d& usual) {
+  const ConfigNode* const section = imu.find(sensor);
+  const ConfigNode* const node = section ? section->find(name) : nullptr;
+  if (!node) return usual;
+  const std::string key = fmt::format("imu0.{}.{}", sensor, name);
+  const Eigen::Matrix3d matrix = read_square_matrix(*node, key, 3);
+  if (name == "A" || std::abs(matrix.determinant()) > 0.1) return matrix;
+  throw InputError(node->where(), key + " is singular, expected scales of about 1");
+}
+
+/// Of the model "scale-misalignment" of Kalibr, which others do not have.
+std::optional<ImuIntrinsics> read_intrinsics(const ConfigNode& imu) {
+  if (!imu.find("gyroscopes") && !imu.find("accelerometers")) return std::nullopt;
+  const Eigen::Matrix3d none = Eigen::Matrix3d::Zero(), one = Eigen::Matrix3d::Identity();
+  const Eigen::Matrix3d turn = read_sensor_matrix(imu, "gyroscopes", "C_gyro_i", one);
+  return ImuIntrinsics{read_sensor_matrix(imu, "gyroscopes", "M", one) * turn,
+                       read_sensor_matrix(imu, "gyroscopes", "A", none) * turn,
+                       read_sensor_matrix(imu, "accelerometers", "M", one)};
+}
+
+void correct(const ImuIntrinsics& intrinsics, ImuStream& stream) {
+  const Eigen::Matrix3d from_gyroscope = intrinsics.gyroscope.inverse();
+  const Eigen::Matrix3d from_accelerometer = intrinsics.accelerometer.inverse();
+  for (ImuSample& sample : stream.samples) {
+    sample.acceleration = from_accelerometer * sample.acceleration;
+    sample.angular_velocity = from_gyroscope * (sample.angular_velocity -
+                                                intrinsics.by_acceleration * sample.acceleration);
+  }
+  stream.notes.emplace_back("corrected by the scale and misalignment that are stated");
+}
+
+}  // namespace
 
 ImuCalibration read_imu_calibration(const ConfigNode& config) {
   ImuCalibration calibration;
@@ -64,11 +91,12 @@ ImuCalibration read_imu_calibration(const ConfigNode& config) {
     calibration.imu_from_rig = read_transform(*transform, "cam0.T_cam_imu").inverse();
   }
   if (const ConfigNode* const shift = camera ? camera->find("timeshift_cam_imu") : nullptr) {
-    calibration.time_shift_s =
-        config_double(*shift, "cam0.timeshift_cam_imu", {.low = -1e3, .high = 1e3});
+    calibration.time_shift_s = config_double(*shift, "cam0.timeshift_cam_imu", {-1e3, 1e3});
   }
-  const ConfigNode* const imu = config.find("imu0");
-  if (imu) calibration.noise = read_imu_noise(*imu, "imu0");
+  if (const ConfigNode* const imu = config.find("imu0")) {
+    calibration.noise = read_noise(*imu);
+    calibration.intrinsics = read_intrinsics(*imu);
+  }
   return calibration;
 }
 
@@ -76,33 +104,7 @@ void fill_in(ImuCalibration& calibration, const ImuCalibration& other) {
   if (!calibration.imu_from_rig) calibration.imu_from_rig = other.imu_from_rig;
   if (!calibration.time_shift_s) calibration.time_shift_s = other.time_shift_s;
   if (!calibration.noise) calibration.noise = other.noise;
-}
-
-std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder) {
-  const std::filesystem::path mav0 =
-      std::filesystem::is_directory(folder / "mav0") ? folder / "mav0" : folder;
-  const std::filesystem::path table = mav0 / "imu0" / "data.csv";
-  if (!std::filesystem::is_regular_file(table)) return std::nullopt;
-  ImuStream stream = read_imu_file(table);
-  const auto config_of = [](const std::filesystem::path& path) {
-    constexpr std::size_t kMaxBytes = std::size_t{1} << 20;
-    return parse_config({path.string(), read_text_file(path, "a YAML file", kMaxBytes)});
-  };
-  const std::filesystem::path sensor = table.parent_path() / "sensor.yaml";
-  const bool has_sensor = std::filesystem::exists(sensor);
-  if (has_sensor) stream.calibration.noise = read_imu_noise(config_of(sensor), "the IMU");
-  if (has_sensor && std::filesystem::exists(mav0 / "cam0" / "sensor.yaml")) {
-    stream.calibration.imu_from_rig = euroc_sensor_from_camera0(table);
-  }
-  // Of TUM-VI.
-  const std::filesystem::path dso = (mav0 / ".." / "dso").lexically_normal();
-  if (std::filesystem::exists(dso / "camchain.yaml")) {
-    fill_in(stream.calibration, read_imu_calibration(config_of(dso / "camchain.yaml")));
-  }
-  if (!stream.calibration.noise && std::filesystem::exists(dso / "imu_config.yaml")) {
-    stream.calibration.noise = read_imu_noise(config_of(dso / "imu_config.yaml"), "the IMU");
-  }
-  return stream;
+  if (!calibration.intrinsics) calibration.intrinsics = other.intrinsics;
 }
 
 void take_imu(const InputOptions& options,
@@ -123,6 +125,7 @@ void take_imu(const InputOptions& options,
   ImuCalibration calibration = options.imu_calibration;
   fill_in(calibration, stream->calibration);
   stream->calibration = calibration;
+  if (calibration.intrinsics) correct(*calibration.intrinsics, *stream);
   // No recording is that long.
   constexpr std::int64_t kDayNs = 86'400'000'000'000;
   const std::int64_t first_ns = stream->samples.front().timestamp_ns;

@@ -121,20 +121,17 @@ std::optional<ImuStream> imu_of_gopro(std::span<const TelemetryPacket> packets,
 std::optional<ImuStream> imu_of_videos(const std::vector<std::filesystem::path>& files);
 
 /// What a document in Kalibr's format says of the IMU: T_cam_imu and timeshift_cam_imu of cam0, and
-/// the noise of the section imu0, which is all four numbers or none. Throws InputError.
+/// of the section imu0 the noise, all four numbers or none, and scale and misalignment of the
+/// sensors. Throws InputError.
 ImuCalibration read_imu_calibration(const ConfigNode& config);
-
-/// The noise that a map states by the four keys of Kalibr; nothing if it has none of them. key: of
-/// the map, for errors. Throws InputError where one is missing or malformed.
-std::optional<ImuNoise> read_imu_noise(const ConfigNode& node, const std::string& key);
 
 /// What `calibration` does not tell, as `other` has it.
 void fill_in(ImuCalibration& calibration, const ImuCalibration& other);
 
 /// Gives an input its inertial data, with a line on them: those of InputOptions::imu, else what
 /// `carried` reads, if any. What the options say of the IMU takes the place of what these know.
-/// Throws InputError for a file of the options; what the input carries and cannot be read is said
-/// and left out, as no input needs it.
+/// Samples are corrected by the intrinsics. Throws InputError for a file of the options; what the
+/// input carries and cannot be read is said and left out, as no input needs it.
 void take_imu(const InputOptions& options,
               const std::function<std::optional<ImuStream>()>& carried,
               InputInfo& info);

@@ -64,7 +64,9 @@ double motion_between(const Rigid3& a, const Rigid3& b) { return (a * b.inverse(
 
 /// The noise that a file states.
 ImuNoise noise_in(const fs::path& file) {
-  return *read_imu_noise(parse_config(ConfigSource::from_file(file)), "imu");
+  ConfigSource source = ConfigSource::from_file(file);
+  source.key = "imu0";
+  return *read_imu_calibration(parse_config(source)).noise;
 }
 
 /// imu.yaml and the mounting in camchain.yaml are those of the spec.
