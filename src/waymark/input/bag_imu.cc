@@ -4,7 +4,7 @@
 
 #include <algorithm>
 #include <map>
-#include <vector>
+#include <utility>
 
 #include "waymark/base/check.h"
 #include "waymark/base/text.h"
@@ -13,21 +13,16 @@
 namespace waymark {
 namespace {
 
-/// The messages of a topic.
-struct ImuTopic {
-  std::vector<SensorReading> gyroscope;
-  std::vector<SensorReading> accelerometer;
-};
-
-std::map<std::uint32_t, ImuTopic> read_topics(
+/// What the messages of each topic have.
+std::map<std::uint32_t, ImuTable> read_topics(
     const BagContent& content, const std::function<std::int64_t(const BagMessage&)>& time_of) {
-  std::map<std::uint32_t, ImuTopic> topics;
+  std::map<std::uint32_t, ImuTable> topics;
   for (const BagImu& imu : content.imu) {
     const std::int64_t time_ns = time_of(imu.message);
     const Eigen::Vector3d turn = Eigen::Vector3d::Map(imu.measured.angular_velocity.data());
     const Eigen::Vector3d push = Eigen::Vector3d::Map(imu.measured.linear_acceleration.data());
     if (!turn.allFinite() || !push.allFinite()) continue;
-    ImuTopic& topic = topics[imu.message.topic];
+    ImuTable& topic = topics[imu.message.topic];
     const bool has_turn = imu.measured.has_angular_velocity && !turn.isZero(0.0);
     const bool has_push = imu.measured.has_linear_acceleration && !push.isZero(0.0);
     if (has_turn) topic.gyroscope.push_back({time_ns, turn});
@@ -43,22 +38,16 @@ std::optional<ImuStream> imu_of_bag(const Bag& bag,
   const BagContent& content = bag.content();
   const auto listed = std::ranges::find_if(content.topics, &BagTopic::is_imu);
   if (listed == content.topics.end()) return std::nullopt;
-  const std::map<std::uint32_t, ImuTopic> topics = read_topics(content, time_of);
-  const auto with_most = [&](auto size) {
-    return std::ranges::max_element(
-        topics, {}, [&](const auto& topic) { return size(topic.second); });
+  const std::map<std::uint32_t, ImuTable> topics = read_topics(content, time_of);
+  // One that has both, if there is any.
+  const auto with_most = [&](auto sensor) {
+    return std::ranges::max_element(topics, {}, [&](const auto& topic) {
+      const ImuTable& of = topic.second;
+      return std::pair(std::min(of.gyroscope.size(), of.accelerometer.size()), (of.*sensor).size());
+    });
   };
-  const auto num_turns = [](const ImuTopic& topic) { return topic.gyroscope.size(); };
-  const auto num_pushes = [](const ImuTopic& topic) { return topic.accelerometer.size(); };
-  const auto num_both = [&](const ImuTopic& topic) {
-    return std::min(num_turns(topic), num_pushes(topic));
-  };
-  auto turns = with_most(num_both), pushes = turns;
-  if (turns == topics.end() || num_both(turns->second) < 2) {
-    turns = with_most(num_turns);
-    pushes = with_most(num_pushes);
-  }
-  if (turns == topics.end() || num_turns(turns->second) == 0 || num_pushes(pushes->second) == 0) {
+  const auto turns = with_most(&ImuTable::gyroscope), pushes = with_most(&ImuTable::accelerometer);
+  if (topics.empty() || turns->second.gyroscope.empty() || pushes->second.accelerometer.empty()) {
     throw InputError(printable(listed->name),
                      "has no turns and accelerations, expected messages of sensor_msgs/Imu with "
                      "both, or two topics");

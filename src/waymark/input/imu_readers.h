@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <functional>
 #include <optional>
+#include <set>
 #include <span>
 #include <string>
 #include <string_view>
@@ -28,39 +29,24 @@ struct SensorReading {
   Eigen::Vector3d value;  ///< rad/s or m/s^2.
 };
 
-/// More samples are refused: more than two hours at 1 kHz.
-inline constexpr std::size_t kMaxImuSamples = std::size_t{1} << 23;
-
-/// A stream at the times of the gyroscope, in the order of time without double times, with the
-/// acceleration interpolated linearly between the readings before and after, but across no gap (see
-/// ImuSamples). Throws InputError at `source` where fewer than two samples are left.
+/// A stream at the times of the gyroscope, increasing, with the acceleration interpolated linearly,
+/// but across no gap (see ImuSamples). Throws InputError at `source` for fewer than two samples.
 ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
                     std::vector<SensorReading> accelerometer,
                     const std::string& source);
 
-/// Which of the sensors of an IMU.
-enum class ImuSensor { kGyroscope, kAccelerometer };
-
-/// Which sensor a name of columns or of a file is of, "w_RS_S_", "gF", "VID_1_gyro"; nothing:
-/// another, or both.
-std::optional<ImuSensor> sensor_of_name(std::string_view name);
-
-/// A text in lower case letters, of ASCII.
-std::string lower_case(std::string_view text);
-
-/// A table of inertial data, in SI units and in the order of its rows.
+/// Inertial data as they come, in SI units and in the order of rows or messages.
 struct ImuTable {
   std::vector<SensorReading> gyroscope;      ///< rad/s; empty: the table has none.
   std::vector<SensorReading> accelerometer;  ///< m/s^2; the same.
-  std::vector<std::string> notes;            ///< Units as understood, for people.
-  std::string fault;                         ///< As ImuStream::fault.
+  std::set<std::string> notes;               ///< Units as understood, for people.
 };
 
 /// Parses a table with a row per moment, with or without a header. Times are in the unit with 10 to
 /// 5000 rows a second; turns in that of the header, else rad/s unless they are too fast for that;
-/// whether accelerations are in m/s^2 or g tells their middle length, gravity's. A last row that is
-/// cut off is left out. name: of the file, for errors and for what plain x, y and z are of. Throws
-/// InputError.
+/// whether accelerations are in m/s^2 or g tells their middle length, gravity's. A last row without
+/// an end of line was cut off and is left out. name: of the file, for errors and for what plain x,
+/// y and z are of. Throws InputError.
 ImuTable parse_imu_table(std::string_view text, const std::string& name);
 
 /// Reads a table of an IMU; one of a single sensor with that of the other beside it, which has the
@@ -68,13 +54,13 @@ ImuTable parse_imu_table(std::string_view text, const std::string& name);
 ImuStream read_imu_file(const std::filesystem::path& path);
 
 /// The inertial data of a EuRoC data set: mav0/imu0/data.csv, with what sensor.yaml beside it and
-/// of camera 0, or dso/camchain.yaml and dso/imu_config.yaml, say; nothing where there are none.
+/// of camera 0, or dso/camchain.yaml and dso/imu_config.yaml, say; nothing without that table.
 /// Throws InputError.
 std::optional<ImuStream> read_euroc_imu(const std::filesystem::path& folder);
 
-/// The inertial data of a bag: of the topics of sensor_msgs/Imu the one with the most messages that
-/// have turns and accelerations, else one of turns with one of accelerations, as RealSense's driver
-/// has them. Nothing where there is none. time_of: of a message. Throws InputError.
+/// The inertial data of a bag: of the topics of sensor_msgs/Imu the one with the most turns and
+/// accelerations, else one of turns with one of accelerations (RealSense's driver). Nothing where
+/// there is none. time_of: of a message. Throws InputError.
 std::optional<ImuStream> imu_of_bag(const Bag& bag,
                                     const std::function<std::int64_t(const BagMessage&)>& time_of);
 
@@ -84,9 +70,8 @@ struct StampedRotation {
   Eigen::Quaterniond rotation;
 };
 
-/// Makes samples in axes of the camera those of an IMU that turns with the images, which a camera
-/// that stabilises them turns against itself; by their clock, of which the orientations are. Those
-/// of the camera tell how far the samples' clock is from it. In the order of time. False, and
+/// Makes samples in axes of the camera those of an IMU that turns with its stabilised images, by
+/// the clock of these, which the orientations have, too. All are in the order of time. False, and
 /// nothing is changed, where the camera's orientations do not turn as the gyroscope does.
 bool turn_with_images(const std::vector<StampedRotation>& camera_from_start,
                       const std::vector<StampedRotation>& image_from_camera,

@@ -3,6 +3,7 @@
 #include "waymark/input/imu_stream.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <optional>
@@ -43,14 +44,12 @@ std::string format_imu_calibration(const ImuCalibration& calibration) {
   std::string text;
   if (calibration.imu_from_rig) {
     const Eigen::Vector3d place = calibration.imu_from_rig->inverse().translation;
-    text += fmt::format(
-        "  mounted at [{:.4f}, {:.4f}, {:.4f}] m from camera 0\n", place.x(), place.y(), place.z());
+    text += fmt::format("  mounted at [{:.4f}] m from camera 0\n", fmt::join(place, ", "));
   }
   if (calibration.time_shift_s) {
     text += fmt::format("  images are {:.6g} s later by its clock\n", *calibration.time_shift_s);
   }
-  const auto& noise = calibration.noise;
-  if (noise) {
+  if (const auto& noise = calibration.noise) {
     text += fmt::format("  stated: {}; walks {:.3g} rad/s^2/sqrt(Hz) and {:.3g} m/s^3/sqrt(Hz)\n",
                         format_noise(*noise),
                         noise->gyroscope_walk,
@@ -105,11 +104,16 @@ ImuStream merge_imu(const std::vector<SensorReading>& gyroscope,
 }
 
 std::string fault_of(const ImuStream& stream) {
-  if (!stream.fault.empty()) return stream.fault;
   if (stream.num_out_of_order > stream.samples.size() / 10) {
     return "so many samples are out of order as those of two devices, or of two clocks, are";
   }
   const ImuHealth health = imu_health(stream.samples);
+  if (const double length = health.accelerometer.mean_length; length < 5.0 || length > 30.0) {
+    return fmt::format(
+        "accelerations have a mean length of {:.3g}, expected gravity in them, 9.8 "
+        "m/s^2 or 1 g",
+        length);
+  }
   if (health.gyroscope.is_constant) return "the gyroscope always shows the same";
   if (health.accelerometer.is_constant) return "the accelerometer always shows the same";
   return {};
@@ -123,14 +127,11 @@ std::string format_imu(const ImuStream& stream, const std::vector<std::int64_t>&
                       health.duration_s,
                       health.rate_hz);
   for (const std::string& note : stream.notes) text += fmt::format("  {}\n", note);
-  if (stream.num_out_of_order > 0) {
-    text += fmt::format("  note: {} out of order are sorted in\n",
-                        count_of(stream.num_out_of_order, "sample"));
-  }
-  if (stream.num_doubles > 0) {
-    text += fmt::format("  note: {} at the time of another left out\n",
-                        count_of(stream.num_doubles, "sample"));
-  }
+  const auto add_count = [&](std::size_t count, const char* what) {
+    if (count > 0) text += fmt::format("  note: {} {}\n", count_of(count, "sample"), what);
+  };
+  add_count(stream.num_out_of_order, "out of order are sorted in");
+  add_count(stream.num_doubles, "at the time of another left out");
   text += describe_overlap(stream, image_times_ns);
   text += fmt::format("  gaps: {}\n", health.gaps.size());
   if (!health.gaps.empty()) {

@@ -24,7 +24,6 @@ struct ImuStream {
   ImuCalibration calibration;      ///< As far as it is told.
   std::string source;              ///< For people: a file, a topic.
   std::vector<std::string> notes;  ///< What was understood and assumed, for people.
-  std::string fault = {};          ///< What its reader found wrong with it; see fault_of().
   /// Samples that came later than one with a later time, and were sorted in.
   std::size_t num_out_of_order = 0;
   std::size_t num_doubles = 0;  ///< Samples left out as there is another of their time.
