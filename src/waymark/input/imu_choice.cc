@@ -110,22 +110,18 @@ void fill_in(ImuCalibration& calibration, const ImuCalibration& other) {
 void take_imu(const InputOptions& options,
               const std::function<std::optional<ImuStream>()>& carried,
               InputInfo& info) {
-  std::optional<ImuStream> stream;
   if (options.imu == "none") return;
-  if (!options.imu.empty()) {
-    stream = read_imu_file(options.imu);
-  } else {
-    try {
-      stream = carried();
-    } catch (const InputError& error) {
-      info.lines.push_back(fmt::format("note: inertial data are left out: {}", error.what()));
-    }
+  std::optional<ImuStream> stream;
+  try {
+    stream = options.imu.empty() ? carried() : read_imu_file(options.imu);
+  } catch (const InputError& error) {
+    if (!options.imu.empty()) throw;
+    info.lines.push_back(fmt::format("note: inertial data are left out: {}", error.what()));
   }
   if (!stream) return;
-  ImuCalibration calibration = options.imu_calibration;
-  fill_in(calibration, stream->calibration);
-  stream->calibration = calibration;
-  if (calibration.intrinsics) correct(*calibration.intrinsics, *stream);
+  const ImuCalibration known = std::exchange(stream->calibration, options.imu_calibration);
+  fill_in(stream->calibration, known);
+  if (stream->calibration.intrinsics) correct(*stream->calibration.intrinsics, *stream);
   // No recording is that long.
   constexpr std::int64_t kDayNs = 86'400'000'000'000;
   const std::int64_t first_ns = stream->samples.front().timestamp_ns;
