@@ -46,7 +46,9 @@ int main(int argc, char** argv) {
     make_output_folder(folder);
     for (std::uint64_t seed = 0; seed < 4; ++seed) {
       testing::RandomMap random(seed, 40, 4);
-      save_map(folder / (std::to_string(seed) + ".wmap"), small_stored_map(random));
+      StoredMap stored = small_stored_map(random);
+      if (seed == 1) stored.imu.emplace();
+      save_map(folder / (std::to_string(seed) + ".wmap"), stored);
     }
     write_journals(argv[2]);
   } catch (const std::exception& error) {

@@ -131,6 +131,34 @@ CalibrationEstimate parse_refinement(const SummaryObject& object) {
   return estimate;
 }
 
+/// A value and its standard deviation, in other units.
+void take_sigma(const SummaryObject& object, const char* key, double unit, double& sigma) {
+  if (const auto part = object.object(key)) part->take("sigma", sigma);
+  sigma *= unit;
+}
+
+InertialReport parse_imu(const SummaryObject& object) {
+  constexpr double kDegree = M_PI / 180.0;
+  InertialReport imu;
+  object.take("used", imu.is_used);
+  object.take("reason", imu.reason);
+  object.take("scale_sigma", imu.scale_sigma);
+  object.take("gravity_sigma_deg", imu.gravity_sigma_rad);
+  imu.gravity_sigma_rad *= kDegree;
+  std::size_t metric_from = 0;
+  if (object.json().contains("metric_from_frame") &&
+      !object.json()["metric_from_frame"].is_null()) {
+    object.take("metric_from_frame", metric_from);
+    imu.metric_from = FrameId{static_cast<std::uint32_t>(metric_from)};
+  }
+  if (const auto shift = object.object("time_shift_ms")) shift->take("value", imu.time_shift_s);
+  imu.time_shift_s *= 1e-3;
+  take_sigma(object, "time_shift_ms", 1e-3, imu.time_shift_sigma_s);
+  take_sigma(object, "rotation_deg", kDegree, imu.rotation_sigma_rad);
+  take_sigma(object, "lever_arm_m", 1.0, imu.lever_arm_sigma_m);
+  return imu;
+}
+
 LoopFrames parse_loop(const SummaryObject& summary, const SummaryJson& json) {
   const auto index = [&](const SummaryJson& entry) -> std::optional<std::uint32_t> {
     if (entry.is_null()) return std::nullopt;
@@ -191,6 +219,7 @@ RunSummary parse_summary_json(std::string_view text, const std::string& name) {
   for (const SummaryJson& entry : object.array("loop_frames")) {
     summary.loop_frames.push_back(parse_loop(object, entry));
   }
+  if (const auto imu = object.object("imu")) summary.imu = parse_imu(*imu);
   summary.tracking_ms = parse_times_of(object.object("tracking_ms"));
   summary.mapping_ms = parse_times_of(object.object("mapping_ms"));
   if (const auto stages = object.object("stages_ms")) {

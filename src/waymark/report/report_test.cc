@@ -49,6 +49,22 @@ std::size_t count(const std::string& text, const std::string& part) {
   return found;
 }
 
+TEST(Report, TellsWhatAnImuBrought) {
+  RunFolder run = circling_run();
+  EXPECT_THAT(format_report(run, nullptr), Not(HasSubstr("Inertial data")));
+  run.summary.imu.emplace().reason = "it contradicts <the> images";
+  EXPECT_THAT(format_report(run, nullptr), HasSubstr("Not used: it contradicts &lt;the&gt;"));
+  run.summary.imu->is_used = true;
+  run.summary.imu->scale_sigma = 0.0021;
+  for (int i = 0; i < 3; ++i) {
+    run.inertial.emplace_back().timestamp_ns = i * 1000;
+    run.inertial.back().biases.gyroscope.x() = 0.01 * i;
+  }
+  const std::string page = format_report(run, nullptr);
+  EXPECT_THAT(page, HasSubstr("known to 0.21 %"));
+  EXPECT_THAT(page, HasSubstr("Bias of the gyroscope [degrees/s]"));
+}
+
 TEST(Report, SaysThatARunWentWell) {
   const std::string page = format_report(circling_run(), nullptr);
   EXPECT_THAT(page, HasSubstr("<h1>circle <span class=\"badge good\">good</span></h1>"));

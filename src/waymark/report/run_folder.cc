@@ -254,6 +254,33 @@ std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::
   return points;
 }
 
+std::vector<InertialMoment> parse_inertial_csv(std::string_view text, const std::string& name) {
+  constexpr std::size_t kNumColumns = 13;
+  constexpr double kMaxValue = 1e6;
+  RowReader rows(text, name, ',');
+  rows.next();
+  std::vector<InertialMoment> moments;
+  while (rows.next()) {
+    rows.expect_exactly(kNumColumns, "the columns of a run's inertial.csv");
+    const auto vector = [&](std::size_t first) {
+      return Eigen::Vector3d(rows.number(first), rows.number(first + 1), rows.number(first + 2));
+    };
+    InertialMoment moment;
+    moment.timestamp_ns = rows.nanoseconds(0);
+    moment.velocity = vector(1);
+    moment.biases = {vector(7), vector(10)};
+    const double largest = std::max({moment.velocity.cwiseAbs().maxCoeff(),
+                                     moment.biases.gyroscope.cwiseAbs().maxCoeff(),
+                                     moment.biases.accelerometer.cwiseAbs().maxCoeff()});
+    const bool is_later = moments.empty() || moment.timestamp_ns > moments.back().timestamp_ns;
+    if (!(largest <= kMaxValue) || !is_later) {
+      throw InputError(rows.where(), "is no moment after the one before, expected a run's");
+    }
+    moments.push_back(moment);
+  }
+  return moments;
+}
+
 RunFolder read_run_folder(const std::filesystem::path& folder) {
   constexpr std::string_view kExpected = "a folder that waymark run wrote";
   if (!std::filesystem::is_directory(folder)) {
@@ -268,6 +295,9 @@ RunFolder read_run_folder(const std::filesystem::path& folder) {
   run.trajectories = read_parts(folder);
   if (std::filesystem::exists(folder / "points.ply")) {
     run.points = parse_points_ply(read("points.ply"), path("points.ply"));
+  }
+  if (std::filesystem::exists(folder / "inertial.csv")) {
+    run.inertial = parse_inertial_csv(read("inertial.csv"), path("inertial.csv"));
   }
   run.summary.counts = count_frames(run.table.frames);
   run.summary.num_trajectory_lines = run.trajectories.front().size();

@@ -22,6 +22,8 @@ struct RunFolder {
   /// One per part of the map, that with most frames first, each by time and in a frame of its own.
   std::vector<std::vector<StampedPose>> trajectories;
   std::vector<Eigen::Vector3f> points;  ///< Of the map of the first; may be missing.
+  /// Of its frames, without poses and covariances; empty without an IMU that told metres.
+  std::vector<InertialMoment> inertial;
 };
 
 /// Reads the files of a folder. Whatever is wrong with one of them, be it damaged or made to do
@@ -34,5 +36,8 @@ FrameTable parse_frames_csv(std::string_view text, const std::string& name);
 RunSummary parse_summary_json(std::string_view text, const std::string& name);
 /// The same of points.ply, as format_points_ply() writes it.
 std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::string& name);
+
+/// The same of inertial.csv.
+std::vector<InertialMoment> parse_inertial_csv(std::string_view text, const std::string& name);
 
 }  // namespace waymark

@@ -123,6 +123,22 @@ TEST(RunFolder, WrongSummariesAreNamed) {
   EXPECT_EQ(fault(R"({"frames": 1})"), "");
 }
 
+TEST(RunFolder, MomentsReadBackAsWritten) {
+  std::vector<InertialMoment> moments(2);
+  moments[1].timestamp_ns = 50;
+  moments[1].velocity = {1.0, -2.0, 3.0};
+  moments[1].biases = {{0.1, 0.2, 0.3}, {4.0, 5.0, 6.0}};
+  const std::string text = format_inertial_csv(moments);
+  const auto read = parse_inertial_csv(text, "a");
+  ASSERT_EQ(read.size(), 2u);
+  EXPECT_EQ(read[1].velocity, moments[1].velocity);
+  EXPECT_EQ(read[1].biases.gyroscope, moments[1].biases.gyroscope);
+  EXPECT_EQ(read[1].biases.accelerometer, moments[1].biases.accelerometer);
+  const std::string last = text.substr(text.rfind('\n', text.size() - 2) + 1);
+  EXPECT_THAT(fault_of([&] { parse_inertial_csv(text + last, "a"); }), HasSubstr("a:4"));
+  EXPECT_THAT(fault_of([&] { parse_inertial_csv(text + "1,2\n", "a"); }), HasSubstr("a:4"));
+}
+
 TEST(RunFolder, PointsReadBackAsWritten) {
   const std::vector<Eigen::Vector3f> points = {{1.0f, -2.5f, 0.125f}, {0.0f, 0.0f, 1e6f}};
   EXPECT_EQ(parse_points_ply(format_points_ply(points), "points.ply"), points);

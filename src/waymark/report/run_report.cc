@@ -15,6 +15,7 @@
 #include "waymark/report/documentation.h"
 #include "waymark/report/drawing.h"
 #include "waymark/report/evaluate_files.h"
+#include "waymark/report/imu_section.h"
 #include "waymark/report/page.h"
 #include "waymark/report/report.h"
 #include "waymark/report/timeline.h"
@@ -355,6 +356,7 @@ std::string format_report(const RunFolder& run, const TruePath* truth) {
   if (compared) body += truth_section(*compared, *truth, run);
   body += coverage_section(run);
   body += calibration_section(run.summary);
+  body += imu_section(run);
   body += time_section(run.summary);
   body += settings_section(run.summary);
   return format_page("Waymark report: " + run.name, body);
