@@ -99,5 +99,20 @@ class Recorded(CliTest):
         self.assertEqual((self.out / "trajectory.txt").read_bytes(), path)
 
 
+class Simulated(CliTest):
+    def test_a_place_that_is_new_after_black_images_is_part_of_the_same_map(self):
+        world = self.folder / "hall"
+        made = waymark("simulate", "hall", "--setup", "mono", "--motion", "flight", "--frames", 200,
+                       "--imu", "mems", "--black", "100,40", "-o", world)
+        self.assertEqual(made.returncode, 0, made.stderr)
+        # No place is recognised: only the IMU tells how the parts lie to each other.
+        done = self.run_on(world, "--setup", "mono", "--set", "loop.enabled=false")
+        self.assertEqual(done.returncode, 0, done.stderr)
+        summary = self.summary()
+        self.assertEqual((summary["submaps"], summary["coverage"]), (1, 1.0))
+        text = waymark("eval", self.out / "trajectory.txt", world / "groundtruth.txt", "--align", "se3", "--json")
+        self.assertLess(json.loads(text.stdout)["ate_rmse_m"], 0.15)
+
+
 if __name__ == "__main__":
     unittest.main()

@@ -269,22 +269,23 @@ void bind_inertial(py::module_& module) {
 }  // namespace
 
 void bind_inertial_moment(py::module_& module) {
-  Class<InertialMoment>(
-      module, "InertialMoment", "What vision and an inertial measurement unit tell of a frame.")
-      .get("timestamp_ns", "int: of the image.", &InertialMoment::timestamp_ns)
-      .get("world_from_rig",
-           "array (4, 4): the pose, metres.",
-           [](const InertialMoment& self) { return Eigen::Matrix4d(self.world_from_rig.matrix()); })
+  Class<NavigationState>(
+      module, "NavigationState", "What vision and an inertial measurement unit tell of a frame.")
+      .get("timestamp_ns", "int: of the image.", &NavigationState::timestamp_ns)
+      .get(
+          "world_from_rig",
+          "array (4, 4): the pose, metres.",
+          [](const NavigationState& self) { return Eigen::Matrix4d(self.world_from_rig.matrix()); })
       .get("velocity",
            "array (3,): of the unit in the axes of the world, m/s.",
-           &InertialMoment::velocity)
+           &NavigationState::velocity)
       .get("covariance",
            "array (9, 9): of exp(xi) * rig_from_world, xi = (rho, phi), and the velocity.",
-           &InertialMoment::covariance)
+           &NavigationState::covariance)
       .get("gyroscope_bias",
            "array (3,): rad/s.",
-           [](const InertialMoment& self) { return self.biases.gyroscope; })
-      .get("accelerometer_bias", "array (3,): m/s^2.", [](const InertialMoment& self) {
+           [](const NavigationState& self) { return self.biases.gyroscope; })
+      .get("accelerometer_bias", "array (3,): m/s^2.", [](const NavigationState& self) {
         return self.biases.accelerometer;
       });
 }

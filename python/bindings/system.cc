@@ -5,6 +5,7 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
+#include <functional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -55,15 +56,10 @@ class PythonSystem {
     for (const ImuSample& one : imu_samples(timestamp_ns, turns, forces)) system_.feed_imu(one);
   }
 
-  std::optional<InertialReport> inertial() {
-    const Turn turn = take();
-    return system_.inertial();
-  }
-
-  std::vector<InertialMoment> inertial_path() {
-    const Turn turn = take();
-    return system_.inertial_path();
-  }
+  std::optional<InertialReport> inertial() { return ask(&System::inertial); }
+  std::vector<NavigationState> inertial_path() { return ask(&System::inertial_path); }
+  SystemStatistics statistics() { return ask(&System::statistics); }
+  std::vector<CalibrationEstimate> calibration() { return ask(&System::calibration); }
 
   void finish() {
     const Turn turn = take();
@@ -120,7 +116,9 @@ class PythonSystem {
     const std::shared_ptr<const Map> newest = system_.map();
     if (!last_map_ || last_map_->stored.map != newest) {
       last_map_ = std::make_shared<PythonMap>();
-      last_map_->stored = {newest, settings_yaml_, images_};
+      const std::optional<InertialReport>& imu = system_.inertial();
+      last_map_->stored = {
+          newest, settings_yaml_, images_, imu && imu->is_used ? imu : std::nullopt};
     }
     return last_map_;
   }
@@ -137,21 +135,11 @@ class PythonSystem {
     return names;
   }
 
-  SystemStatistics statistics() {
-    const Turn turn = take();
-    return system_.statistics();
-  }
-
   std::optional<py::array_t<std::uint8_t>> ego_mask() {
     const Turn turn = take();
     const Image mask = system_.ego_mask();
     if (mask.values.empty()) return std::nullopt;
     return py::array_t<std::uint8_t>(Shape{mask.height_px, mask.width_px}, mask.values.data());
-  }
-
-  std::vector<CalibrationEstimate> calibration() {
-    const Turn turn = take();
-    return system_.calibration();
   }
 
   FrameDetails details() {
@@ -161,10 +149,9 @@ class PythonSystem {
   }
 
   void save(const std::filesystem::path& path) {
-    StoredMap stored = map()->stored;
-    if (const auto imu = inertial(); imu && imu->is_used) stored.imu = imu;
+    const std::shared_ptr<PythonMap> newest = map();
     const ReleasedGil released;
-    save_map(path, stored);
+    save_map(path, newest->stored);
   }
 
   bool is_finished() const { return is_finished_; }
@@ -177,6 +164,11 @@ class PythonSystem {
     }
   }
 
+  template <class Get>
+  auto ask(Get get) {
+    const Turn turn = take();
+    return std::invoke(get, system_);
+  }
   Turn take() { return Turn(is_taken_, "System", process_); }
 
   SessionConfig config_;
@@ -263,15 +255,12 @@ void bind_imu(SystemClass& system) {
 Measurements of an IMU (docs/imu.md), which frames fed later make use of: one, or arrays of N.
 timestamp_ns: int or array (N,), later than those before, others are left out.
 angular_velocity, acceleration: array (3,) or (N, 3), rad/s and m/s^2, gravity included.)")
-      .def("inertial", &PythonSystem::inertial, R"(inertial(self)
---
-
-What the IMU told so far: an InertialReport, or None without samples. Final after finish().)")
-      .def("inertial_path", &PythonSystem::inertial_path, R"(inertial_path(self)
---
-
-Poses, velocities and biases of the frames of the largest part of the map, after finish(): a list of
-InertialMoment; empty where lengths are not known in metres.)");
+      .def(
+          "inertial", &PythonSystem::inertial, "An InertialReport so far, or None without samples.")
+      .def("inertial_path",
+           &PythonSystem::inertial_path,
+           "After finish(): the NavigationState of each frame in the largest part; [] without "
+           "metres.");
 }
 
 void bind_control(SystemClass& system) {

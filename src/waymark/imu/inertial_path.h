@@ -14,8 +14,8 @@
 
 namespace waymark {
 
-/// What vision and IMU tell together of a moment.
-struct InertialMoment {
+/// What vision and IMU tell together of a state.
+struct NavigationState {
   std::int64_t timestamp_ns = 0;  ///< By the clock of the images.
   Rigid3 world_from_rig;          ///< In metres.
   /// Of the IMU in the axes of the world, m/s.
@@ -26,12 +26,12 @@ struct InertialMoment {
   ImuBiases biases;
 };
 
-/// The moments in the order of time and, where samples tell all between two of them that are at
+/// The states in the order of time and, where samples tell all between two of them that are at
 /// most 10 s apart, that of each sample there: integrated from the earlier one, with what is
 /// missing to the later one spread evenly. report: of the same path. Covariances are those of the
-/// earlier moment.
-std::vector<InertialMoment> at_imu_rate(std::span<const InertialMoment> moments,
-                                        const ImuSamples& samples,
-                                        const InertialReport& report);
+/// earlier state.
+std::vector<NavigationState> at_imu_rate(std::span<const NavigationState> states,
+                                         const ImuSamples& samples,
+                                         const InertialReport& report);
 
 }  // namespace waymark

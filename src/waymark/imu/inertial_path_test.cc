@@ -15,15 +15,15 @@ constexpr double kRadius = 2.0;  // m
 constexpr double kShift_s = 0.1;
 
 /// On a circle, looking along z upwards; the IMU is at the rig, turned.
-InertialMoment truth(std::int64_t timestamp_ns) {
+NavigationState truth(std::int64_t timestamp_ns) {
   const double angle = kTurn * 1e-9 * static_cast<double>(timestamp_ns);
   const Eigen::Vector3d out(std::cos(angle), std::sin(angle), 0.0);
-  InertialMoment moment;
-  moment.timestamp_ns = timestamp_ns;
-  moment.world_from_rig = {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
-                           kRadius * out};
-  moment.velocity = kTurn * kRadius * Eigen::Vector3d(-out.y(), out.x(), 0.0);
-  return moment;
+  NavigationState state;
+  state.timestamp_ns = timestamp_ns;
+  state.world_from_rig = {Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitZ())),
+                          kRadius * out};
+  state.velocity = kTurn * kRadius * Eigen::Vector3d(-out.y(), out.x(), 0.0);
+  return state;
 }
 
 InertialReport report() {
@@ -46,11 +46,11 @@ ImuSamples circle_samples(int count) {
 }
 
 TEST(InertialPath, HasAMomentForEverySample) {
-  const std::vector<InertialMoment> frames{truth(20 * kPeriodNs), truth(60 * kPeriodNs)};
+  const std::vector<NavigationState> frames{truth(20 * kPeriodNs), truth(60 * kPeriodNs)};
   const auto all = at_imu_rate(frames, circle_samples(100), report());
   ASSERT_EQ(all.size(), 41u);
   for (std::size_t i = 0; i < all.size(); ++i) {
-    const InertialMoment expected = truth(static_cast<std::int64_t>(20 + i) * kPeriodNs);
+    const NavigationState expected = truth(static_cast<std::int64_t>(20 + i) * kPeriodNs);
     EXPECT_EQ(all[i].timestamp_ns, expected.timestamp_ns);
     EXPECT_LT((all[i].world_from_rig.inverse() * expected.world_from_rig).log().norm(), 1e-5);
     EXPECT_LT((all[i].velocity - expected.velocity).norm(), 1e-4);
@@ -58,7 +58,7 @@ TEST(InertialPath, HasAMomentForEverySample) {
 }
 
 TEST(InertialPath, MeetsTheFramesHoweverFarOffTheSamplesLead) {
-  std::vector<InertialMoment> frames{truth(0), truth(40 * kPeriodNs)};
+  std::vector<NavigationState> frames{truth(0), truth(40 * kPeriodNs)};
   const Rigid3 off(so3_exp({0.0, 0.01, 0.0}), {0.0, 0.0, 0.02});
   frames[1].world_from_rig = frames[1].world_from_rig * off;
   const auto all = at_imu_rate(frames, circle_samples(100), report());
@@ -69,7 +69,7 @@ TEST(InertialPath, MeetsTheFramesHoweverFarOffTheSamplesLead) {
 }
 
 TEST(InertialPath, KeepsFramesBetweenWhichSamplesAreMissing) {
-  const std::vector<InertialMoment> frames{truth(0), truth(500 * kPeriodNs)};
+  const std::vector<NavigationState> frames{truth(0), truth(500 * kPeriodNs)};
   EXPECT_EQ(at_imu_rate(frames, circle_samples(100), report()).size(), 2u);
 }
 

@@ -14,20 +14,20 @@
 namespace waymark {
 namespace {
 
-/// A longer time between moments is a gap.
+/// A longer time between states is a gap.
 constexpr std::int64_t kGapNs = 1'000'000'000;
 
 std::string figure_of(const RunFolder& run,
                       const std::string& title,
-                      const std::function<double(const InertialMoment&)>& value) {
+                      const std::function<double(const NavigationState&)>& value) {
   DrawnCurve curve{{}, {}, {}, "time [s]", title};
   const std::int64_t first_ns = run.inertial.front().timestamp_ns;
   std::int64_t last_ns = first_ns;
-  for (const InertialMoment& moment : run.inertial) {
-    curve.x.push_back(1e-9 * static_cast<double>(moment.timestamp_ns - first_ns));
-    curve.y.push_back(value(moment));
-    curve.starts_stroke.push_back(moment.timestamp_ns - last_ns > kGapNs);
-    last_ns = moment.timestamp_ns;
+  for (const NavigationState& state : run.inertial) {
+    curve.x.push_back(1e-9 * static_cast<double>(state.timestamp_ns - first_ns));
+    curve.y.push_back(value(state));
+    curve.starts_stroke.push_back(state.timestamp_ns - last_ns > kGapNs);
+    last_ns = state.timestamp_ns;
   }
   return fmt::format(
       "<figure><figcaption>{}</figcaption>\n{}</figure>\n", title, draw_curve(curve));
@@ -38,13 +38,13 @@ std::string curves_of(const RunFolder& run) {
   constexpr double kDegrees = 180.0 / M_PI;
   const auto& figure = figure_of;
   return "<div class=\"side-by-side\">\n" +
-         figure(run, "Speed [m/s]", [](const auto& moment) { return moment.velocity.norm(); }) +
+         figure(run, "Speed [m/s]", [](const auto& state) { return state.velocity.norm(); }) +
          figure(run,
                 "Bias of the gyroscope [degrees/s]",
-                [](const auto& moment) { return kDegrees * moment.biases.gyroscope.norm(); }) +
+                [](const auto& state) { return kDegrees * state.biases.gyroscope.norm(); }) +
          figure(run,
                 "Bias of the accelerometer [m/s²]",
-                [](const auto& moment) { return moment.biases.accelerometer.norm(); }) +
+                [](const auto& state) { return state.biases.accelerometer.norm(); }) +
          "</div>\n";
 }
 

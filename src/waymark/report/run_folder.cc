@@ -254,31 +254,31 @@ std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::
   return points;
 }
 
-std::vector<InertialMoment> parse_inertial_csv(std::string_view text, const std::string& name) {
+std::vector<NavigationState> parse_inertial_csv(std::string_view text, const std::string& name) {
   constexpr std::size_t kNumColumns = 13;
   constexpr double kMaxValue = 1e6;
   RowReader rows(text, name, ',');
   rows.next();
-  std::vector<InertialMoment> moments;
+  std::vector<NavigationState> states;
   while (rows.next()) {
     rows.expect_exactly(kNumColumns, "the columns of a run's inertial.csv");
     const auto vector = [&](std::size_t first) {
       return Eigen::Vector3d(rows.number(first), rows.number(first + 1), rows.number(first + 2));
     };
-    InertialMoment moment;
-    moment.timestamp_ns = rows.nanoseconds(0);
-    moment.velocity = vector(1);
-    moment.biases = {vector(7), vector(10)};
-    const double largest = std::max({moment.velocity.cwiseAbs().maxCoeff(),
-                                     moment.biases.gyroscope.cwiseAbs().maxCoeff(),
-                                     moment.biases.accelerometer.cwiseAbs().maxCoeff()});
-    const bool is_later = moments.empty() || moment.timestamp_ns > moments.back().timestamp_ns;
+    NavigationState state;
+    state.timestamp_ns = rows.nanoseconds(0);
+    state.velocity = vector(1);
+    state.biases = {vector(7), vector(10)};
+    const double largest = std::max({state.velocity.cwiseAbs().maxCoeff(),
+                                     state.biases.gyroscope.cwiseAbs().maxCoeff(),
+                                     state.biases.accelerometer.cwiseAbs().maxCoeff()});
+    const bool is_later = states.empty() || state.timestamp_ns > states.back().timestamp_ns;
     if (!(largest <= kMaxValue) || !is_later) {
-      throw InputError(rows.where(), "is no moment after the one before, expected a run's");
+      throw InputError(rows.where(), "is no state after the one before, expected a run's");
     }
-    moments.push_back(moment);
+    states.push_back(state);
   }
-  return moments;
+  return states;
 }
 
 RunFolder read_run_folder(const std::filesystem::path& folder) {

@@ -23,7 +23,7 @@ struct RunFolder {
   std::vector<std::vector<StampedPose>> trajectories;
   std::vector<Eigen::Vector3f> points;  ///< Of the map of the first; may be missing.
   /// Of its frames, without poses and covariances; empty without an IMU that told metres.
-  std::vector<InertialMoment> inertial;
+  std::vector<NavigationState> inertial;
 };
 
 /// Reads the files of a folder. Whatever is wrong with one of them, be it damaged or made to do
@@ -38,6 +38,6 @@ RunSummary parse_summary_json(std::string_view text, const std::string& name);
 std::vector<Eigen::Vector3f> parse_points_ply(std::string_view text, const std::string& name);
 
 /// The same of inertial.csv.
-std::vector<InertialMoment> parse_inertial_csv(std::string_view text, const std::string& name);
+std::vector<NavigationState> parse_inertial_csv(std::string_view text, const std::string& name);
 
 }  // namespace waymark

@@ -124,16 +124,16 @@ TEST(RunFolder, WrongSummariesAreNamed) {
 }
 
 TEST(RunFolder, MomentsReadBackAsWritten) {
-  std::vector<InertialMoment> moments(2);
-  moments[1].timestamp_ns = 50;
-  moments[1].velocity = {1.0, -2.0, 3.0};
-  moments[1].biases = {{0.1, 0.2, 0.3}, {4.0, 5.0, 6.0}};
-  const std::string text = format_inertial_csv(moments);
+  std::vector<NavigationState> states(2);
+  states[1].timestamp_ns = 50;
+  states[1].velocity = {1.0, -2.0, 3.0};
+  states[1].biases = {{0.1, 0.2, 0.3}, {4.0, 5.0, 6.0}};
+  const std::string text = format_inertial_csv(states);
   const auto read = parse_inertial_csv(text, "a");
   ASSERT_EQ(read.size(), 2u);
-  EXPECT_EQ(read[1].velocity, moments[1].velocity);
-  EXPECT_EQ(read[1].biases.gyroscope, moments[1].biases.gyroscope);
-  EXPECT_EQ(read[1].biases.accelerometer, moments[1].biases.accelerometer);
+  EXPECT_EQ(read[1].velocity, states[1].velocity);
+  EXPECT_EQ(read[1].biases.gyroscope, states[1].biases.gyroscope);
+  EXPECT_EQ(read[1].biases.accelerometer, states[1].biases.accelerometer);
   const std::string last = text.substr(text.rfind('\n', text.size() - 2) + 1);
   EXPECT_THAT(fault_of([&] { parse_inertial_csv(text + last, "a"); }), HasSubstr("a:4"));
   EXPECT_THAT(fault_of([&] { parse_inertial_csv(text + "1,2\n", "a"); }), HasSubstr("a:4"));

@@ -281,27 +281,6 @@ std::string format_poses_csv(const FrameTable& table,
   return text;
 }
 
-std::string format_inertial_csv(std::span<const InertialMoment> moments) {
-  std::string text =
-      "timestamp_ns,velocity_x,velocity_y,velocity_z,position_sigma,rotation_sigma,velocity_sigma,"
-      "gyro_bias_x,gyro_bias_y,gyro_bias_z,accel_bias_x,accel_bias_y,accel_bias_z\n";
-  const auto append = [&text](const Eigen::Vector3d& values) {
-    for (const double value : values) text += fmt::format(",{:.6g}", value);
-  };
-  for (const InertialMoment& moment : moments) {
-    text += fmt::to_string(moment.timestamp_ns);
-    append(moment.velocity);
-    for (int part = 0; part < 3; ++part) {
-      const double variance = moment.covariance.diagonal().segment<3>(3 * part).mean();
-      text += fmt::format(",{:.6g}", std::sqrt(variance));
-    }
-    append(moment.biases.gyroscope);
-    append(moment.biases.accelerometer);
-    text += "\n";
-  }
-  return text;
-}
-
 std::string format_summary_json(const RunSummary& summary) {
   Json json;
   append_counts(json, summary.counts, summary.num_trajectory_lines);

@@ -203,7 +203,7 @@ std::string format_poses_csv(const FrameTable& table,
                              std::span<const std::vector<StampedPose>> trajectories);
 
 /// The text of inertial.csv: what vision and an IMU tell together of each frame.
-std::string format_inertial_csv(std::span<const InertialMoment> moments);
+std::string format_inertial_csv(std::span<const NavigationState> states);
 
 /// Writes frames.csv into the folder; throws OutputError.
 void write_frames_csv(const std::filesystem::path& folder, const FrameTable& table);

@@ -185,12 +185,12 @@ TEST(Results, OfImagesWithoutTimesHaveNamesInstead) {
 }
 
 TEST(Results, TellVelocityAndBiasesOfEachFrame) {
-  InertialMoment moment;
-  moment.timestamp_ns = 5000;
-  moment.velocity = {1.0, -2.5, 0.0};
-  moment.covariance.diagonal() << 1.0, 4.0, 4.0, 9.0, 9.0, 9.0, 16.0, 0.0, 32.0;
-  moment.biases = {{0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}};
-  const std::string text = format_inertial_csv(std::vector{moment});
+  NavigationState state;
+  state.timestamp_ns = 5000;
+  state.velocity = {1.0, -2.5, 0.0};
+  state.covariance.diagonal() << 1.0, 4.0, 4.0, 9.0, 9.0, 9.0, 16.0, 0.0, 32.0;
+  state.biases = {{0.01, 0.02, 0.03}, {0.1, 0.2, 0.3}};
+  const std::string text = format_inertial_csv(std::vector{state});
   EXPECT_THAT(text,
               ::testing::HasSubstr("accel_bias_z\n5000,1,-2.5,0,1.73205,3,4,0.01,0.02,0.03,"));
 }

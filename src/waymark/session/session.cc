@@ -211,7 +211,7 @@ void add_trajectories(const Map& map,
 /// Where the first trajectory is the one that it is of: that with most frames and with most of the
 /// map are hardly ever two.
 void add_inertial_path(const System& system, bool wants_imu_rate, SessionResults& results) {
-  const std::vector<InertialMoment>& path = system.inertial_path();
+  const std::vector<NavigationState>& path = system.inertial_path();
   if (path.empty() || results.trajectories.empty()) return;
   const auto is_first = [&](const StampedPose& pose) {
     return pose.timestamp_ns == path.front().timestamp_ns;
@@ -219,8 +219,8 @@ void add_inertial_path(const System& system, bool wants_imu_rate, SessionResults
   if (std::ranges::none_of(results.trajectories.front(), is_first)) return;
   results.inertial = path;
   if (!wants_imu_rate) return;
-  for (const InertialMoment& moment : system.inertial_path_at_imu_rate()) {
-    results.at_imu_rate.push_back({moment.timestamp_ns, moment.world_from_rig});
+  for (const NavigationState& state : system.inertial_path_at_imu_rate()) {
+    results.at_imu_rate.push_back({state.timestamp_ns, state.world_from_rig});
   }
 }
 

@@ -34,7 +34,7 @@ struct SessionResults {
   /// Some landmarks of the same, in its frame: see kMaxShownPoints.
   std::vector<Eigen::Vector3f> points;
   /// Frames of the first trajectory as an IMU and vision tell them; empty without.
-  std::vector<InertialMoment> inertial;
+  std::vector<NavigationState> inertial;
   /// What trajectory.txt has for the first trajectory where it is asked for at the IMU's rate.
   std::vector<StampedPose> at_imu_rate;
   RunSummary summary;

@@ -10,6 +10,7 @@
 #include "waymark/imu/imu_health.h"
 #include "waymark/imu/preintegration.h"
 #include "waymark/map/align.h"
+#include "waymark/system/inertial_join.h"
 #include "waymark/system/trajectory.h"
 #include "waymark/track/last_frame.h"
 
@@ -39,9 +40,8 @@ constexpr double kSystematicTimeShift_s = 2e-4;
 constexpr std::size_t kShownSamples = 2000;
 /// Of the lengths of a map that is metric, as a part: baselines and depths are that good.
 constexpr double kMetricSigma = 0.01;
-/// A scale is told where its logarithm has a smaller standard deviation, and a turn of the
-/// gyroscope where that of its mounting, in rad, has.
-constexpr double kFirmScale = 0.05;
+/// A turn of the gyroscope is told where that of its mounting, in rad, has a smaller standard
+/// deviation.
 constexpr double kFirmRotation = 0.02;
 /// Of the scale with which the map is put into metres while it grows, once.
 constexpr double kSureScale = 0.01;
@@ -87,6 +87,11 @@ double distance_of_things(const Map& map, SubmapId submap) {
     if (of_one > 0.0f) inverse.push_back(of_one);
   });
   return inverse.empty() ? 1.0 : 1.0 / static_cast<double>(median(inverse));
+}
+
+/// What puts a part of the map into metres, level.
+Sim3 level_and_metric(const InertialSetup& setup) {
+  return Sim3(turn_upright(-setup.gravity), Eigen::Vector3d::Zero(), std::exp(setup.log_scale));
 }
 
 /// Whether an estimate is further from what was believed before than both allow: what it moved by
@@ -176,14 +181,20 @@ std::optional<SubmapPlacement> InertialEstimator::update(const TrajectoryMemory&
   if (!report_->is_used || report_->scale_sigma > kSureScale) return std::nullopt;
   if (is_placement_sent_ || map.submaps()[submap.value].is_metric) return std::nullopt;
   is_placement_sent_ = true;
-  return SubmapPlacement{submap, level_and_metric()};
+  return SubmapPlacement{submap, level_and_metric(found_->setup)};
 }
 
-/// Of the map as it was looked at last.
-Sim3 InertialEstimator::level_and_metric() const {
-  return Sim3(turn_upright(-found_->setup.gravity),
-              Eigen::Vector3d::Zero(),
-              std::exp(found_->setup.log_scale));
+/// Of a part, which may be another one than that of the whole way.
+InertialKnowledge InertialEstimator::knowledge_of(SubmapId submap, const Map& map) const {
+  InertialKnowledge known = knowledge();
+  if (submap == found_in_) return known;
+  known.has_same_scale = false;
+  known.distance_of_things = distance_of_things(map, submap);
+  known.options.pose_position_sigma = kPoseSigma * known.distance_of_things;
+  known.options.log_scale = 0.0;
+  known.options.log_scale_sigma =
+      map.submaps()[submap.value].is_metric ? kMetricSigma : InertialStartOptions().log_scale_sigma;
+  return known;
 }
 
 void InertialEstimator::note_placement(const SubmapPlacement& placement, FrameId frame) {
@@ -283,8 +294,14 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
                                                      std::shared_ptr<const Map> map,
                                                      bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
-  const SubmapId submap = submaps_by_size(*map).front();
-  look(choose_poses(list_poses(memory, *map), submap), submap, *map);
+  const auto look_at_largest = [&] {
+    const SubmapId largest = submaps_by_size(*map).front();
+    look(choose_poses(list_poses(memory, *map), largest), largest, *map);
+    return largest;
+  };
+  SubmapId submap = look_at_largest();
+  const auto known = [&](SubmapId part) { return knowledge_of(part, *map); };
+  while (is_frame_free && is_firm() && join_parts(memory, known, map)) submap = look_at_largest();
   if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
     path_ = smooth_trajectory(knowledge(), submap, *map, memory);
   }
@@ -294,7 +311,7 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
     return map;
   }
   const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
-  Sim3 level = level_and_metric();
+  Sim3 level = level_and_metric(found_->setup);
   if (!is_scaled) level.scale = 1.0;
   report_->gravity_in_world = level.rotation * report_->gravity_in_world;
   move_path(level);
@@ -309,20 +326,35 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
   } else {
     transform_submap(next, submap, level);
   }
+  place_other_parts(memory, *map, next);
   return next.freeze();
 }
 
-std::vector<InertialMoment> InertialEstimator::path_at_imu_rate() const {
+/// Puts the parts into metres, level, that are not the one that was looked at.
+void InertialEstimator::place_other_parts(const TrajectoryMemory& memory,
+                                          const Map& map,
+                                          Map& placed) const {
+  const std::vector<TrajectoryFrame> frames = list_poses(memory, map);
+  for (const SubmapId part : submaps_by_size(map)) {
+    const std::vector<VisionPose> poses = choose_poses(frames, part);
+    if (part == found_in_ || map.submaps()[part.value].is_metric || poses.empty()) continue;
+    const auto told = start_again(knowledge_of(part, map), poses);
+    if (!told || told->is_contradicted() || told->sigma(kLogScaleAt) > kFirmScale) continue;
+    placed = put_into_metres(std::move(placed), part, level_and_metric(told->setup));
+  }
+}
+
+std::vector<NavigationState> InertialEstimator::path_at_imu_rate() const {
   return path_.empty() ? path_ : at_imu_rate(path_, samples_, *report_);
 }
 
 void InertialEstimator::move_path(const Sim3& new_from_old) {
-  for (InertialMoment& moment : path_) {
-    const Rigid3& old = moment.world_from_rig;
-    moment.world_from_rig = {new_from_old.rotation * old.rotation, new_from_old * old.translation};
-    moment.velocity = new_from_old.rotation * moment.velocity;
-    moment.covariance.topRows<3>() *= new_from_old.scale;
-    moment.covariance.leftCols<3>() *= new_from_old.scale;
+  for (NavigationState& state : path_) {
+    const Rigid3& old = state.world_from_rig;
+    state.world_from_rig = {new_from_old.rotation * old.rotation, new_from_old * old.translation};
+    state.velocity = new_from_old.rotation * state.velocity;
+    state.covariance.topRows<3>() *= new_from_old.scale;
+    state.covariance.leftCols<3>() *= new_from_old.scale;
   }
 }
 

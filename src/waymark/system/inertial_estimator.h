@@ -70,15 +70,15 @@ class InertialEstimator {
   const std::optional<InertialReport>& report() const { return report_; }
 
   /// The frames of the largest part, after finish(); empty where lengths in metres are not told.
-  const std::vector<InertialMoment>& path() const { return path_; }
+  const std::vector<NavigationState>& path() const { return path_; }
   /// The same at the rate of the samples.
-  std::vector<InertialMoment> path_at_imu_rate() const;
+  std::vector<NavigationState> path_at_imu_rate() const;
 
  private:
-  /// What puts the map into metres, level; where something was found.
-  Sim3 level_and_metric() const;
   /// The same.
   InertialKnowledge knowledge() const;
+  InertialKnowledge knowledge_of(SubmapId submap, const Map& map) const;
+  void place_other_parts(const TrajectoryMemory& memory, const Map& map, Map& placed) const;
   /// Whether all but the states is known well.
   bool is_firm() const;
   void move_path(const Sim3& new_from_old);
@@ -92,7 +92,7 @@ class InertialEstimator {
   InertialStartOptions options_;            ///< That it was found with.
   std::optional<DeadReckoning> reckoning_;  ///< From the newest frame that had a pose when asked.
   std::optional<InertialReport> report_;
-  std::vector<InertialMoment> path_;
+  std::vector<NavigationState> path_;
   bool is_placement_sent_ = false;
   std::optional<FrameId> metric_from_;
   SubmapId metric_submap_;

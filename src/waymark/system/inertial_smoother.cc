@@ -114,7 +114,7 @@ void smooth_window(const InertialKnowledge& known,
                    std::size_t end_wanted,
                    const Map& map,
                    TrajectoryMemory& memory,
-                   std::vector<InertialMoment>& path) {
+                   std::vector<NavigationState>& path) {
   std::vector<VisionPose> poses;
   for (const SmoothedFrame& frame : window) poses.push_back(frame.pose);
   const auto told = start_again(known, poses);
@@ -145,8 +145,10 @@ std::optional<InertialStart> start_again(const InertialKnowledge& known,
   const InertialStart& found = known.found;
   const ImuCalibration told{found.setup.imu_from_rig, found.time_shift_s, known.noise};
   InertialStartOptions options = known.options;
-  options.log_scale = found.setup.log_scale;
-  options.log_scale_sigma = found.sigma(kLogScaleAt);
+  if (known.has_same_scale) {
+    options.log_scale = found.setup.log_scale;
+    options.log_scale_sigma = found.sigma(kLogScaleAt);
+  }
   options.told_lever_arm_sigma = largest_sigma(found.covariance(), kLeverArmAt);
   options.told_rotation_sigma = largest_sigma(found.covariance(), kRotationAt);
   options.told_time_shift_sigma_s = found.sigma(kTimeShiftAt);
@@ -160,11 +162,11 @@ bool is_sure(const InertialKnowledge& known, const Matrix25d& covariance) {
          largest_sigma(covariance, kStateAt + 3) < kSureAngle;
 }
 
-std::vector<InertialMoment> smooth_trajectory(const InertialKnowledge& known,
-                                              SubmapId submap,
-                                              const Map& map,
-                                              TrajectoryMemory& memory) {
-  std::vector<InertialMoment> path;
+std::vector<NavigationState> smooth_trajectory(const InertialKnowledge& known,
+                                               SubmapId submap,
+                                               const Map& map,
+                                               TrajectoryMemory& memory) {
+  std::vector<NavigationState> path;
   Stretches stretches(submap, map, memory);
   while (true) {
     const std::vector<SmoothedFrame> stretch = stretches.next();

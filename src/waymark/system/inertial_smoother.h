@@ -19,6 +19,8 @@ inline constexpr std::int64_t kMaxBridgedNs = 10'000'000'000;
 
 /// What a scale may be off by as a part, however many poses tell it.
 inline constexpr double kSystematicScale = 0.002;
+/// A scale is told where its logarithm has a smaller standard deviation.
+inline constexpr double kFirmScale = 0.05;
 
 /// What is known of an IMU in a part of the map.
 struct InertialKnowledge {
@@ -27,6 +29,7 @@ struct InertialKnowledge {
   ImuNoise noise;
   InertialStartOptions options;  ///< With how good poses of vision are.
   double distance_of_things;     ///< In map units.
+  bool has_same_scale = true;    ///< As `found`, not of another part, whose scale is free.
 };
 
 /// The states of poses, with all but them as it was found of the whole way.
@@ -39,10 +42,10 @@ bool is_sure(const InertialKnowledge& known, const Matrix25d& covariance);
 
 /// Makes the poses of all frames in a part of the map those that vision and IMU tell together, and
 /// gives those to frames that vision did not find, as long as stretches without are short. Gives
-/// the moments of these frames, in map units.
-std::vector<InertialMoment> smooth_trajectory(const InertialKnowledge& known,
-                                              SubmapId submap,
-                                              const Map& map,
-                                              TrajectoryMemory& memory);
+/// the states of these frames, in map units.
+std::vector<NavigationState> smooth_trajectory(const InertialKnowledge& known,
+                                               SubmapId submap,
+                                               const Map& map,
+                                               TrajectoryMemory& memory);
 
 }  // namespace waymark

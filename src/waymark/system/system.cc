@@ -224,10 +224,10 @@ void System::prepare(const FrameImages& images, std::shared_ptr<const void> owne
 void System::set_imu(const ImuCalibration& calibration) { impl_->set_imu(calibration); }
 void System::feed_imu(const ImuSample& sample) { impl_->feed_imu(sample); }
 const std::optional<InertialReport>& System::inertial() const { return impl_->inertial().report(); }
-const std::vector<InertialMoment>& System::inertial_path() const {
+const std::vector<NavigationState>& System::inertial_path() const {
   return impl_->inertial().path();
 }
-std::vector<InertialMoment> System::inertial_path_at_imu_rate() const {
+std::vector<NavigationState> System::inertial_path_at_imu_rate() const {
   return impl_->inertial().path_at_imu_rate();
 }
 std::optional<double> System::imu_rate_hz() const { return impl_->inertial().rate_hz(); }

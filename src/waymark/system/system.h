@@ -103,9 +103,9 @@ class System {
   const std::optional<InertialReport>& inertial() const;
   /// What it and vision tell together of the frames of the largest part of the map, after finish();
   /// empty where lengths are not known in metres. Its poses are those of trajectory().
-  const std::vector<InertialMoment>& inertial_path() const;
+  const std::vector<NavigationState>& inertial_path() const;
   /// The same at the rate of its samples.
-  std::vector<InertialMoment> inertial_path_at_imu_rate() const;
+  std::vector<NavigationState> inertial_path_at_imu_rate() const;
   /// Samples per second of late; nothing before there are two.
   std::optional<double> imu_rate_hz() const;
 
