@@ -5,7 +5,6 @@
 #include <pybind11/pybind11.h>
 #include <pybind11/stl.h>
 
-#include <functional>
 #include <stdexcept>
 #include <string>
 #include <utility>
@@ -27,6 +26,12 @@ constexpr double kMaxMemoryGb = 1e6;
 
 /// A System with what arguments need to be understood; what takes long lets other threads run.
 class PythonSystem {
+  template <class Get>
+  auto ask(Get get) {
+    const Turn turn = take();
+    return (system_.*get)();
+  }
+
  public:
   PythonSystem(SessionConfig config, Timing timing, std::shared_ptr<PythonMap> map);
 
@@ -164,11 +169,6 @@ class PythonSystem {
     }
   }
 
-  template <class Get>
-  auto ask(Get get) {
-    const Turn turn = take();
-    return std::invoke(get, system_);
-  }
   Turn take() { return Turn(is_taken_, "System", process_); }
 
   SessionConfig config_;
