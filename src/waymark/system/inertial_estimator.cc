@@ -47,6 +47,9 @@ constexpr double kFirmRotation = 0.02;
 constexpr double kSureScale = 0.01;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
+/// A turn that two poses tell is off by less, in rad and as a part of it.
+constexpr double kTurnError = 0.003;
+constexpr double kTurnPart = 0.04;
 
 /// Poses evenly over the way; where these would be too far apart, in bursts.
 std::vector<VisionPose> spread_out(std::span<const VisionPose> poses) {
@@ -271,16 +274,44 @@ std::optional<ReckonedPose> InertialEstimator::dead_reckon(const TrajectoryMemor
   return reckoning_->to(knowledge(), timestamp_ns);
 }
 
-std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
-                                                          std::int64_t end_ns) const {
-  if (!is_firm() || end_ns - begin_ns > kMaxBridgedNs) return std::nullopt;
-  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * found_->time_shift_s));
+std::optional<Eigen::Quaterniond> InertialEstimator::turn_by(const Eigen::Quaterniond& imu_from_rig,
+                                                             double time_shift_s,
+                                                             const ImuBiases& biases,
+                                                             std::int64_t begin_ns,
+                                                             std::int64_t end_ns) const {
+  if (end_ns - begin_ns > kMaxBridgedNs) return std::nullopt;
+  const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * time_shift_s));
   std::vector<ImuSample> samples = samples_.between(begin_ns + shift_ns, end_ns + shift_ns);
   if (samples.empty()) return std::nullopt;
-  const Preintegration turned(
-      std::move(samples), default_imu_noise(), found_->states.back().biases);
-  const Eigen::Quaterniond& imu_from_rig = found_->setup.imu_from_rig.rotation;
+  const Preintegration turned(std::move(samples), default_imu_noise(), biases);
   return imu_from_rig.conjugate() * turned.delta().rotation.conjugate() * imu_from_rig;
+}
+
+std::optional<Eigen::Quaterniond> InertialEstimator::turn(std::int64_t begin_ns,
+                                                          std::int64_t end_ns) const {
+  if (!is_firm()) return std::nullopt;
+  return turn_by(found_->setup.imu_from_rig.rotation,
+                 found_->time_shift_s,
+                 found_->states.back().biases,
+                 begin_ns,
+                 end_ns);
+}
+
+bool InertialEstimator::contradicts_turn(std::int64_t begin_ns,
+                                         std::int64_t end_ns,
+                                         const Eigen::Quaterniond& rig_end_from_rig_begin,
+                                         double largest_bias) const {
+  std::optional<Eigen::Quaterniond> measured = turn(begin_ns, end_ns);
+  if (measured) {
+    largest_bias = kFirmBias;
+  } else if (told_.imu_from_rig) {
+    const double time_shift_s = told_.time_shift_s.value_or(0.0);
+    measured = turn_by(told_.imu_from_rig->rotation, time_shift_s, {}, begin_ns, end_ns);
+  }
+  if (!measured) return false;
+  const double of_angle = kTurnPart * measured->angularDistance(Eigen::Quaterniond::Identity());
+  const double of_bias = 1e-9 * static_cast<double>(end_ns - begin_ns) * largest_bias;
+  return measured->angularDistance(rig_end_from_rig_begin) > kTurnError + of_angle + of_bias;
 }
 
 std::optional<Eigen::Vector3f> InertialEstimator::turn_rad_s(std::int64_t timestamp_ns) const {

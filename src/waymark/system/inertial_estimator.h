@@ -49,6 +49,14 @@ class InertialEstimator {
   /// before that is known well, and where samples are missing.
   std::optional<Eigen::Quaterniond> turn(std::int64_t begin_ns, std::int64_t end_ns) const;
 
+  /// Whether the gyroscope contradicts that the rig turned so from one image to another, by more
+  /// than poses err. Before it is known well by its mounting as told, and a bias of up to
+  /// largest_bias, in rad/s; never where none is told.
+  bool contradicts_turn(std::int64_t begin_ns,
+                        std::int64_t end_ns,
+                        const Eigen::Quaterniond& rig_end_from_rig_begin,
+                        double largest_bias) const;
+
   /// How the rig turns about a moment by the gyroscope, as RigMotion has it; where turn() tells it.
   std::optional<Eigen::Vector3f> turn_rad_s(std::int64_t timestamp_ns) const;
 
@@ -82,6 +90,12 @@ class InertialEstimator {
   /// Whether all but the states is known well.
   bool is_firm() const;
   void move_path(const Sim3& new_from_old);
+  /// As turn() has it, by an IMU that is mounted and biased so.
+  std::optional<Eigen::Quaterniond> turn_by(const Eigen::Quaterniond& imu_from_rig,
+                                            double time_shift_s,
+                                            const ImuBiases& biases,
+                                            std::int64_t begin_ns,
+                                            std::int64_t end_ns) const;
   void look(std::span<const VisionPose> poses, SubmapId submap, const Map& map);
 
   ImuCalibration told_;

@@ -110,6 +110,13 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
       };
     }
   }
+  if (inertial_.has_samples()) {
+    frame.contradicts_turn = [&, time_ns = frame.timestamp_ns](std::int64_t begin_ns,
+                                                               const Eigen::Quaterniond& turn,
+                                                               double largest_bias) {
+      return inertial_.contradicts_turn(begin_ns, time_ns, turn, largest_bias);
+    };
+  }
   {
     StageTimer timer(result_.stages, Stage::kWait);
     back_end_.update(id, visible_);

@@ -35,6 +35,11 @@ struct Frame {
   std::optional<Eigen::Quaterniond> turn = std::nullopt;
   /// How it turns within the frame by a gyroscope, as RigMotion has it.
   std::optional<Eigen::Vector3f> turn_rad_s = std::nullopt;
+  /// Whether a gyroscope contradicts that the rig turned so since a moment (rig_from_rig_then), as
+  /// long as its bias, where that is not known, is no larger (rad/s). Empty where there is none.
+  std::function<bool(
+      std::int64_t begin_ns, const Eigen::Quaterniond& rig_from_rig_then, double largest_bias)>
+      contradicts_turn = nullptr;
   /// Asked where it is not found by its motion; nothing where an IMU does not tell it well enough,
   /// empty where there is none.
   std::function<std::optional<ReckonedPose>()> dead_reckon = nullptr;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "waymark/base/adaptive_threshold.h"
 #include "waymark/base/median.h"
@@ -15,6 +16,12 @@
 
 namespace waymark {
 namespace {
+
+/// A gyroscope that contradicts a pair is believed unless its bias, in rad/s, may be why: the more
+/// frames pass, the larger biases may. After so many frames it is not believed.
+constexpr double kUsualBias = 0.05;
+constexpr double kBiasPerFrame = 0.0025;
+constexpr int kMaxContradicted = 20;
 
 const Camera& camera_of(const Frame& frame) { return *frame.features->rig->cameras[0].camera; }
 
@@ -169,6 +176,7 @@ std::optional<Initialization> Initializer::start_from_two_views(const Frame& fra
       return start;
     }
   }
+  num_contradicted_ += std::exchange(is_contradicted_, false);
   passed_.push_back(frame);
   if (references_.empty() ||
       (frame.id.value - references_.back().frame.id.value >=
@@ -269,6 +277,14 @@ std::optional<Initialization> Initializer::try_pair(const Reference& reference,
       *reference.frame.features, *frame.features, reference.matches, *two_view.geometry);
   if (static_cast<int>(pair.matches.size()) < enough) {
     reason_ = FrameReason::kTooFewInliers;
+    return std::nullopt;
+  }
+  if (num_contradicted_ < kMaxContradicted && frame.contradicts_turn &&
+      frame.contradicts_turn(reference.frame.timestamp_ns,
+                             pair.b_from_a.rotation,
+                             kUsualBias + kBiasPerFrame * num_contradicted_)) {
+    is_contradicted_ = true;
+    reason_ = FrameReason::kNotVerified;
     return std::nullopt;
   }
   Initialization start;

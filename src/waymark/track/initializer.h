@@ -30,9 +30,9 @@ struct Initialization {
 
 /// Starts a map: from the first frame with enough depth, or in mono from two views. In mono several
 /// earlier frames are kept as references; each new frame is matched to all of them, and the first
-/// pair with a well conditioned geometry makes the map. The frames in between are then located in
-/// it, the newest kMaxPassed of them at most: a camera may stand still for any time before it
-/// moves.
+/// pair with a well conditioned geometry makes the map, unless a gyroscope contradicts its turn:
+/// then most features are on what moves. The frames in between are then located in it, the newest
+/// kMaxPassed of them at most: a camera may stand still for any time before it moves.
 class Initializer {
  public:
   static constexpr std::size_t kMaxPassed = 300;
@@ -87,7 +87,9 @@ class Initializer {
   ProjectionMatcher projection_;
   PoseWorkspace pose_workspace_;
   std::deque<Reference> references_;
-  std::deque<Frame> passed_;  ///< The newest frames since the oldest reference.
+  bool is_contradicted_ = false;  ///< A pair with the newest frame.
+  int num_contradicted_ = 0;      ///< Frames whose pairs a gyroscope contradicted.
+  std::deque<Frame> passed_;      ///< The newest frames since the oldest reference.
 };
 
 }  // namespace waymark

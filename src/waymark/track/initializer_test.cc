@@ -108,6 +108,52 @@ TEST(Initializer, MonoStartsWithTheTrueMotionUpToScale) {
   EXPECT_LT(errors[errors.size() / 2], 0.06);
 }
 
+/// A camera that moves sideways, and in the first of its frames a box that has most of the features
+/// and turns before it.
+struct BoxInTheWay {
+  static constexpr std::uint32_t kNumHidden = 12;
+  Scene room = {make_test_rig(1), cloud_ahead(400), {.seed = 2}, sideways()};
+
+  Frame frame(std::uint32_t number) const {
+    Scene seen = room;
+    if (number < kNumHidden) {
+      const Rigid3 turned = pose_at(0.0, 0.0, 2.5, 0.03 * number);
+      seen.cloud = with_box(seen.cloud, scatter_in({-1, -1, -1}, {1, 1, 1}, 1200, 3.0, 4), turned);
+    }
+    return seen.frame(number);
+  }
+  /// As a gyroscope without bias tells it.
+  bool contradicts(std::uint32_t begin, std::uint32_t end, const Eigen::Quaterniond& turn) const {
+    const Rigid3 truth = room.world_from_rig(end).inverse() * room.world_from_rig(begin);
+    return turn.angularDistance(truth.rotation) > 0.01;
+  }
+};
+
+std::optional<std::uint32_t> start_beside_box(bool has_gyroscope, bool is_gyroscope_wrong) {
+  const BoxInTheWay scene;
+  Initializer initializer(false, 7);
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    Frame frame = scene.frame(i);
+    if (has_gyroscope) {
+      frame.contradicts_turn = [&, i](std::int64_t begin_ns, const auto& turn, double) {
+        const auto begin = static_cast<std::uint32_t>(begin_ns / 50'000'000);
+        return is_gyroscope_wrong || scene.contradicts(begin, i, turn);
+      };
+    }
+    if (initializer.add(frame)) return i;
+  }
+  return std::nullopt;
+}
+
+TEST(Initializer, MonoDoesNotStartFromATurnThatAGyroscopeContradicts) {
+  ASSERT_LT(start_beside_box(false, false).value(), BoxInTheWay::kNumHidden);
+  EXPECT_GE(start_beside_box(true, false).value(), BoxInTheWay::kNumHidden);
+}
+
+TEST(Initializer, MonoStartsThoughAGyroscopeContradictsWhatever) {
+  EXPECT_GT(start_beside_box(true, true).value(), 19u);
+}
+
 TEST(Initializer, MonoFillsTheFramesItSkipped) {
   const Scene scene = mono_scene(sideways());
   const Started started = run(scene, false, 40);
