@@ -255,12 +255,12 @@ void bind_imu(SystemClass& system) {
 Measurements of an IMU (docs/imu.md), which frames fed later make use of: one, or arrays of N.
 timestamp_ns: int or array (N,), later than those before, others are left out.
 angular_velocity, acceleration: array (3,) or (N, 3), rad/s and m/s^2, gravity included.)")
-      .def(
-          "inertial", &PythonSystem::inertial, "An InertialReport so far, or None without samples.")
+      .def("inertial",
+           &PythonSystem::inertial,
+           "inertial(self)\n--\n\nAn InertialReport, or None without samples.")
       .def("inertial_path",
            &PythonSystem::inertial_path,
-           "After finish(): the NavigationState of each frame in the largest part; [] without "
-           "metres.");
+           "inertial_path(self)\n--\n\nAfter finish(): a NavigationState for each frame, or [].");
 }
 
 void bind_control(SystemClass& system) {
