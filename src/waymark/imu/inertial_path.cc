@@ -46,19 +46,6 @@ std::vector<NavigationState> integrate(const NavigationState& first,
 
 }  // namespace
 
-ImuCalibration InertialReport::calibration() const {
-  constexpr double kToldRotation = 0.01;  // rad
-  constexpr double kToldLeverArm_m = 0.02;
-  constexpr double kToldTimeShift_s = 1e-3;
-  ImuCalibration told;
-  if (!is_used) return told;
-  if (rotation_sigma_rad < kToldRotation && lever_arm_sigma_m < kToldLeverArm_m) {
-    told.imu_from_rig = imu_from_rig;
-  }
-  if (time_shift_sigma_s < kToldTimeShift_s) told.time_shift_s = time_shift_s;
-  return told;
-}
-
 std::vector<NavigationState> at_imu_rate(std::span<const NavigationState> states,
                                          const ImuSamples& samples,
                                          const InertialReport& report) {
