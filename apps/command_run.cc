@@ -54,8 +54,7 @@ FrameObserver observe(Session& session, Autosave& autosave, LiveControl* live, R
              const FrameRecord& record, const std::string& warning) mutable {
     report(record, warning);
     if (live) live->show(record);
-    autosave.set_imu(session.system->inertial());
-    if (const auto failure = autosave.update(session.system->map())) {
+    if (const auto failure = autosave.update(session.system->map(), session.system->inertial())) {
       reporter.warning("autosave: " + *failure);
     }
   };
@@ -109,8 +108,7 @@ void save_final_map(const System& system,
                                  options.map_out.string()));
     return;
   }
-  autosave.set_imu(system.inertial());
-  autosave.save(system.map());
+  autosave.save(system.map(), system.inertial());
   reporter.info(fmt::format("map in {}", options.map_out.string()));
 }
 

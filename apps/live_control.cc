@@ -63,7 +63,7 @@ bool LiveControl::should_stop(const std::function<bool()>& is_interrupted) {
   take_requests();
   while (parts_->is_paused && !is_stopped_ && !is_interrupted()) {
     std::this_thread::sleep_for(kPollInterval);
-    parts_->autosave.update(parts_->system.map());
+    parts_->autosave.update(parts_->system.map(), parts_->system.inertial());
     take_requests();
   }
   return is_stopped_ || is_interrupted();

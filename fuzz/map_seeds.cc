@@ -47,7 +47,7 @@ int main(int argc, char** argv) {
     for (std::uint64_t seed = 0; seed < 4; ++seed) {
       testing::RandomMap random(seed, 40, 4);
       StoredMap stored = small_stored_map(random);
-      if (seed == 1) stored.imu.emplace();
+      if (seed == 1) stored.imu.emplace().is_used = true;
       save_map(folder / (std::to_string(seed) + ".wmap"), stored);
     }
     write_journals(argv[2]);

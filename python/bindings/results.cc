@@ -266,9 +266,7 @@ void bind_inertial(py::module_& module) {
       });
 }
 
-}  // namespace
-
-void bind_inertial_moment(py::module_& module) {
+void bind_navigation_state(py::module_& module) {
   Class<NavigationState>(
       module, "NavigationState", "What vision and an inertial measurement unit tell of a frame.")
       .get("timestamp_ns", "int: of the image.", &NavigationState::timestamp_ns)
@@ -290,12 +288,14 @@ void bind_inertial_moment(py::module_& module) {
       });
 }
 
+}  // namespace
+
 void bind_results(py::module_& module) {
   bind_tracking_result(module);
   bind_trajectory(module);
   bind_statistics(module);
   bind_inertial(module);
-  bind_inertial_moment(module);
+  bind_navigation_state(module);
 }
 
 }  // namespace waymark::python

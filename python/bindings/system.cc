@@ -26,8 +26,7 @@ constexpr double kMaxMemoryGb = 1e6;
 
 /// A System with what arguments need to be understood; what takes long lets other threads run.
 class PythonSystem {
-  template <class Get>
-  auto ask(Get get) {
+  auto ask(auto get) {
     const Turn turn = take();
     return (system_.*get)();
   }
@@ -121,17 +120,12 @@ class PythonSystem {
     const std::shared_ptr<const Map> newest = system_.map();
     if (!last_map_ || last_map_->stored.map != newest) {
       last_map_ = std::make_shared<PythonMap>();
-      const std::optional<InertialReport>& imu = system_.inertial();
-      last_map_->stored = {
-          newest, settings_yaml_, images_, imu && imu->is_used ? imu : std::nullopt};
+      last_map_->stored = {newest, settings_yaml_, images_, system_.inertial()};
     }
     return last_map_;
   }
 
-  Trajectory trajectory() {
-    const Turn turn = take();
-    return {system_.trajectory()};
-  }
+  Trajectory trajectory() { return {ask(&System::trajectory)}; }
 
   std::vector<std::string> frame_states() {
     const Turn turn = take();
@@ -257,10 +251,16 @@ timestamp_ns: int or array (N,), later than those before, others are left out.
 angular_velocity, acceleration: array (3,) or (N, 3), rad/s and m/s^2, gravity included.)")
       .def("inertial",
            &PythonSystem::inertial,
-           "inertial(self)\n--\n\nAn InertialReport, or None without samples.")
+           R"(inertial(self)
+--
+
+What the IMU told so far: an InertialReport, or None without samples. Final after finish().)")
       .def("inertial_path",
            &PythonSystem::inertial_path,
-           "inertial_path(self)\n--\n\nAfter finish(): a NavigationState for each frame, or [].");
+           R"(inertial_path(self)
+--
+
+A list of NavigationState for the frames of the largest part, after finish(); empty without metres.)");
 }
 
 void bind_control(SystemClass& system) {

@@ -18,17 +18,17 @@ times, nanoseconds; lengths of a map made by one camera without depth have no un
 out are read-only.
 """
 from ._waymark import (NO_ID, Atlas, AtlasLocalizer, Calibration, CalibrationEstimate, Camera, EstimatedCalibration,
-                       Features, FrameDetails, NavigationState, InertialReport, Input, InputError, InputFrame, Keyframe,
+                       Features, FrameDetails, InertialReport, Input, InputError, InputFrame, Keyframe,
                        Keyframes, Landmark, Landmarks, Localizer, LoopEdge, Map, Markers,
-                       MarkerObservations, MergedMap, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
+                       MarkerObservations, MergedMap, NavigationState, OutputError, Statistics, Submap, System, TrackingResult, Trajectory, Viewer,
                        __version__, calibrate, evaluate, info, open_input, read_depth_image, read_grey_image, report)
 from .importing import import_map, import_settings
 
 __all__ = [
     "NO_ID", "Atlas", "AtlasLocalizer", "Calibration", "CalibrationEstimate", "Camera", "EstimatedCalibration", "Features",
-    "FrameDetails", "NavigationState", "InertialReport", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
+    "FrameDetails", "InertialReport", "Input", "InputError", "InputFrame", "Keyframe", "Keyframes",
     "Landmark", "Landmarks", "Localizer", "LoopEdge", "Map", "Markers",
-    "MarkerObservations", "MergedMap", "OutputError",
+    "MarkerObservations", "MergedMap", "NavigationState", "OutputError",
     "Statistics", "Submap", "System", "TrackingResult", "Trajectory", "Viewer", "__version__",
     "calibrate", "evaluate", "import_map", "import_settings", "info", "open_input", "read_depth_image",
     "read_grey_image", "report",

@@ -12,8 +12,6 @@
 namespace waymark {
 namespace {
 
-constexpr std::int64_t kMaxIntegratedNs = 10'000'000'000;
-
 /// States of the samples between two others, without what is missing to the second one; the last
 /// is that of the second one. Empty where samples are missing.
 std::vector<NavigationState> integrate(const NavigationState& first,
@@ -55,7 +53,7 @@ std::vector<NavigationState> at_imu_rate(std::span<const NavigationState> states
     if (i + 1 == states.size()) break;
     const NavigationState& second = states[i + 1];
     const std::int64_t duration_ns = second.timestamp_ns - states[i].timestamp_ns;
-    if (duration_ns > kMaxIntegratedNs) continue;
+    if (duration_ns > kMaxBridgedNs) continue;
     auto between = integrate(states[i], second.timestamp_ns, samples, report);
     if (between.empty()) continue;
     const NavigationState end = between.back();

@@ -14,7 +14,10 @@
 
 namespace waymark {
 
-/// What vision and IMU tell together of a state.
+/// Nothing is bridged for longer, whose errors grow beyond use.
+inline constexpr std::int64_t kMaxBridgedNs = 10'000'000'000;
+
+/// What vision and IMU tell together of a moment.
 struct NavigationState {
   std::int64_t timestamp_ns = 0;  ///< By the clock of the images.
   Rigid3 world_from_rig;          ///< In metres.

@@ -34,8 +34,8 @@ struct StoredMap {
   std::string settings;            ///< Those used, as YAML.
   /// Of some keyframes or none; those of erased ones are not saved.
   KeyframeImages images;
-  /// The IMU that it was made with, and gravity in the frame of its largest part; nothing where
-  /// there was none that could be used. Gravity is 0 where it is not known.
+  /// The IMU that it was made with, and gravity in the frame of its largest part; files have it
+  /// where it is used. Gravity is 0 where it is not known.
   std::optional<InertialReport> imu = std::nullopt;
   std::string producer = {};  ///< The program that wrote the file; save_map() sets its own.
 };

@@ -155,6 +155,7 @@ TEST(MapFile, HoldsTheImu) {
   StoredMap saved = map_with_markers();
   InertialReport& imu = saved.imu.emplace();
   imu.imu_from_rig = Rigid3::exp((Vector6d() << 0.1, 0.2, 0.3, 0.4, 0.5, 0.6).finished());
+  imu.is_used = true;
   imu.rotation_sigma_rad = 0.001;
   imu.lever_arm_sigma_m = 0.002;
   imu.time_shift_s = -0.01;

@@ -18,7 +18,9 @@ constexpr NumberRange kRateRange{-1e3, 1e3};          // rad/s
 
 }  // namespace
 
-void write_imu(MapRecordWriter& writer, const InertialReport& imu) {
+void write_imu(MapRecordWriter& writer, const std::optional<InertialReport>& report) {
+  if (!report || !report->is_used) return;
+  const InertialReport& imu = *report;
   writer.begin("imu", 0);
   writer.add_transform("imu_from_rig", imu.imu_from_rig);
   writer.add_number("rotation_sigma_rad", imu.rotation_sigma_rad, kSigmaRange);

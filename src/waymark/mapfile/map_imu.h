@@ -2,6 +2,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #pragma once
 
+#include <optional>
+
 #include "waymark/imu/inertial_report.h"
 #include "waymark/mapfile/map_record.h"
 #include "waymark/mapfile/map_record_writer.h"
@@ -10,7 +12,8 @@ namespace waymark {
 
 // The record of the kind imu; see docs/map-format.md.
 
-void write_imu(MapRecordWriter& writer, const InertialReport& imu);
+/// Nothing of an IMU that is not used.
+void write_imu(MapRecordWriter& writer, const std::optional<InertialReport>& report);
 /// InputError for what cannot be.
 InertialReport read_imu(MapRecord& record);
 

@@ -90,7 +90,7 @@ void MapJournal::write_change(MapRecordWriter& writer,
   write_loop_edges(writer, map);
   write_odometry(writer, map, difference.noted);
   write_markers(writer, map);
-  if (stored.imu) write_imu(writer, *stored.imu);
+  write_imu(writer, stored.imu);
 }
 
 }  // namespace waymark

@@ -38,7 +38,7 @@ std::uint32_t write_map_file(const std::filesystem::path& path,
   write_loop_edges(writer, map);
   write_odometry(writer, map);
   write_markers(writer, map);
-  if (stored.imu) write_imu(writer, *stored.imu);
+  write_imu(writer, stored.imu);
   for (const auto& [id, jpeg] : stored.images) {
     // Erased keyframes may still have one.
     if (map.keyframes().contains(id)) write_image(writer, id, jpeg);

@@ -20,7 +20,8 @@ Autosave::Autosave(std::filesystem::path path,
       images_(images),
       journal_(path_) {}
 
-std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& map) {
+std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& map,
+                                            const std::optional<InertialReport>& imu) {
   using namespace std::chrono_literals;
   if (under_way_.valid()) {
     if (under_way_.wait_for(0s) != std::future_status::ready) return std::nullopt;
@@ -36,17 +37,13 @@ std::optional<std::string> Autosave::update(const std::shared_ptr<const Map>& ma
   try {
     // The map never changes, the rest is fixed: nothing is shared that anyone writes.
     const bool is_wanted = !served_.empty();
-    under_way_ = std::async(std::launch::async, [this, is_wanted, stored = prepare(map)] {
+    under_way_ = std::async(std::launch::async, [this, is_wanted, stored = prepare(map, imu)] {
       is_wanted ? journal_.save_whole(stored) : journal_.save(stored);
     });
   } catch (const std::exception&) {
     return describe_failure(std::current_exception());  // No memory or no thread is left, now.
   }
   return std::nullopt;
-}
-
-void Autosave::set_imu(const std::optional<InertialReport>& imu) {
-  imu_ = imu && imu->is_used ? imu : std::nullopt;
 }
 
 void Autosave::save_soon(std::function<void(const std::string& error)> on_done) {
@@ -64,18 +61,20 @@ std::string Autosave::finish_save() {
   return failure;
 }
 
-void Autosave::save(const std::shared_ptr<const Map>& map) {
+void Autosave::save(const std::shared_ptr<const Map>& map,
+                    const std::optional<InertialReport>& imu) {
   if (under_way_.valid()) finish_save();
-  journal_.save_whole(prepare(map));
+  journal_.save_whole(prepare(map, imu));
   for (const auto& on_done : std::exchange(wanted_, {})) on_done("");
 }
 
-StoredMap Autosave::prepare(const std::shared_ptr<const Map>& map) const {
+StoredMap Autosave::prepare(const std::shared_ptr<const Map>& map,
+                            const std::optional<InertialReport>& imu) const {
   StoredMap stored;
   stored.map = map;
   stored.settings = settings_;
   stored.images = images_.images_of(*map);
-  stored.imu = imu_;
+  stored.imu = imu;
   return stored;
 }
 

@@ -34,21 +34,23 @@ class Autosave {
   ~Autosave() = default;
 
   /// To be called often: saves the map when it is time, unless it is empty or the last save is
-  /// still under way. Gives what went wrong with an earlier one; the next one will be tried.
-  std::optional<std::string> update(const std::shared_ptr<const Map>& map);
-  /// What is known of the IMU from now on, which is saved with the map where it is used.
-  void set_imu(const std::optional<InertialReport>& imu);
+  /// still under way. Gives what went wrong with an earlier one; the next one will be tried. imu:
+  /// what is known of it, which the map keeps where it is used.
+  std::optional<std::string> update(const std::shared_ptr<const Map>& map,
+                                    const std::optional<InertialReport>& imu = std::nullopt);
   /// The next update() saves the map as soon as it can, the file by itself; on_done hears, from a
   /// later update() or the last save(), what went wrong, or nothing.
   void save_soon(std::function<void(const std::string& error)> on_done);
   const std::filesystem::path& path() const { return path_; }
   /// Waits for the save under way and saves the map, the file by itself. Throws OutputError.
-  void save(const std::shared_ptr<const Map>& map);
+  void save(const std::shared_ptr<const Map>& map,
+            const std::optional<InertialReport>& imu = std::nullopt);
 
  private:
   using Clock = std::chrono::steady_clock;
 
-  StoredMap prepare(const std::shared_ptr<const Map>& map) const;
+  StoredMap prepare(const std::shared_ptr<const Map>& map,
+                    const std::optional<InertialReport>& imu) const;
   /// Takes what became of the save under way; what went wrong, or an empty text.
   std::string finish_save();
 
@@ -56,7 +58,6 @@ class Autosave {
   const Clock::duration interval_;
   const std::string settings_;
   const KeyframeImageCache& images_;
-  std::optional<InertialReport> imu_;
   Clock::time_point last_start_ = Clock::now();
   MapJournal journal_;  // Of the save under way as long as there is one.
   std::future<void> under_way_;

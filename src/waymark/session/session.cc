@@ -148,37 +148,21 @@ double ego_share(const Image& mask) {
          static_cast<double>(mask.values.size());
 }
 
-/// Or removes that of an earlier run.
-void write_ego_mask(const std::filesystem::path& path, const Image& mask) {
+/// Or removes that of an earlier run where there is nothing to write.
+void write_or_remove(const std::filesystem::path& path, std::string_view content) {
   std::error_code error;
-  if (mask.values.empty()) {
+  if (content.empty()) {
     std::filesystem::remove(path, error);
   } else {
-    write_file_atomically(path, encode_png(mask));
+    write_file_atomically(path, content);
   }
 }
 
-/// Or removes that of an earlier run.
-void write_poses(const std::filesystem::path& path, const SessionResults& results) {
-  std::error_code error;
-  if (results.table.names.empty()) {
-    std::filesystem::remove(path, error);
-  } else {
-    write_file_atomically(path, format_poses_csv(results.table, results.trajectories));
-  }
-}
-
-/// Or removes that of an earlier run.
-void write_inertial(const std::filesystem::path& folder, const SessionResults& results) {
-  std::error_code error;
-  if (results.inertial.empty()) {
-    std::filesystem::remove(folder / "inertial.csv", error);
-  } else {
-    write_file_atomically(folder / "inertial.csv", format_inertial_csv(results.inertial));
-  }
-  if (!results.at_imu_rate.empty()) {
-    write_trajectory(folder / "trajectory.txt", results.at_imu_rate, TrajectoryFormat::kTum);
-  }
+/// The first one at the rate of an IMU, where that is asked for.
+std::vector<std::vector<StampedPose>> written_trajectories(const SessionResults& results) {
+  std::vector<std::vector<StampedPose>> written = results.trajectories;
+  if (!results.at_imu_rate.empty()) written.front() = results.at_imu_rate;
+  return written;
 }
 
 /// Throws InputError for files that results would take the place of.
@@ -289,17 +273,27 @@ bool prepare_results(const std::filesystem::path& folder) {
 }
 
 void write_results(const std::filesystem::path& folder, const SessionResults& results) {
+  const FrameTable& table = results.table;
   save_each(
-      {[&] { write_trajectories(folder, results.trajectories, results.table.has_times); },
-       [&] { write_inertial(folder, results); },
-       [&] { write_poses(folder / "poses.csv", results); },
+      {[&] { write_trajectories(folder, written_trajectories(results), table.has_times); },
+       [&] {
+         write_or_remove(folder / "inertial.csv",
+                         results.inertial.empty() ? "" : format_inertial_csv(results.inertial));
+       },
+       [&] {
+         write_or_remove(folder / "poses.csv",
+                         table.names.empty() ? "" : format_poses_csv(table, results.trajectories));
+       },
        [&] {
          write_trajectory(folder / "keyframes.txt", results.keyframes, TrajectoryFormat::kTum);
        },
        [&] { write_file_atomically(folder / "points.ply", format_points_ply(results.points)); },
        [&] { write_summary_json(folder, results.summary); },
-       [&] { write_ego_mask(folder / "view_mask.png", results.ego_mask); },
-       [&] { write_frames_csv(folder, results.table); }});
+       [&] {
+         write_or_remove(folder / "view_mask.png",
+                         results.ego_mask.values.empty() ? "" : encode_png(results.ego_mask));
+       },
+       [&] { write_frames_csv(folder, table); }});
 }
 
 std::string_view to_string(Timing timing) {

@@ -337,11 +337,10 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
     path_ = smooth_trajectory(knowledge(), submap, *map, memory);
   }
   const bool is_metric = map->submaps()[submap.value].is_metric;
-  if (!report_->is_used || !is_frame_free) {
-    if (!is_metric) path_.clear();
-    return map;
-  }
-  const bool is_scaled = !is_metric && report_->scale_sigma < kFirmScale;
+  const bool is_scaled =
+      !is_metric && is_frame_free && report_->is_used && report_->scale_sigma < kFirmScale;
+  if (!is_metric && !is_scaled) path_.clear();
+  if (!report_->is_used || !is_frame_free) return map;
   Sim3 level = level_and_metric(found_->setup);
   if (!is_scaled) level.scale = 1.0;
   report_->gravity_in_world = level.rotation * report_->gravity_in_world;
@@ -350,7 +349,6 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
     report_->metric_from = FrameId{static_cast<std::uint32_t>(memory.entries().size() - 1)};
   }
   if (!is_scaled) report_->metric_from.reset();
-  if (!is_metric && !is_scaled) path_.clear();
   Map next = Map::thaw(*map);
   if (is_scaled) {
     next = put_into_metres(std::move(next), submap, level);

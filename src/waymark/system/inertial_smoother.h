@@ -14,9 +14,6 @@
 
 namespace waymark {
 
-/// Nothing is bridged for longer, whose errors grow beyond use.
-inline constexpr std::int64_t kMaxBridgedNs = 10'000'000'000;
-
 /// What a scale may be off by as a part, however many poses tell it.
 inline constexpr double kSystematicScale = 0.002;
 /// A scale is told where its logarithm has a smaller standard deviation.
