@@ -39,9 +39,9 @@ struct ImuBiases {
 /// are gyroscope * turn + by_acceleration * push and accelerometer * push, where turn (rad/s) and
 /// push (m/s^2) are the true ones in the axes of the IMU.
 struct ImuIntrinsics {
-  Eigen::Matrix3d gyroscope = Eigen::Matrix3d::Identity();
-  Eigen::Matrix3d by_acceleration = Eigen::Matrix3d::Zero();  ///< rad/s per m/s^2.
-  Eigen::Matrix3d accelerometer = Eigen::Matrix3d::Identity();
+  Eigen::Matrix3d gyroscope = Eigen::Matrix3d::Identity();      ///< Without unit.
+  Eigen::Matrix3d by_acceleration = Eigen::Matrix3d::Zero();    ///< rad/s per m/s^2.
+  Eigen::Matrix3d accelerometer = Eigen::Matrix3d::Identity();  ///< Without unit.
 };
 
 /// What is known of an IMU and of how it is mounted. What is not told is found.

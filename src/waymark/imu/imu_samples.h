@@ -26,8 +26,10 @@ class ImuSamples {
   /// Appends a sample, unless it is not later than the last one or not finite: returns whether it
   /// was taken. Such samples are counted and left out.
   bool add(const ImuSample& sample);
+  /// Samples that add() left out.
   std::size_t num_rejected() const { return num_rejected_; }
 
+  /// Those taken.
   std::span<const ImuSample> all() const { return samples_; }
 
   /// Median of the last hundred or so; 0 before there are two samples.

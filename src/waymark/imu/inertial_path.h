@@ -26,7 +26,7 @@ struct NavigationState {
   /// Of the pose, as that of a frame (tangent vectors xi = (rho, phi) of exp(xi) * rig_from_world,
   /// in m and rad), and the velocity.
   Eigen::Matrix<double, 9, 9> covariance = Eigen::Matrix<double, 9, 9>::Zero();
-  ImuBiases biases;
+  ImuBiases biases;  ///< At that moment.
 };
 
 /// The states in the order of time and, where samples tell all between two of them that are at
