@@ -46,6 +46,7 @@ double Preintegration::duration_s() const {
 void Preintegration::integrate() {
   delta_ = {};
   by_biases_.setZero();
+  by_scales_.setZero();
   covariance_.setZero();
   for (std::size_t i = 1; i < samples_.size(); ++i) advance(samples_[i - 1], samples_[i]);
   delta_.rotation.normalize();
@@ -90,6 +91,9 @@ void Preintegration::advance(const ImuSample& begin, const ImuSample& end) {
   step.by_rates.block<3, 3>(6, 0) = dt * dt / 6.0 * after_by_rate;
   step.by_rates.block<3, 3>(6, 3) = dt * dt / 6.0 * (2.0 * before + after);
   by_biases_ = step.by_error * by_biases_ - step.by_rates;
+  Eigen::Matrix<double, 6, 1> rates;
+  rates << turn / dt, 0.5 * (force_before + force_after);
+  by_scales_ = step.by_error * by_scales_ - step.by_rates * rates.asDiagonal();
   advance_covariance(step);
 }
 

@@ -48,6 +48,8 @@ class Preintegration {
 
   /// 9x6: (rotation, velocity, position) by (gyroscope bias, accelerometer bias).
   const Eigen::Matrix<double, 9, 6>& by_biases() const { return by_biases_; }
+  /// 9x6: the same by how much too large, as a part, each axis measures (gyroscope, accelerometer).
+  const Eigen::Matrix<double, 9, 6>& by_scales() const { return by_scales_; }
   /// Of the errors from noise and from biases that move in between, and of how far both biases move
   /// (their random walks), which go together.
   const Matrix15d& covariance() const { return covariance_; }
@@ -64,7 +66,7 @@ class Preintegration {
   ImuNoise noise_;
   ImuBiases biases_;
   InertialDelta delta_;
-  Eigen::Matrix<double, 9, 6> by_biases_;
+  Eigen::Matrix<double, 9, 6> by_biases_, by_scales_;
   Matrix15d covariance_;
   Matrix15d square_root_information_;
 };

@@ -87,6 +87,29 @@ TEST(Preintegration, DerivativesByBiasesAreThoseOfIntegration) {
   }
 }
 
+TEST(Preintegration, DerivativesByScalesOfAxesAreThoseOfIntegration) {
+  Rng rng(2, 0);
+  const auto samples = true_samples(testing::hand_held_motion(rng), 0.0, 0.5, 100);
+  const ImuBiases biases{{0.02, -0.01, 0.03}, {0.1, 0.2, -0.3}};
+  const Preintegration center(samples, kNoise, biases);
+  constexpr double kStep = 1e-5;
+  for (int i = 0; i < 6; ++i) {
+    auto smaller = samples, larger = samples;
+    for (std::size_t k = 0; k < samples.size(); ++k) {
+      for (auto& [changed, sign] : {std::pair(&smaller[k], -1.0), std::pair(&larger[k], 1.0)}) {
+        double& rate = i < 3 ? changed->angular_velocity[i] : changed->acceleration[i - 3];
+        rate += sign * kStep * (rate - (i < 3 ? biases.gyroscope[i] : biases.accelerometer[i - 3]));
+      }
+    }
+    const InertialDelta a = Preintegration(smaller, kNoise, biases).delta();
+    const InertialDelta b = Preintegration(larger, kNoise, biases).delta();
+    const Vector9d numeric = difference(a, b) / (2.0 * kStep);
+    // The mean force of a step stands for both of its ends.
+    EXPECT_LT((numeric - center.by_scales().col(i)).norm(), 2e-3) << i;
+    EXPECT_GT(numeric.norm(), 0.02) << i;
+  }
+}
+
 TEST(Preintegration, ChangedBiasesAreExactToFirstOrderAndExactlyIntegratedWhenFar) {
   Rng rng(3, 0);
   const auto samples = true_samples(testing::hand_held_motion(rng), 0.0, 0.5, 100);

@@ -228,7 +228,8 @@ WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
                                     const BundleOptions& options,
                                     const KnownCalibration* known,
-                                    const MapCorrection* start) {
+                                    const MapCorrection* start,
+                                    const InertialEvidence* imu) {
   WindowProblem window_problem = make_problem(map, window, start);
   std::optional<KnownCalibration> calibration;
   if (known) {
@@ -243,7 +244,9 @@ WindowAdjustment compute_adjustment(const Map& map,
     const std::vector<KeyframeId> keyframes = keyframes_of(window);
     window_problem.marker_rigs = add_markers(map, keyframes, window_problem.problem);
   }
+  if (imu) add_inertial_terms(map, keyframes_of(window), *imu, window_problem.problem);
   const BundleResult result = adjust_bundle(window_problem.problem, options);
+  if (imu && contradicts_imu(window_problem.problem, result)) return {};
   WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};
   for (std::size_t i = 0; i < window_problem.observations.size(); ++i) {
     if (result.is_outlier[i]) adjustment.outliers.push_back(window_problem.observations[i]);

@@ -10,6 +10,7 @@
 #include "waymark/map/correction.h"
 #include "waymark/map/map.h"
 #include "waymark/mapping/associate.h"
+#include "waymark/mapping/inertial_bundle.h"
 #include "waymark/optimize/bundle.h"
 
 namespace waymark {
@@ -44,11 +45,14 @@ struct WindowAdjustment {
 /// Adjusts a window and leaves the map as it is.
 /// \param known  the calibration that is to be adjusted along, or null.
 /// \param start  where what it names begins; null: all of it where the map has it. Without known.
+/// \param imu  what ties its keyframes, or null. Without known. Nothing moves where they
+/// contradict.
 WindowAdjustment compute_adjustment(const Map& map,
                                     const BundleWindow& window,
                                     const BundleOptions& options,
                                     const KnownCalibration* known = nullptr,
-                                    const MapCorrection* start = nullptr);
+                                    const MapCorrection* start = nullptr,
+                                    const InertialEvidence* imu = nullptr);
 
 /// Looks for the readout of a rolling shutter in what a window sees; nothing where the images do
 /// not contradict that in use, or more than that is known of the calibration: see recalibrate().

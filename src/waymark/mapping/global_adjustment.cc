@@ -39,7 +39,8 @@ double scale_around(const Map& map,
 
 GlobalAdjustment adjust(const Map& frozen,
                         BundleWindow window,
-                        const KnownCalibration* known = nullptr) {
+                        const KnownCalibration* known = nullptr,
+                        const InertialEvidence* imu = nullptr) {
   GlobalAdjustment adjustment;
   if (window.moving.empty() || window.landmarks.empty()) return adjustment;
   const BundleOptions options{.num_rounds = 2,
@@ -48,7 +49,8 @@ GlobalAdjustment adjust(const Map& frozen,
   WindowAdjustment found =
       window.moving.size() > kMaxAdjustedAtOnce
           ? compute_adjustment_in_parts(frozen, window, options, kMaxAdjustedAtOnce)
-          : compute_adjustment(frozen, window, options, known);
+          : compute_adjustment(frozen, window, options, known, nullptr, imu);
+  if (found.correction.keyframes.empty()) return adjustment;
   adjustment.calibration = std::move(found.calibration);
   adjustment.correction = std::move(found.correction);
   adjustment.outliers = std::move(found.outliers);
@@ -65,6 +67,12 @@ GlobalAdjustment adjust(const Map& frozen,
 
 GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap) {
   return adjust(frozen, whole_submap(frozen, submap));
+}
+
+GlobalAdjustment adjust_with_imu(const Map& frozen, SubmapId submap, const InertialEvidence& imu) {
+  BundleWindow window = whole_submap(frozen, submap);
+  if (window.moving.size() > kMaxAdjustedAtOnce) return {};
+  return adjust(frozen, std::move(window), nullptr, &imu);
 }
 
 GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known) {

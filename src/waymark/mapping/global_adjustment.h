@@ -26,6 +26,10 @@ struct GlobalAdjustment {
 /// one see compute_adjustment_in_parts(). Any thread; nothing is shared. Uses all cores.
 GlobalAdjustment adjust_globally(const Map& frozen, SubmapId submap);
 
+/// The same with what an IMU measured, for a sub-map of at most kMaxAdjustedAtOnce keyframes; empty
+/// where it is larger, and where they contradict each other.
+GlobalAdjustment adjust_with_imu(const Map& frozen, SubmapId submap, const InertialEvidence& imu);
+
 /// The same over all sub-maps, and the calibration along with them: each tells of it what it shows.
 /// What a large map is made of has told it long before.
 GlobalAdjustment adjust_with_calibration(const Map& frozen, const KnownCalibration& known);

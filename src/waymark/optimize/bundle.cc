@@ -19,10 +19,13 @@ namespace {
 constexpr double kHuberSigmas = 2.0;
 /// Corners are not located better than this, whatever few residuals say.
 constexpr double kMinNoisePx = 0.15;
+/// Of a component of a residual where none can be measured.
+constexpr double kAssumedNoisePx = 1.0;
 
 void check(const BundleProblem& problem) {
   WAYMARK_CHECK(problem.rigs.size() == problem.rig_from_world.size());
   WAYMARK_CHECK(problem.is_pose_fixed.size() == problem.rig_from_world.size());
+  WAYMARK_CHECK(!problem.calibration || !problem.motion);
   if (problem.calibration) {
     WAYMARK_CHECK(problem.calibration->first_derivative.size() == problem.observations.size());
   }
@@ -76,6 +79,11 @@ std::optional<double> measured_noise_px(const JudgedObservations& judged) {
   return std::sqrt(median(squared)) / 1.177;
 }
 
+double median_residual_px(const JudgedObservations& judged) {
+  std::vector<double> squared = judged.squared_residuals;
+  return squared.empty() ? 0.0 : std::sqrt(median(squared));
+}
+
 /// Options of a round: the loss as narrow as the noise allows.
 BundleOptions narrowed(const BundleOptions& options, const JudgedObservations& judged) {
   BundleOptions result = options;
@@ -107,8 +115,13 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   };
   judge(std::numeric_limits<double>::max());
   BundleResult result;
+  result.initial_median_px = median_residual_px(judged);
   for (int round = 0; round < options.num_rounds; ++round) {
     BundleOptions round_options = narrowed(options, judged);
+    if (problem.motion) {
+      problem.motion->noise_px =
+          std::max(measured_noise_px(judged).value_or(kAssumedNoisePx), kMinNoisePx);
+    }
     round_options.with_evidence = round + 1 == options.num_rounds;
     const BundleRound done = minimize_with_schur(problem, judged.is_used, round_options);
     if (round == 0) result.initial_cost = done.initial_cost;
@@ -116,6 +129,7 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
     result.num_iterations += done.num_iterations;
     judge(options.gate_px * options.gate_px);
   }
+  result.final_median_px = median_residual_px(judged);
   result.noise_px = measured_noise_px(judged).value_or(0.0);
   result.is_outlier.resize(num_observations);
   for (std::size_t i = 0; i < num_observations; ++i) {

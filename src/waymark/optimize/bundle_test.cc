@@ -255,6 +255,69 @@ TEST(Bundle, BrokenPromisesAreNamed) {
   EXPECT_THROW(adjust_bundle(foreign, {}), CheckError);
 }
 
+/// Motion from pose to pose is that of an unknown, the same of all, as far as it is known.
+BundleMotion motion_of(const BundleScene& scene) {
+  BundleMotion motion;
+  const auto num_poses = static_cast<std::uint32_t>(scene.rig_from_world.size());
+  for (std::uint32_t i = 0; i + 1 < num_poses; ++i) {
+    motion.terms.push_back({{i, i + 1}, {0, 1, 0, 1, 0, 1, 1}});
+  }
+  motion.unknowns.assign(2, Vector6d::Constant(0.1));
+  motion.prior.assign(2, Vector6d::Constant(0.02));
+  motion.prior_information.assign(2, Vector6d::Constant(30.0));
+  motion.noise_px = 0.7;
+  motion.evaluate = [](std::size_t term, const auto& poses, const auto& unknowns) {
+    BundleMotion::Rows rows;
+    rows.by_blocks.setZero();
+    const auto residual = [&](const std::array<Rigid3, 2>& at) {
+      Eigen::Matrix<double, 15, 1> value = Eigen::Matrix<double, 15, 1>::Zero();
+      value.head<6>() = 40.0 * ((at[1] * at[0].inverse()).log() - unknowns[0]);
+      value[7] = static_cast<double>(term) * (unknowns[1].sum() - 1.0);
+      return value;
+    };
+    rows.residual = residual(poses);
+    for (int k = 0; k < 12; ++k) {
+      auto more = poses, less = poses;
+      const auto pose = static_cast<std::size_t>(k / 6);
+      more[pose] = Rigid3::exp(1e-6 * Vector6d::Unit(k % 6)) * poses[pose];
+      less[pose] = Rigid3::exp(-1e-6 * Vector6d::Unit(k % 6)) * poses[pose];
+      rows.by_blocks.col(k) = (residual(more) - residual(less)) / 2e-6;
+    }
+    rows.by_blocks.block<6, 6>(0, 12) = -40.0 * Matrix6d::Identity();
+    rows.by_blocks.row(7).segment<6>(18).setConstant(static_cast<double>(term));
+    return rows;
+  };
+  return motion;
+}
+
+TEST(Bundle, MotionTermsEndWhereTheWholeCostIsLeast) {
+  const BundleScene scene = make_bundle_scene({.num_poses = 9, .num_fixed = 2}, 3);
+  BundleProblem problem = problem_of(scene);
+  problem.motion = motion_of(scene);
+  const std::vector<std::uint8_t> is_used(problem.observations.size(), 1);
+  const BundleOptions options = {.max_iterations_per_round = 200, .relative_cost_tolerance = 1e-14};
+  const BundleRound round = minimize_with_schur(problem, is_used, options);
+  EXPECT_LT(round.final_cost, 0.9 * round.initial_cost);
+  const auto cost_of = [&](BundleProblem at) {
+    return minimize_with_schur(at, is_used, {.max_iterations_per_round = 0}).initial_cost;
+  };
+  EXPECT_NEAR(cost_of(problem), round.final_cost, 1e-9 * round.final_cost);
+  for (int k = 0; k < 18; ++k) {
+    std::array<double, 2> costs{};
+    for (const int side : {0, 1}) {
+      BundleProblem moved = problem;
+      const Vector6d step = (side == 0 ? -1e-5 : 1e-5) * Vector6d::Unit(k % 6);
+      Rigid3& pose = moved.rig_from_world[4];
+      if (k < 6) pose = Rigid3::exp(step) * pose;
+      if (k >= 6) moved.motion->unknowns[static_cast<std::size_t>(k / 6 - 1)] += step;
+      costs[static_cast<std::size_t>(side)] = cost_of(moved);
+      EXPECT_GT(costs[static_cast<std::size_t>(side)], round.final_cost) << k;
+    }
+    const double rise = costs[0] + costs[1] - 2.0 * round.final_cost;
+    EXPECT_LT(std::abs(costs[1] - costs[0]), 0.02 * rise) << k;
+  }
+}
+
 TEST(Bundle, AgreesWithCeresOnTheMinimum) {
   const BundleSceneOptions kinds[] = {
       {},

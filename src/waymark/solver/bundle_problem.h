@@ -11,6 +11,7 @@
 #include "waymark/camera/camera.h"
 #include "waymark/camera/rig.h"
 #include "waymark/geometry/rigid3.h"
+#include "waymark/solver/bundle_motion.h"
 
 namespace waymark {
 
@@ -85,6 +86,7 @@ struct BundleProblem {
   std::vector<Eigen::Vector3d> points;          ///< In the world.
   std::vector<BundleObservation> observations;  ///< Sorted by point.
   std::optional<BundleCalibration> calibration = std::nullopt;  ///< Where it is unknown.
+  std::optional<BundleMotion> motion = std::nullopt;  ///< Not together with a calibration.
 
   /// The same for a pose of the rig whose calibration is unknown, else null.
   const BundleCalibration* calibration_of(std::uint32_t pose) const {

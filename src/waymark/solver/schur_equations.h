@@ -44,6 +44,7 @@ struct BundleState {
   std::vector<Eigen::Vector3d> points;
   std::vector<RigidMatrix> cameras;  // Of each rig.
   Eigen::VectorXd calibration;       // Change of the parameters, where they are unknown.
+  std::vector<Vector6d> unknowns;    // Of the motion.
 };
 
 /// Blocks of the normal equations H * step = -gradient.
@@ -83,6 +84,7 @@ class SchurSolver {
     state_.points = problem.points;
     for (const Rigid3& pose : state_.rig_from_world) state_.matrices.push_back(matrix_of(pose));
     list_cameras();
+    if (problem.motion) state_.unknowns = problem.motion->unknowns;
     if (problem.calibration) {
       state_.calibration = problem.calibration->change;
       move_cameras(state_);
@@ -130,9 +132,14 @@ class SchurSolver {
     return std::accumulate(sums.begin(), sums.end(), 0.0);
   }
   double loss(std::size_t i, const BundleState& state) const;
+  double motion_cost(const BundleState& state) const;
   double cost(const BundleState& state);
   void linearize();
   void linearize_one_by_one();
+  void add_motion();
+  void add_motion_column(std::uint32_t slot,
+                         std::span<const std::uint32_t> places,
+                         double* sums) const;
   static BundlePlaces places_of(const BundleState& state);
   template <int kRows>
   void accumulate(const ResidualRows<kRows>& rows,
@@ -180,7 +187,13 @@ class SchurSolver {
   std::vector<std::uint32_t> entry_of_link_;
   std::vector<std::uint32_t> links_of_slot_;     // Ascending.
   std::vector<std::size_t> first_link_of_slot_;  // And one past the end.
-  std::optional<CalibrationBorder> border_;      // Where the calibration is unknown.
+  /// Of the lower triangle, below the diagonal.
+  struct MotionBlock {
+    std::uint32_t column, row;
+    Matrix6d value;
+  };
+  std::vector<MotionBlock> motion_blocks_;   // By column.
+  std::optional<CalibrationBorder> border_;  // Where the calibration is unknown.
   ThreadPool threads_;
   BlockCholesky reduced_;
   Eigen::VectorXd reduced_gradient_;

@@ -93,7 +93,7 @@ double SchurSolver::cost(const BundleState& state) {
     const Eigen::VectorXd off = state.calibration - problem_.calibration->prior_change;
     sum += off.dot(problem_.calibration->prior_information * off);
   }
-  return 0.5 * sum;
+  return 0.5 * (sum + motion_cost(state));
 }
 
 /// Of the rows of observation i; in place, since it is large to return.
@@ -166,6 +166,7 @@ void SchurSolver::linearize() {
     blocks_.poses[slot] << sums.topLeftCorner<3, 6>(), sums.block<3, 6>(4, 0);
     blocks_.pose_gradient[slot] << sums.col(6).head<3>(), sums.col(6).segment<3>(4);
   }
+  add_motion();
 }
 
 void SchurSolver::linearize_one_by_one() {

@@ -129,6 +129,7 @@ void SchurSolver::reduce_panel(std::size_t index, double damping) {
     Eigen::Map<Eigen::Matrix<double, kPaddedBlockRows, 6>>(sums.data() +
                                                            kSize * (slot - panel.begin))
         .topRows<6>() = block;
+    add_motion_column(slot, places, sums.data());
     reduce_column(slot, places, sums.data());
     reduced_.set_column(index, slot - panel.begin, sums);
   }
@@ -185,6 +186,13 @@ double SchurSolver::substitute_back(double damping) {
     candidate_.rig_from_world[pose] = Rigid3::exp(step) * state_.rig_from_world[pose];
     candidate_.matrices[pose] = matrix_of(candidate_.rig_from_world[pose]);
   }
+  for (std::size_t i = 0; i < plan_.slot_of_unknown.size(); ++i) {
+    const std::uint32_t slot = plan_.slot_of_unknown[i];
+    const Vector6d step = -reduced_gradient_.segment<6>(static_cast<Eigen::Index>(6 * slot));
+    decrease +=
+        promised(step, blocks_.pose_gradient[slot], blocks_.poses[slot].diagonal(), damping);
+    candidate_.unknowns[i] = state_.unknowns[i] + step;
+  }
   if (border_) {
     const Eigen::VectorXd step = -border_->solution();
     decrease += promised(step, border_->gradient(), border_->diagonal(), damping);
@@ -236,6 +244,7 @@ BundleRound minimize_with_schur(BundleProblem& problem,
   const BundleRound round = solver.minimize();
   problem.rig_from_world = solver.state().rig_from_world;
   problem.points = solver.state().points;
+  if (problem.motion) problem.motion->unknowns = solver.state().unknowns;
   if (problem.calibration) {
     problem.calibration->change = solver.state().calibration;
     if (options.with_evidence) problem.calibration->evidence = solver.calibration_evidence();

@@ -33,9 +33,11 @@ inline constexpr std::uint32_t kNoSlot = UINT32_MAX;
 /// Which observations meet where. A link is a point together with a free pose that sees it, by
 /// one camera or more; links run by point, then by pose.
 struct SchurStructure {
-  std::vector<std::uint32_t> slot_of_pose;  // Position in the reduced system, or kNoSlot.
+  std::vector<std::uint32_t> slot_of_pose;     // Position in the reduced system, or kNoSlot.
+  std::vector<std::uint32_t> slot_of_unknown;  // The same of those of BundleMotion.
   std::size_t num_slots = 0;
-  BlockPattern pattern;  // Slots that see a point in common. In an order of little fill-in.
+  // Slots that see a point or have a term in common. In an order of little fill-in.
+  BlockPattern pattern;
   std::vector<std::uint32_t> observations;         // The used ones.
   std::vector<std::uint32_t> link_of_observation;  // Parallel to it; kNoSlot if none.
   std::vector<std::uint32_t> points;               // Those with observations.
@@ -43,6 +45,10 @@ struct SchurStructure {
   std::vector<std::uint32_t> first_link;           // Likewise.
   std::vector<std::uint32_t> slot_of_link;
 };
+
+/// Of the poses, then of the unknowns of a term.
+using SlotsOfTerm = std::array<std::uint32_t, BundleMotion::kNumBlocks>;
+SlotsOfTerm slots_of(const BundleMotion::Term& term, const SchurStructure& plan);
 
 SchurStructure make_schur_structure(const BundleProblem& problem,
                                     std::span<const std::uint8_t> is_used);

@@ -84,12 +84,27 @@ BlockPattern find_pattern(const BundleProblem& problem,
   return pattern;
 }
 
+/// Adds slots that have a term in common.
+void add_terms(const BundleMotion& motion, SchurStructure& plan) {
+  for (const BundleMotion::Term& term : motion.terms) {
+    const SlotsOfTerm slots = slots_of(term, plan);
+    for (const std::uint32_t row : slots) {
+      for (const std::uint32_t column : slots) {
+        if (row != kNoSlot && column < row) plan.pattern.push_back({row, column});
+      }
+    }
+  }
+  std::ranges::sort(plan.pattern);
+  plan.pattern.erase(std::unique(plan.pattern.begin(), plan.pattern.end()), plan.pattern.end());
+}
+
 /// Numbers the slots in an order of little fill-in.
 void order_slots(SchurStructure& plan) {
   const std::vector<std::uint32_t> position = order_of_elimination(plan.num_slots, plan.pattern);
   for (std::uint32_t& slot : plan.slot_of_pose) {
     if (slot != kNoSlot) slot = position[slot];
   }
+  for (std::uint32_t& slot : plan.slot_of_unknown) slot = position[slot];
   for (auto& [row, column] : plan.pattern) {
     std::tie(row, column) = std::pair(std::max(position[row], position[column]),
                                       std::min(position[row], position[column]));
@@ -125,7 +140,12 @@ SchurStructure make_schur_structure(const BundleProblem& problem,
     plan.slot_of_pose.push_back(is_fixed ? kNoSlot : static_cast<std::uint32_t>(plan.num_slots));
     plan.num_slots += is_fixed ? 0 : 1;
   }
+  const std::size_t num_unknowns = problem.motion ? problem.motion->unknowns.size() : 0;
+  for (std::size_t i = 0; i < num_unknowns; ++i) {
+    plan.slot_of_unknown.push_back(static_cast<std::uint32_t>(plan.num_slots++));
+  }
   plan.pattern = find_pattern(problem, is_used, plan);
+  if (problem.motion) add_terms(*problem.motion, plan);
   order_slots(plan);
   plan.observations.reserve(problem.observations.size());
   plan.link_of_observation.reserve(problem.observations.size());

@@ -6,13 +6,13 @@
 #include <cmath>
 #include <utility>
 
-#include "waymark/base/median.h"
 #include "waymark/imu/imu_health.h"
 #include "waymark/imu/preintegration.h"
 #include "waymark/map/align.h"
+#include "waymark/mapping/global_adjustment.h"
 #include "waymark/system/inertial_join.h"
+#include "waymark/system/inertial_poses.h"
 #include "waymark/system/trajectory.h"
-#include "waymark/track/last_frame.h"
 
 namespace waymark {
 namespace {
@@ -20,11 +20,6 @@ namespace {
 /// Looks at the way begin with as many frames, and come again when it is half as long again.
 constexpr std::size_t kFirstFrames = 20;
 constexpr double kGrowth = 1.5;
-/// Of a longer way every second, third, ... frame is looked at.
-constexpr std::size_t kMaxPoses = 200;
-/// Neighbours among them are so near in time; in bursts of so many where the way is too long.
-constexpr std::int64_t kMaxStepNs = 500'000'000;
-constexpr std::size_t kBurst = 20;
 /// Poses of vision are that good: in rad, and as a part of how far away things are.
 constexpr double kPoseSigma = 0.001;
 /// Errors of a pose in standard deviations that count fully.
@@ -50,47 +45,6 @@ constexpr double kFirmBias = 0.01;
 /// A turn that two poses tell is off by less, in rad and as a part of it.
 constexpr double kTurnError = 0.003;
 constexpr double kTurnPart = 0.04;
-
-/// Poses evenly over the way; where these would be too far apart, in bursts.
-std::vector<VisionPose> spread_out(std::span<const VisionPose> poses) {
-  const std::size_t step = 1 + poses.size() / kMaxPoses;
-  const auto step_ns = [&](std::size_t i) {
-    return poses[std::min(i, poses.size() - 1)].timestamp_ns - poses[0].timestamp_ns;
-  };
-  std::vector<VisionPose> chosen;
-  if (step_ns(step) <= kMaxStepNs) {
-    for (std::size_t i = 0; i < poses.size(); i += step) chosen.push_back(poses[i]);
-    return chosen;
-  }
-  std::size_t near_step = 1;
-  while (step_ns(near_step + 1) <= kMaxStepNs) ++near_step;
-  for (std::size_t burst = 0; burst < poses.size(); burst += step * kBurst) {
-    const std::size_t end = std::min(poses.size(), burst + near_step * kBurst);
-    for (std::size_t i = burst; i < end; i += near_step) chosen.push_back(poses[i]);
-  }
-  return chosen;
-}
-
-/// Frames of one part of the map, as many as are looked at.
-std::vector<VisionPose> choose_poses(std::span<const TrajectoryFrame> frames, SubmapId submap) {
-  std::vector<VisionPose> poses;
-  for (const TrajectoryFrame& frame : frames) {
-    if (frame.submap != submap || frame.state != FrameState::kTracked) continue;
-    poses.push_back({frame.timestamp_ns, frame.world_from_rig.inverse()});
-  }
-  return spread_out(poses);
-}
-
-/// How far away things are, in map units: the median over keyframes of the median of each.
-double distance_of_things(const Map& map, SubmapId submap) {
-  std::vector<float> inverse;
-  map.keyframes().for_each([&](KeyframeId, const Keyframe& keyframe) {
-    if (keyframe.submap != submap) return;
-    const float of_one = median_inverse_range(map, keyframe.rig_from_world, keyframe.landmarks);
-    if (of_one > 0.0f) inverse.push_back(of_one);
-  });
-  return inverse.empty() ? 1.0 : 1.0 / static_cast<double>(median(inverse));
-}
 
 /// What puts a part of the map into metres, level.
 Sim3 level_and_metric(const InertialSetup& setup) {
@@ -321,18 +275,35 @@ std::optional<Eigen::Vector3f> InertialEstimator::turn_rad_s(std::int64_t timest
   return (so3_log(*turned) / (2e-9 * static_cast<double>(kHalfNs))).cast<float>();
 }
 
+SubmapId InertialEstimator::look_at_largest(const TrajectoryMemory& memory, const Map& map) {
+  const SubmapId largest = submaps_by_size(map).front();
+  look(choose_poses(list_poses(memory, map), largest), largest, map);
+  return largest;
+}
+
+std::shared_ptr<const Map> InertialEstimator::adjust(const TrajectoryMemory& memory,
+                                                     const Map& map) {
+  if (!has_samples() || map.keyframes().is_empty()) return nullptr;
+  const SubmapId submap = look_at_largest(memory, map);
+  if (!is_firm() || found_->sigma(kLogScaleAt) > kFirmScale) return nullptr;
+  InertialStart found = *found_;
+  if (map.submaps()[submap.value].is_metric) found.setup.log_scale = 0.0;
+  const GlobalAdjustment adjustment = adjust_with_imu(map, submap, {samples_, noise_, found});
+  if (adjustment.correction.keyframes.empty()) return nullptr;
+  Map next = Map::thaw(map);
+  DirtyLandmarks dirty;
+  apply_adjustment(next, adjustment, dirty);
+  return next.freeze();
+}
+
 std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
                                                      std::shared_ptr<const Map> map,
                                                      bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
-  const auto look_at_largest = [&] {
-    const SubmapId largest = submaps_by_size(*map).front();
-    look(choose_poses(list_poses(memory, *map), largest), largest, *map);
-    return largest;
-  };
-  SubmapId submap = look_at_largest();
+  SubmapId submap = look_at_largest(memory, *map);
   const auto known = [&](SubmapId part) { return knowledge_of(part, *map); };
-  while (is_frame_free && is_firm() && join_parts(memory, known, map)) submap = look_at_largest();
+  while (is_frame_free && is_firm() && join_parts(memory, known, map))
+    submap = look_at_largest(memory, *map);
   if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
     path_ = smooth_trajectory(knowledge(), submap, *map, memory);
   }

@@ -66,6 +66,10 @@ class InertialEstimator {
                                           const Map& map,
                                           std::int64_t timestamp_ns);
 
+  /// Adjusts the largest part with what was measured between its keyframes. Null where that is not
+  /// known well, and where it contradicts the images.
+  std::shared_ptr<const Map> adjust(const TrajectoryMemory& memory, const Map& map);
+
   /// Looks at the whole way, and gives frames without a pose those that the IMU tells.
   /// is_frame_free: the map was begun in this session and no marker says where it is. Gives the map
   /// with its largest part level (z up), and in metres where these are told; the same map where
@@ -96,6 +100,7 @@ class InertialEstimator {
                                             const ImuBiases& biases,
                                             std::int64_t begin_ns,
                                             std::int64_t end_ns) const;
+  SubmapId look_at_largest(const TrajectoryMemory& memory, const Map& map);
   void look(std::span<const VisionPose> poses, SubmapId submap, const Map& map);
 
   ImuCalibration told_;

@@ -185,9 +185,14 @@ void System::Impl::finish() {
   is_finished_ = true;
   back_end_.end_threads();
   visible_ = back_end_.finish(motions());
-  memory_.settle(*rig(), *map());
   const bool is_placed = back_end_.marker_survey().frame.has_value();
-  visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free_ && !is_placed);
+  const bool is_frame_free = is_frame_free_ && !is_placed;
+  memory_.settle(*rig(), *map());
+  if (auto adjusted = is_frame_free ? inertial_.adjust(memory_, *map()) : nullptr) {
+    visible_.snapshot.map = std::move(adjusted);
+    memory_.settle(*rig(), *map());
+  }
+  visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free);
 }
 
 /// How the rig moved at the keyframes, where that matters.

@@ -71,7 +71,6 @@ void TrajectoryMemory::add(const Frame& frame, const TrackingResult& result, con
 
 void TrajectoryMemory::settle(const Rig& rig, const Map& map) {
   for (const Unsettled& unsettled : unsettled_) settle(unsettled, rig, map);
-  unsettled_.clear();
   for (auto it = unposed_.rbegin(); it != unposed_.rend(); ++it) fill(*it, 1, rig, map);
   for (const Unposed& unposed : unposed_) fill(unposed, -1, rig, map);
   unposed_.clear();

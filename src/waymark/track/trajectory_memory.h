@@ -63,7 +63,8 @@ class TrajectoryMemory {
   /// Adds the next frame; map is the one it was tracked in.
   void add(const Frame& frame, const TrackingResult& result, const Map& map);
   /// Finds the poses of all unsettled frames again in the final map, and from there those of the
-  /// frames before and after them that had none. rig: as calibrated by now.
+  /// frames before and after them that had none. Once more where the map was moved since. rig: as
+  /// calibrated by now.
   void settle(const Rig& rig, const Map& map);
 
   /// How the rig moved in a frame, without what it saw, by the poses of the frames before and after
