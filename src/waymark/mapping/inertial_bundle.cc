@@ -10,14 +10,13 @@
 #include <utility>
 #include <vector>
 
+#include "waymark/imu/inertial_path.h"
 #include "waymark/imu/inertial_residual.h"
 #include "waymark/imu/preintegration.h"
 
 namespace waymark {
 namespace {
 
-/// Keyframes further apart are not tied.
-constexpr std::int64_t kMaxApartNs = 5'000'000'000;
 /// What is not told beforehand, in rad and m/s.
 constexpr double kGravitySigma = 1.0;
 constexpr double kVelocitySigma = 100.0;
@@ -144,7 +143,7 @@ void add_inertial_terms(const Map& map,
   const auto shift_ns = static_cast<std::int64_t>(std::llround(1e9 * imu.found.time_shift_s));
   for (std::uint32_t i = 0; i + 1 < order.size(); ++i) {
     const std::int64_t begin_ns = time_of(order[i]), end_ns = time_of(order[i + 1]);
-    if (end_ns <= begin_ns || end_ns - begin_ns > kMaxApartNs) continue;
+    if (end_ns <= begin_ns || end_ns - begin_ns > kMaxBridgedNs) continue;
     auto samples = imu.samples.between(begin_ns + shift_ns, end_ns + shift_ns);
     if (samples.empty()) continue;
     measured->emplace_back(std::move(samples), imu.noise, imu.found.states.back().biases);

@@ -282,15 +282,17 @@ SubmapId InertialEstimator::look_at_largest(const TrajectoryMemory& memory, cons
 }
 
 std::shared_ptr<const Map> InertialEstimator::adjust(const TrajectoryMemory& memory,
-                                                     const Map& map) {
-  if (!has_samples() || map.keyframes().is_empty()) return nullptr;
-  const SubmapId submap = look_at_largest(memory, map);
-  if (!is_firm() || found_->sigma(kLogScaleAt) > kFirmScale) return nullptr;
+                                                     std::shared_ptr<const Map> map) {
+  if (!has_samples() || map->keyframes().is_empty()) return map;
+  SubmapId submap = look_at_largest(memory, *map);
+  const auto known = [&](SubmapId part) { return knowledge_of(part, *map); };
+  while (is_firm() && join_parts(memory, known, map)) submap = look_at_largest(memory, *map);
+  if (!is_firm() || found_->sigma(kLogScaleAt) > kFirmScale) return map;
   InertialStart found = *found_;
-  if (map.submaps()[submap.value].is_metric) found.setup.log_scale = 0.0;
-  const GlobalAdjustment adjustment = adjust_with_imu(map, submap, {samples_, noise_, found});
-  if (adjustment.correction.keyframes.empty()) return nullptr;
-  Map next = Map::thaw(map);
+  if (map->submaps()[submap.value].is_metric) found.setup.log_scale = 0.0;
+  const GlobalAdjustment adjustment = adjust_with_imu(*map, submap, {samples_, noise_, found});
+  if (adjustment.correction.keyframes.empty()) return map;
+  Map next = Map::thaw(*map);
   DirtyLandmarks dirty;
   apply_adjustment(next, adjustment, dirty);
   return next.freeze();
@@ -300,10 +302,7 @@ std::shared_ptr<const Map> InertialEstimator::finish(TrajectoryMemory& memory,
                                                      std::shared_ptr<const Map> map,
                                                      bool is_frame_free) {
   if (!has_samples() || map->keyframes().is_empty()) return map;
-  SubmapId submap = look_at_largest(memory, *map);
-  const auto known = [&](SubmapId part) { return knowledge_of(part, *map); };
-  while (is_frame_free && is_firm() && join_parts(memory, known, map))
-    submap = look_at_largest(memory, *map);
+  const SubmapId submap = look_at_largest(memory, *map);
   if (report_->is_used && found_->sigma(kLogScaleAt) < kFirmScale) {
     path_ = smooth_trajectory(knowledge(), submap, *map, memory);
   }

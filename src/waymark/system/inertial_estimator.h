@@ -66,9 +66,10 @@ class InertialEstimator {
                                           const Map& map,
                                           std::int64_t timestamp_ns);
 
-  /// Adjusts the largest part with what was measured between its keyframes. Null where that is not
-  /// known well, and where it contradicts the images.
-  std::shared_ptr<const Map> adjust(const TrajectoryMemory& memory, const Map& map);
+  /// Joins parts of the map between which it tells the way, and adjusts the largest one with what
+  /// was measured between its keyframes. Gives the same map where that is not known well, and where
+  /// it contradicts the images.
+  std::shared_ptr<const Map> adjust(const TrajectoryMemory& memory, std::shared_ptr<const Map> map);
 
   /// Looks at the whole way, and gives frames without a pose those that the IMU tells.
   /// is_frame_free: the map was begun in this session and no marker says where it is. Gives the map

@@ -188,9 +188,9 @@ void System::Impl::finish() {
   const bool is_placed = back_end_.marker_survey().frame.has_value();
   const bool is_frame_free = is_frame_free_ && !is_placed;
   memory_.settle(*rig(), *map());
-  if (auto adjusted = is_frame_free ? inertial_.adjust(memory_, *map()) : nullptr) {
-    visible_.snapshot.map = std::move(adjusted);
-    memory_.settle(*rig(), *map());
+  if (const auto before = map(); is_frame_free) {
+    visible_.snapshot.map = inertial_.adjust(memory_, before);
+    if (map() != before) memory_.settle(*rig(), *map());
   }
   visible_.snapshot.map = inertial_.finish(memory_, map(), is_frame_free);
 }
