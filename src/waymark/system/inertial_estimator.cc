@@ -290,7 +290,9 @@ std::shared_ptr<const Map> InertialEstimator::adjust(const TrajectoryMemory& mem
   if (!is_firm() || found_->sigma(kLogScaleAt) > kFirmScale) return map;
   InertialStart found = *found_;
   if (map->submaps()[submap.value].is_metric) found.setup.log_scale = 0.0;
-  const GlobalAdjustment adjustment = adjust_with_imu(*map, submap, {samples_, noise_, found});
+  // Noise is often stated larger than it is, for what else an IMU does wrong.
+  const ImuNoise noise = noise_of({}, samples_.all());
+  const GlobalAdjustment adjustment = adjust_with_imu(*map, submap, {samples_, noise, found});
   if (adjustment.correction.keyframes.empty()) return map;
   Map next = Map::thaw(*map);
   DirtyLandmarks dirty;
