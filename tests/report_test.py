@@ -69,7 +69,7 @@ class ReportTest(CliTest):
 
     def run_reported(self, source, *options, status=0):
         done = self.run_on(source, "--report", *options)
-        self.assertEqual(done.returncode, status, done.stderr)
+        self.assertIn(done.returncode, status if isinstance(status, tuple) else (status,), done.stderr)
         return done
 
 
@@ -224,7 +224,8 @@ class Causes(ReportTest):
         self.assertIn("parts", self.advised_after(source))
 
     def test_late(self):
-        self.assertIn("late", self.advised_after(self.copied(), "--timing", "realtime", "--pace", 40))
+        # How many frames are left, and whether a map starts of them, depends on what else the machine does.
+        self.assertIn("late", self.advised_after(self.copied(), "--timing", "realtime", "--pace", 40, status=(0, 3)))
 
     def test_jumps(self):
         source = self.copied("fast_turn")
