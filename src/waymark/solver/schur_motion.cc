@@ -82,10 +82,10 @@ void SchurSolver::add_motion_column(std::uint32_t slot,
                                     std::span<const std::uint32_t> places,
                                     double* sums) const {
   constexpr std::size_t kSize = kBlockRows * kPaddedBlockRows;
-  for (const MotionBlock& block :
-       std::ranges::equal_range(motion_blocks_, slot, {}, &MotionBlock::column)) {
-    Eigen::Map<Eigen::Matrix<double, kPaddedBlockRows, 6>>(sums + kSize * places[block.row])
-        .topRows<6>() += block.value;
+  auto block = std::ranges::lower_bound(motion_blocks_, slot, {}, &MotionBlock::column);
+  for (; block != motion_blocks_.end() && block->column == slot; ++block) {
+    Eigen::Map<Eigen::Matrix<double, kPaddedBlockRows, 6>>(sums + kSize * places[block->row])
+        .topRows<6>() += block->value;
   }
 }
 
