@@ -23,6 +23,7 @@
 #include "waymark/input/input.h"
 #include "waymark/simulate/dataset.h"
 #include "waymark/simulate/named_cameras.h"
+#include "waymark/simulate/named_rigs.h"
 #include "waymark/simulate/sequence.h"
 
 namespace waymark {
@@ -116,15 +117,37 @@ void blacken(const std::vector<int>& firsts_and_counts, SequenceSpec& spec) {
   }
 }
 
+/// The same of one camera.
+void darken(const std::vector<int>& cameras_firsts_and_counts, SequenceSpec& spec) {
+  if (cameras_firsts_and_counts.size() % 3 != 0) {
+    throw InputError("--dark", "ends early, expected CAMERA,FIRST,COUNT,...");
+  }
+  ImageEffects black = spec.effects;
+  black.gain = 0.0;
+  for (std::size_t i = 0; i < cameras_firsts_and_counts.size(); i += 3) {
+    const auto camera = static_cast<std::size_t>(cameras_firsts_and_counts[i]);
+    if (camera >= spec.chain.cameras.size()) {
+      throw InputError(
+          "--dark",
+          fmt::format("names camera {}, expected one below {}", camera, spec.chain.cameras.size()));
+    }
+    const int first = cameras_firsts_and_counts[i + 1];
+    spec.spans.insert(spec.spans.begin(),
+                      {first, first + cameras_firsts_and_counts[i + 2], black, camera});
+  }
+}
+
 struct SimulateOptions {
   std::string name;  ///< Of a world, or of a sequence of the suite.
   std::filesystem::path out;
   std::string camera;  ///< Camchain file or name; empty: the default.
+  std::string rig;     ///< A name in place of camera and setup; empty: these.
   Setup setup = Setup::kStereo;
   SequenceSpec spec;
   double exposure_ms = 0.0;
   double readout_ms = 0.0;
   double depth_lag_ms = 0.0;
+  double trigger_lag_ms = 0.0;
   double stitched_m = 0.0;
   double stabilised_share = 0.0;
   double compressed_kbit_per_s = 0.0;
@@ -134,11 +157,13 @@ struct SimulateOptions {
   std::vector<std::string> told;  ///< KEY=VALUE each.
   std::vector<std::string> imu;   ///< Name, then KEY=VALUE each; empty: none.
   std::vector<int> black;         ///< First frame and number of frames, by turns.
+  std::vector<int> dark;          ///< Camera, first frame and number of frames, by turns.
   bool is_list = false;
   bool is_quiet = false;
 };
 
 CameraChain chain_of(const SimulateOptions& options) {
+  if (!options.rig.empty()) return named_rig(options.rig, kHeightPx);
   if (options.camera.empty()) return default_camera_chain(options.setup);
   const std::vector<std::string> names = camera_names();
   if (std::find(names.begin(), names.end(), options.camera) != names.end()) {
@@ -168,6 +193,7 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   SequenceSpec spec = plain_spec_of(options);
   spec.readout_s = 1e-3 * options.readout_ms;
   spec.depth_lag_s = 1e-3 * options.depth_lag_ms;
+  spec.trigger_lag_s = 1e-3 * options.trigger_lag_ms;
   spec.stitched_m = options.stitched_m;
   spec.stabilised_share = options.stabilised_share;
   spec.compressed_kbit_per_s = options.compressed_kbit_per_s;
@@ -176,6 +202,7 @@ SequenceSpec spec_of(const SimulateOptions& options) {
   turn_camera1(options.turn_deg, spec.chain);
   if (!options.imu.empty()) spec.imu = parse_imu(options.imu);
   blacken(options.black, spec);
+  darken(options.dark, spec);
   spec.told = parse_calibration_error(options.told);
   // What cannot be told fails before anything is written.
   make_rig(told_chain(spec.chain, spec.told));
@@ -187,6 +214,7 @@ int list_choices() {
   for (const std::string& world : world_names()) print_result("world {}\n", world);
   for (const std::string& motion : motion_names()) print_result("motion {}\n", motion);
   for (const std::string& camera : camera_names()) print_result("camera {}\n", camera);
+  for (const std::string& rig : rig_names()) print_result("rig {}\n", rig);
   for (const std::string& imu : imu_names()) print_result("imu {}\n", imu);
   for (const SuiteEntry& entry : simulated_suite()) {
     print_result("sequence {} {} {}\n", entry.spec.name, entry.setup, entry.about);
@@ -282,6 +310,11 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
                   "Milliseconds that depth images are taken after the others [0]")
       ->check(number_between(0.0, 1000.0));
   simulation
+      .add_option("--trigger-lag",
+                  options.trigger_lag_ms,
+                  "Milliseconds that each camera is exposed after the one before it [0]")
+      ->check(number_between(0.0, 1000.0));
+  simulation
       .add_option("--stitched",
                   options.stitched_m,
                   "Metres between the two lenses that 360 degree images are stitched from [0]")
@@ -301,6 +334,12 @@ void add_flaw_options(CLI::App& simulation, SimulateOptions& options) {
       .add_option("--black",
                   options.black,
                   "FIRST,COUNT,...: frames that are black, as many from each first one on [none]")
+      ->delimiter(',')
+      ->check(CLI::Range(0, 1000000));
+  simulation
+      .add_option("--dark",
+                  options.dark,
+                  "CAMERA,FIRST,COUNT,...: frames in which one camera is black [none]")
       ->delimiter(',')
       ->check(CLI::Range(0, 1000000));
   add_pair_options(simulation, options);
@@ -343,6 +382,13 @@ void add_simulate_command(CLI::App& program, Command& command) {
                     options->setup,
                     {{"mono", Setup::kMono}, {"stereo", Setup::kStereo}, {"rgbd", Setup::kRgbd}},
                     "mono, stereo or rgbd [stereo]");
+  simulation
+      .add_option("--rig",
+                  options->rig,
+                  "Cameras that look in several directions, in place of --camera and --setup; see "
+                  "--list")
+      ->excludes("--camera")
+      ->excludes("--setup");
   simulation.add_option("--motion", spec.motion, "How the camera moves; see --list")
       ->capture_default_str();
   simulation.add_option("--frames", spec.num_frames, "Number of frames")

@@ -135,20 +135,22 @@ class Writer {
   void add(const SimulatedFrame& frame, const Rigid3& world_from_camera0) {
     const std::string seconds = format_seconds(frame.timestamp_ns);
     const bool is_csv = layout_ == Layout::kEuroc || layout_ == Layout::kTumVi;
-    const std::string name = (is_csv ? std::to_string(frame.timestamp_ns) : seconds) + ".png";
     const std::vector<fs::path> folders = image_folders();
+    lists_.resize(folders.size());
     for (std::size_t i = 0; i < folders.size(); ++i) {
       const Image& image = frame.images[i];
+      const std::int64_t taken_ns = frame.image_timestamps_ns[i];
+      const std::string name = (is_csv ? std::to_string(taken_ns) : seconds) + ".png";
+      if (is_csv) lists_[i] += fmt::format("{},{}\n", taken_ns, name);
+      if (layout_ == Layout::kTumRgbd) lists_[i] += fmt::format("{} rgb/{}\n", seconds, name);
+      if (layout_ == Layout::kImageFolder) lists_[i] += seconds + "\n";
       write_png(folder_ / folders[i] / name,
                 compressions_.empty() ? image : compressions_[i].compress(image));
     }
     if (layout_ == Layout::kTumRgbd) {
       const std::string depth_seconds = format_seconds(frame.depth_timestamp_ns);
       write_png(folder_ / "depth" / (depth_seconds + ".png"), frame.depth);
-      list_ += fmt::format("{} rgb/{}\n", seconds, name);
       depth_list_ += fmt::format("{0} depth/{0}.png\n", depth_seconds);
-    } else {
-      list_ += is_csv ? fmt::format("{},{}\n", frame.timestamp_ns, name) : seconds + "\n";
     }
     truth_.push_back({frame.timestamp_ns, world_from_camera0});
   }
@@ -156,11 +158,11 @@ class Writer {
   void finish() const {
     switch (layout_) {
       case Layout::kTumRgbd:
-        write_file_atomically(folder_ / "rgb.txt", "# timestamp filename\n" + list_);
+        write_file_atomically(folder_ / "rgb.txt", "# timestamp filename\n" + lists_[0]);
         write_file_atomically(folder_ / "depth.txt", "# timestamp filename\n" + depth_list_);
         break;
       case Layout::kImageFolder:
-        write_file_atomically(folder_ / "times.txt", list_);
+        write_file_atomically(folder_ / "times.txt", lists_[0]);
         break;
       case Layout::kEuroc:
       case Layout::kTumVi:
@@ -209,7 +211,7 @@ class Writer {
   void write_sensors() const {
     for (std::size_t i = 0; i < spec_.chain.cameras.size(); ++i) {
       const fs::path sensor = folder_ / "mav0" / fmt::format("cam{}", i);
-      write_file_atomically(sensor / "data.csv", "#timestamp [ns],filename\n" + list_);
+      write_file_atomically(sensor / "data.csv", "#timestamp [ns],filename\n" + lists_[i]);
       if (layout_ != Layout::kEuroc) continue;
       write_file_atomically(sensor / "sensor.yaml", format_sensor(told_.cameras[i], spec_.rate_hz));
     }
@@ -222,7 +224,7 @@ class Writer {
   fs::path folder_;
   Layout layout_;
   std::vector<VideoCompression> compressions_;  ///< Per camera, or none.
-  std::string list_;
+  std::vector<std::string> lists_;              ///< Of images, per camera.
   std::string depth_list_;
   std::vector<StampedPose> truth_;
 };

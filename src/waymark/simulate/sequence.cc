@@ -86,7 +86,7 @@ SimulatedSequence::SimulatedSequence(SequenceSpec spec,
       world_(populated_world(spec_, motion_, markers_)),
       pool_(std::make_unique<ThreadPool>(num_threads)) {
   WAYMARK_CHECK(spec_.num_frames > 0 && spec_.rate_hz > 0.0);
-  WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0);
+  WAYMARK_CHECK(spec_.readout_s >= 0.0 && spec_.depth_lag_s >= 0.0 && spec_.trigger_lag_s >= 0.0);
   WAYMARK_CHECK(!rig_.cameras.empty() && rig_.cameras.size() < kDepthStream);
   prepare_flaws(registry);
 }
@@ -105,7 +105,7 @@ void SimulatedSequence::prepare_flaws(const CameraRegistry& registry) {
       CameraDescription& picture = sensors.cameras[i].description;
       stabilizers_.emplace_back(
           picture,
-          [&](int frame) { return world_from_cam(i, seconds(frame)); },
+          [&](int frame) { return world_from_cam(i, seconds(frame, i)); },
           spec_.num_frames,
           spec_.rate_hz,
           spec_.stabilised_share);
@@ -142,7 +142,8 @@ std::vector<ImuSample> SimulatedSequence::imu_samples() const {
 
 ImageEffects SimulatedSequence::effects_of(std::size_t camera, int index) const {
   const auto span = std::ranges::find_if(spec_.spans, [&](const EffectSpan& each) {
-    return index >= each.first_frame && index < each.end_frame;
+    return index >= each.first_frame && index < each.end_frame &&
+           each.camera.value_or(camera) == camera;
   });
   ImageEffects effects = span == spec_.spans.end() ? spec_.effects : span->effects;
   if (camera == 1) {
@@ -178,7 +179,7 @@ Image SimulatedSequence::render_from(std::size_t camera, double ahead_m, double 
 }
 
 Image SimulatedSequence::expose(std::size_t camera, int index, const ImageEffects& effects) {
-  const double middle = seconds(index);
+  const double middle = seconds(index, camera);
   const double half = 0.5 * effects.exposure_s;
   const int count = num_sub_exposures(motion_.world_from_rig(middle - half),
                                       motion_.world_from_rig(middle + half),
@@ -209,6 +210,8 @@ SimulatedFrame SimulatedSequence::frame(int index) {
     apply_exposure(effects, rng, image);
     if (!stabilizers_.empty()) image = stabilizers_[camera].stabilize(image, index);
     frame.images.push_back(std::move(image));
+    frame.image_timestamps_ns.push_back(kFirstTimestampNs +
+                                        std::llround(1e9 * seconds(index, camera)));
   }
   if (spec_.chain.depth_factor) {
     const double time_s = seconds(index) + spec_.depth_lag_s;

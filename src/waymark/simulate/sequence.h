@@ -41,9 +41,10 @@ namespace waymark {
 
 /// Other effects for the frames [first_frame, end_frame).
 struct EffectSpan {
-  int first_frame = 0;   ///< Index of the first frame.
-  int end_frame = 0;     ///< One past the last.
-  ImageEffects effects;  ///< In place of those of the sequence.
+  int first_frame = 0;                               ///< Index of the first frame.
+  int end_frame = 0;                                 ///< One past the last.
+  ImageEffects effects;                              ///< In place of those of the sequence.
+  std::optional<std::size_t> camera = std::nullopt;  ///< Of one camera alone; none: of all.
 };
 
 /// A sequence in words and numbers. The cameras may be of any model the registry knows; with a
@@ -53,7 +54,7 @@ struct SequenceSpec {
   std::string world = "room";     ///< See make_world().
   std::string motion = "loop";    ///< See make_motion().
   std::uint64_t seed = 0;         ///< Of the world's looks, the sway and the noise.
-  CameraChain chain;              ///< One camera, or two for stereo.
+  CameraChain chain;              ///< One camera, two for stereo, or more.
   double rate_hz = 20.0;          ///< Frames per second.
   int num_frames = 200;           ///< Which also say how long the motion takes.
   ImageEffects effects;           ///< Of the frames that no span holds.
@@ -67,6 +68,8 @@ struct SequenceSpec {
   double readout_s = 0.0;
   /// Depth images are taken so much later than the other images, as their own times say.
   double depth_lag_s = 0.0;
+  /// Each camera is exposed so much later than the one before it, as their own times say.
+  double trigger_lag_s = 0.0;
   /// Distance between the two lenses, back to back, that images of a 360 degree camera are stitched
   /// from, see Stitch; the front lens is half of it ahead of the camera. 0: there is one centre.
   double stitched_m = 0.0;
@@ -96,11 +99,12 @@ CameraChain rgbd_chain(const CameraDescription& camera, double depth_factor);
 
 /// A rendered frame and where the rig was.
 struct SimulatedFrame {
-  std::int64_t timestamp_ns = 0;        ///< Frames are 1 / rate_hz apart.
-  std::int64_t depth_timestamp_ns = 0;  ///< When the depth image was taken.
-  std::vector<Image> images;            ///< One per camera of the rig.
-  DepthImage depth;                     ///< Registered to camera 0; empty without depth.
-  Rigid3 world_from_rig;                ///< Truth at the middle of the exposure and of the rows.
+  std::int64_t timestamp_ns = 0;                  ///< Frames are 1 / rate_hz apart.
+  std::int64_t depth_timestamp_ns = 0;            ///< When the depth image was taken.
+  std::vector<Image> images;                      ///< One per camera of the rig.
+  std::vector<std::int64_t> image_timestamps_ns;  ///< When each was taken.
+  DepthImage depth;                               ///< Registered to camera 0; empty without depth.
+  Rigid3 world_from_rig;  ///< Truth at the middle of the exposure and of the rows.
 };
 
 /// Renders the frames of a spec, each from (seed, index) alone: in any order, with the same bits
@@ -134,7 +138,9 @@ class SimulatedSequence {
   SimulatedFrame frame(int index);
 
  private:
-  double seconds(int index) const { return index / spec_.rate_hz; }
+  double seconds(int index, std::size_t camera = 0) const {
+    return index / spec_.rate_hz + static_cast<double>(camera) * spec_.trigger_lag_s;
+  }
   Rigid3 world_from_cam(std::size_t camera, double time_s) const;
   Image render(std::size_t camera, double time_s);
   Image render_from(std::size_t camera, double ahead_m, double time_s);
