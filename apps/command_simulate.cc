@@ -5,8 +5,6 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
-#include <numbers>
-#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -15,12 +13,12 @@
 #include "numbers.h"
 #include "paths.h"
 #include "reporter.h"
+#include "simulated_chain.h"
 #include "terminal.h"
 #include "waymark/base/check.h"
 #include "waymark/base/config.h"
 #include "waymark/base/text.h"
 #include "waymark/exchange/export_folder.h"
-#include "waymark/input/input.h"
 #include "waymark/simulate/dataset.h"
 #include "waymark/simulate/named_cameras.h"
 #include "waymark/simulate/named_rigs.h"
@@ -28,81 +26,6 @@
 
 namespace waymark {
 namespace {
-
-constexpr double kDepthFactor = 5000.0;
-constexpr int kHeightPx = 480;
-
-/// The camera unless others are given: moderately distorted; the second of a pair is neither
-/// parallel to the first nor like it.
-CameraDescription default_camera(int index) {
-  CameraDescription camera;
-  camera.camera_model = "pinhole";
-  camera.intrinsics = {420.0 + index, 421.0 + index, 317.0 - 3.0 * index, 242.0 + 2.0 * index};
-  camera.distortion_model = "radtan";
-  camera.distortion_coeffs = {-0.2, 0.05, 0.0002, -0.0001};
-  camera.width_px = 640;
-  camera.height_px = 480;
-  camera.where = "default camera";
-  return camera;
-}
-
-Rigid3 default_cam1_from_cam0() {
-  Vector6d motion;
-  motion << -0.11, 0.002, -0.001, 0.008, -0.01, 0.005;
-  return Rigid3::exp(motion);
-}
-
-/// Turns the second of a pair, where there is one, about its own axes.
-void turn_camera1(const std::vector<double>& degrees, CameraChain& chain) {
-  if (degrees.empty()) return;
-  if (chain.cameras.size() < 2) {
-    throw InputError("--turn", "there is one camera, expected a pair (--setup stereo)");
-  }
-  const double mrad_per_degree = 1e3 * std::numbers::pi / 180.0;
-  const Eigen::Vector3d turn_mrad = mrad_per_degree * Eigen::Vector3d(degrees.data());
-  chain = told_chain(std::move(chain), {.turn_mrad = turn_mrad});
-}
-
-CameraChain make_chain(Setup setup,
-                       const CameraDescription& camera0,
-                       const CameraDescription& camera1) {
-  switch (setup) {
-    case Setup::kMono:
-      return mono_chain(camera0);
-    case Setup::kStereo:
-      return stereo_chain(camera0, camera1, default_cam1_from_cam0());
-    case Setup::kRgbd:
-      return rgbd_chain(camera0, kDepthFactor);
-  }
-  return {};
-}
-
-CameraChain default_camera_chain(Setup setup) {
-  return make_chain(setup, default_camera(0), default_camera(1));
-}
-
-/// Of a named camera (simulate/named_cameras.h), 480 pixels high.
-CameraChain named_camera_chain(const std::string& name, Setup setup) {
-  const CameraDescription camera = named_camera(name, kHeightPx);
-  return make_chain(setup, camera, camera);
-}
-
-/// The part of a camchain file that a setup uses.
-CameraChain read_camera_chain(const std::filesystem::path& file, Setup setup) {
-  std::optional<CameraChain> chain = read_camchain(parse_config(ConfigSource::from_file(file)));
-  const std::size_t num_cameras = setup == Setup::kStereo ? 2 : 1;
-  if (!chain || chain->cameras.size() < num_cameras) {
-    throw InputError(file.string(),
-                     fmt::format("describes {} cameras, expected {} for {}",
-                                 chain ? chain->cameras.size() : 0,
-                                 num_cameras,
-                                 to_string(setup)));
-  }
-  chain->cameras.resize(num_cameras);
-  if (setup != Setup::kRgbd) chain->depth_factor.reset();
-  if (setup == Setup::kRgbd && !chain->depth_factor) chain->depth_factor = kDepthFactor;
-  return *chain;
-}
 
 /// Frames that are black but for the sensor's noise.
 void blacken(const std::vector<int>& firsts_and_counts, SequenceSpec& spec) {
@@ -162,16 +85,6 @@ struct SimulateOptions {
   bool is_quiet = false;
 };
 
-CameraChain chain_of(const SimulateOptions& options) {
-  if (!options.rig.empty()) return named_rig(options.rig, kHeightPx);
-  if (options.camera.empty()) return default_camera_chain(options.setup);
-  const std::vector<std::string> names = camera_names();
-  if (std::find(names.begin(), names.end(), options.camera) != names.end()) {
-    return named_camera_chain(options.camera, options.setup);
-  }
-  return read_camera_chain(options.camera, options.setup);
-}
-
 SequenceSpec plain_spec_of(const SimulateOptions& options) {
   const std::vector<std::string> worlds = world_names();
   if (std::find(worlds.begin(), worlds.end(), options.name) == worlds.end()) {
@@ -184,7 +97,8 @@ SequenceSpec plain_spec_of(const SimulateOptions& options) {
   SequenceSpec spec = options.spec;
   spec.name = spec.world = options.name;
   spec.effects.exposure_s = 1e-3 * options.exposure_ms;
-  spec.chain = chain_of(options);
+  spec.chain = options.rig.empty() ? simulated_chain(options.camera, options.setup)
+                                   : named_rig(options.rig, kSimulatedHeightPx);
   return spec;
 }
 
