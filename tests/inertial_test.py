@@ -4,6 +4,7 @@
 """One camera and an IMU give metres and a level map, however the IMU is described; one that is wrong is left out with
 a line, and changes nothing. Needs WAYMARK_DATA."""
 import json
+import math
 import os
 import pathlib
 import unittest
@@ -112,6 +113,26 @@ class Simulated(CliTest):
         self.assertEqual((summary["submaps"], summary["coverage"]), (1, 1.0))
         text = waymark("eval", self.out / "trajectory.txt", world / "groundtruth.txt", "--align", "se3", "--json")
         self.assertLess(json.loads(text.stdout)["ate_rmse_m"], 0.15)
+
+    def test_people_before_a_pair_at_rest_do_not_move_it(self):
+        scene = self.folder / "scene"
+        done = waymark("simulate", "hall", "--motion", "still", "--frames", 60, "--walkers", 3, "--imu", "phone", "--seed", 4,
+                       "-o", scene)
+        self.assertEqual(done.returncode, 0, done.stderr)
+        # An IMU that is told to have no noise at all shows none at rest, either.
+        quiet = self.folder / "quiet.yaml"
+        quiet.write_text("".join(f"{name}: 0.0\n" for name in (
+            "gyroscope_noise_density", "gyroscope_random_walk", "accelerometer_noise_density", "accelerometer_random_walk")))
+        farthest = {}
+        for imu in ("auto", "none"):
+            done = waymark("run", scene, "-c", scene / "camchain.yaml", "-c", quiet, "-o", self.out, *(["--imu", imu] * (imu == "none")))
+            self.assertEqual(done.returncode, 0, done.stderr)
+            places = [[float(word) for word in line.split()[1:4]] for line in
+                      (self.out / "trajectory.txt").read_text().splitlines() if not line.startswith("#")]
+            self.assertEqual(len(places), 60)
+            farthest[imu] = max(math.dist(place, places[0]) for place in places)
+        self.assertLess(farthest["auto"], 0.03)
+        self.assertGreater(farthest["none"], 0.3)
 
     def test_a_crowd_at_the_start_is_not_followed(self):
         scene = self.folder / "scene"

@@ -98,12 +98,35 @@ double shown_density(std::span<const ImuSample> samples, Eigen::Vector3d ImuSamp
   return std::sqrt(median(squared) / (kMedianOfThree * kOfSecondDifference) * median(steps_s));
 }
 
+/// Variance of samples at rest to that of white noise as their second differences show it.
+constexpr double kMaxRestGrowth = 1.7;
+/// What rounding makes of samples without any, in rad/s and m/s^2.
+constexpr double kLeastDeviation = 1e-6;
+
 }  // namespace
 
 ImuNoise shown_imu_noise(std::span<const ImuSample> samples) {
   WAYMARK_CHECK(samples.size() >= 3);
   return {.gyroscope = shown_density(samples, &ImuSample::angular_velocity),
           .accelerometer = shown_density(samples, &ImuSample::acceleration)};
+}
+
+bool shows_no_motion(std::span<const ImuSample> samples) {
+  const ImuNoise noise = shown_imu_noise(samples);
+  const double seconds =
+      1e-9 * static_cast<double>(samples.back().timestamp_ns - samples.front().timestamp_ns);
+  const double root_rate = std::sqrt(static_cast<double>(samples.size() - 1) / seconds);
+  const auto is_noise = [&](Eigen::Vector3d ImuSample::*sensor, double density) {
+    Eigen::Vector3d mean = Eigen::Vector3d::Zero();
+    for (const ImuSample& sample : samples) mean += sample.*sensor;
+    mean /= static_cast<double>(samples.size());
+    double sum = 0.0;
+    for (const ImuSample& sample : samples) sum += (sample.*sensor - mean).squaredNorm();
+    const double white = std::max(density * root_rate, kLeastDeviation);
+    return sum <= kMaxRestGrowth * 3.0 * white * white * static_cast<double>(samples.size());
+  };
+  return is_noise(&ImuSample::angular_velocity, noise.gyroscope) &&
+         is_noise(&ImuSample::acceleration, noise.accelerometer);
 }
 
 ImuNoise default_imu_noise() { return {2.4e-4, 3.5e-3, 1.9e-5, 3e-3}; }

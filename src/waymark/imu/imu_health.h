@@ -40,6 +40,10 @@ struct ImuHealth {
 /// samples: of ascending times.
 ImuHealth imu_health(std::span<const ImuSample> samples);
 
+/// Whether an IMU shows nothing but noise: it lies still, or goes straight on at a constant speed,
+/// which no device on wheels or in the hand does. At least three samples.
+bool shows_no_motion(std::span<const ImuSample> samples);
+
 /// For an IMU that nothing is known of: twice the white noise of one as in phones and cheap cameras
 /// (Bosch BMI160 data sheet: 0.007 deg/s/sqrt(Hz) and 180 ug/sqrt(Hz)), for vibration, scale and
 /// misalignment, and the random walks of the Analog Devices ADIS16448 of EuRoC (Burri et al. 2016),

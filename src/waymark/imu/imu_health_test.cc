@@ -54,5 +54,27 @@ TEST(ImuHealth, FindsGaps) {
   EXPECT_EQ(imu_health({}).rate_hz, 0.0);
 }
 
+/// How many of the stretches of .4 s show no motion.
+double part_at_rest(const testing::ImuMotion& motion, const ImuNoise& noise) {
+  Rng rng(2, 0);
+  const ImuBiases biases{{0.02, -0.01, 0.03}, {0.1, 0.2, -0.3}};
+  const ImuSamples samples = testing::simulated_samples(
+      motion, 0.0, 20.0, 200.0, noise, biases, {0.0, 0.0, -kStandardGravity}, rng);
+  int num_at_rest = 0;
+  for (std::size_t i = 0; i < 50; ++i) {
+    num_at_rest += shows_no_motion(samples.all().subspan(80 * i, 80));
+  }
+  return num_at_rest / 50.0;
+}
+
+TEST(ImuHealth, ShowsNoMotionAtRestAlone) {
+  const ImuNoise usual{1e-4, 2e-3, 1e-5, 1e-4};
+  EXPECT_GT(part_at_rest({}, usual), 0.95);
+  EXPECT_EQ(part_at_rest({}, {}), 1.0);  // Without noise.
+  Rng rng(3, 0);
+  EXPECT_EQ(part_at_rest(testing::hand_held_motion(rng), usual), 0.0);
+  EXPECT_LT(part_at_rest(testing::hovering_motion(rng), usual), 0.1);
+}
+
 }  // namespace
 }  // namespace waymark

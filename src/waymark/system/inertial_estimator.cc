@@ -31,6 +31,8 @@ constexpr double kMaxAccelerometerBias = 0.8;
 /// Poses of vision err alike for long, which no number of them averages out.
 constexpr double kSystematicRotation = 5e-4;  // rad
 constexpr double kSystematicTimeShift_s = 2e-4;
+/// Of noise as is usual: none has less, whatever is told and a rest shows.
+constexpr double kLeastNoise = 0.1;
 /// So many samples show their noise.
 constexpr std::size_t kShownSamples = 2000;
 /// Of the lengths of a map that is metric, as a part: baselines and depths are that good.
@@ -42,6 +44,10 @@ constexpr double kFirmRotation = 0.02;
 constexpr double kSureScale = 0.01;
 /// Rates of turn that biases may have, rad/s.
 constexpr double kFirmBias = 0.01;
+/// Rest has lasted so long, with as many samples.
+constexpr std::int64_t kRestNs = 400'000'000;
+constexpr std::int64_t kMinRestNs = 90'000'000;  ///< At the start, where there are no more.
+constexpr std::size_t kMinRestSamples = 10;
 /// A turn that two poses tell is off by less, in rad and as a part of it.
 constexpr double kTurnError = 0.003;
 constexpr double kTurnPart = 0.04;
@@ -84,8 +90,8 @@ ImuNoise noise_of(const ImuCalibration& told, std::span<const ImuSample> samples
   const ImuNoise usual = default_imu_noise();
   const ImuNoise noise = told.noise.value_or(usual);
   const ImuNoise shown = shown_imu_noise(samples.last(std::min(samples.size(), kShownSamples)));
-  return {std::max(noise.gyroscope, shown.gyroscope),
-          std::max(noise.accelerometer, shown.accelerometer),
+  return {std::max({noise.gyroscope, shown.gyroscope, kLeastNoise * usual.gyroscope}),
+          std::max({noise.accelerometer, shown.accelerometer, kLeastNoise * usual.accelerometer}),
           std::max(noise.gyroscope_walk, usual.gyroscope_walk),
           std::max(noise.accelerometer_walk, usual.accelerometer_walk)};
 }
@@ -266,6 +272,16 @@ bool InertialEstimator::contradicts_turn(std::int64_t begin_ns,
   const double of_angle = kTurnPart * measured->angularDistance(Eigen::Quaterniond::Identity());
   const double of_bias = 1e-9 * static_cast<double>(end_ns - begin_ns) * largest_bias;
   return measured->angularDistance(rig_end_from_rig_begin) > kTurnError + of_angle + of_bias;
+}
+
+bool InertialEstimator::is_at_rest(std::int64_t timestamp_ns) const {
+  const double shift_s = found_ ? found_->time_shift_s : told_.time_shift_s.value_or(0.0);
+  const std::int64_t end_ns = timestamp_ns + std::llround(1e9 * shift_s);
+  const std::int64_t first_ns = samples_.all().front().timestamp_ns;
+  const std::int64_t begin_ns = std::max(end_ns - kRestNs, first_ns);
+  if (end_ns - begin_ns < kMinRestNs) return false;
+  const std::vector<ImuSample> samples = samples_.between(begin_ns, end_ns);
+  return samples.size() >= kMinRestSamples && shows_no_motion(samples);
 }
 
 std::optional<Eigen::Vector3f> InertialEstimator::turn_rad_s(std::int64_t timestamp_ns) const {

@@ -57,6 +57,9 @@ class InertialEstimator {
                         const Eigen::Quaterniond& rig_end_from_rig_begin,
                         double largest_bias) const;
 
+  /// Whether samples show nothing but noise for a while up to this moment.
+  bool is_at_rest(std::int64_t timestamp_ns) const;
+
   /// How the rig turns about a moment by the gyroscope, as RigMotion has it; where turn() tells it.
   std::optional<Eigen::Vector3f> turn_rad_s(std::int64_t timestamp_ns) const;
 

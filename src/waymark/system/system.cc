@@ -111,6 +111,7 @@ const TrackingResult& System::Impl::feed(const FrameImages& images) {
     }
   }
   if (inertial_.has_samples()) {
+    frame.is_at_rest = inertial_.is_at_rest(frame.timestamp_ns);
     frame.contradicts_turn = [&, time_ns = frame.timestamp_ns](std::int64_t begin_ns,
                                                                const Eigen::Quaterniond& turn,
                                                                double largest_bias) {

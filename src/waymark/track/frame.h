@@ -33,6 +33,7 @@ struct Frame {
   std::function<MarkerObservations()> find_markers = nullptr;
   /// How the rig turned since the newest frame that has a pose, by a gyroscope: rig_from_rig_then.
   std::optional<Eigen::Quaterniond> turn = std::nullopt;
+  bool is_at_rest = false;  ///< By what an IMU measured for a while.
   /// How it turns within the frame by a gyroscope, as RigMotion has it.
   std::optional<Eigen::Vector3f> turn_rad_s = std::nullopt;
   /// Whether a gyroscope contradicts that the rig turned so since a moment (rig_from_rig_then), as

@@ -13,6 +13,15 @@
 namespace waymark {
 namespace {
 
+/// Where the rig rests landmarks are found where they were, in pixels of their level. It has come
+/// to rest where that part of them is, and where it moved less from frame to frame, by
+/// distance_from(); then people may hide nearly all, and for a while all of it. After that it went
+/// straight on at a constant speed.
+constexpr double kRestRadiusPx = 2.0;
+constexpr double kRestPart = 0.1;
+constexpr double kRestMotion = 0.001;
+constexpr int kMaxUnseen = 10;  // Frames.
+
 /// Around a prediction, and when that fails.
 std::array<double, 2> search_radii_px(const Frame& frame, const PoseSearchOptions& options) {
   const Camera& camera = *frame.features->rig->cameras[0].camera;
@@ -45,7 +54,14 @@ struct PoseSearch::Step {
   bool is_confirmed = false;    ///< By itself, without the local map.
 };
 
-const std::array<PoseSearch::Step, 6> PoseSearch::kSteps = {{
+const std::array<PoseSearch::Step, 7> PoseSearch::kSteps = {{
+    {.name = "rest",
+     .stage = Stage::kPredict,
+     .is_possible = [](const Context& context,
+                       const PoseSearchOptions&) { return !context.is_lost; },
+     .locate = &PoseSearch::at_rest,
+     .is_alternative = true,
+     .is_confirmed = true},
     {.name = "motion",
      .stage = Stage::kPredict,
      .is_possible = [](const Context& context,
@@ -112,6 +128,38 @@ std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
     return found;
   }
   return std::nullopt;
+}
+
+std::optional<LocatedFrame> PoseSearch::at_rest(Frame& frame, const Context& context) {
+  if (!frame.is_at_rest) {
+    resting_.reset();
+    num_unseen_ = 0;
+  }
+  if (!frame.is_at_rest || num_unseen_ > kMaxUnseen) return std::nullopt;
+  const Map& map = *context.visible.map;
+  const Rigid3 rig_from_world = resting_.value_or(context.last.rig_from_world());
+  local_map_.refresh(
+      context.visible.map,
+      [&] { return context.last.landmarks(map).ids; },
+      context.last.reference());
+  std::vector<LandmarkId> visible;
+  std::vector<LandmarkId> stay = locator_.find(*frame.features,
+                                               local_map().landmarks,
+                                               rig_from_world,
+                                               {.radius_px = kRestRadiusPx},
+                                               &visible);
+  const double part = static_cast<double>(num_valid(stay)) / static_cast<double>(visible.size());
+  num_unseen_ = num_valid(stay) < settings_.min_inliers ? num_unseen_ + 1 : 0;
+  if (!resting_ && num_unseen_ > 0) return std::nullopt;
+  LocatedFrame located = locator_.locate(*frame.features, map, rig_from_world, std::move(stay));
+  located.rig_from_world = rig_from_world;
+  const Rigid3 predicted = context.last.predict(frame.timestamp_ns);
+  const bool comes_to_rest =
+      part > kRestPart && distance_from(predicted, map, located) < kRestMotion;
+  if (!resting_ && !comes_to_rest) return std::nullopt;
+  located.visible = std::move(visible);
+  resting_ = rig_from_world;
+  return located;
 }
 
 std::optional<LocatedFrame> PoseSearch::by_motion(Frame& frame, const Context& context) {

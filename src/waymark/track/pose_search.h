@@ -61,10 +61,11 @@ class PoseSearch {
  private:
   using Found = std::optional<LocatedFrame>;
   struct Step;
-  static const std::array<Step, 6> kSteps;
+  static const std::array<Step, 7> kSteps;
 
   const PoseSearchOptions& options() const { return settings_.options.pose_search; }
 
+  Found at_rest(Frame& frame, const Context& context);
   Found by_motion(Frame& frame, const Context& context);
   Found by_dead_reckoning(Frame& frame, const Context& context);
   Found near_last_pose(Frame& frame, const Context& context);
@@ -93,6 +94,8 @@ class PoseSearch {
   PoseCheck check_;
   RecentLocalMap local_map_;
   std::string_view found_by_;
+  std::optional<Rigid3> resting_;  ///< Where the rig came to rest; none where it moves.
+  int num_unseen_ = 0;  ///< Frames at rest that do not show what is around, the last ones in turn.
 };
 
 }  // namespace waymark

@@ -34,11 +34,13 @@ class TrackerTest : public ::testing::Test {
 
   Tracked track(std::uint32_t number,
                 const Features& features,
-                const std::function<std::optional<ReckonedPose>()>& dead_reckon = nullptr) {
+                const std::function<std::optional<ReckonedPose>()>& dead_reckon = nullptr,
+                bool is_at_rest = false) {
     Frame frame{FrameId{number},
                 50'000'000 * std::int64_t{number},
                 std::make_shared<const Features>(features)};
     frame.dead_reckon = dead_reckon;
+    frame.is_at_rest = is_at_rest;
     Tracked outcome;
     outcome.message = tracker_->track(frame, {map_, places_}, outcome);
     return outcome;
@@ -291,6 +293,36 @@ TEST_F(TrackerTest, BeginsASubmapWhereAnImuIsButNothingIsKnown) {
   } while (outcome.submap == SubmapId{0} && ++number < 30);
   EXPECT_EQ(outcome.submap, SubmapId{1});
   EXPECT_GT(number, 10u);
+}
+
+/// Most of what is seen goes to the side.
+TEST_F(TrackerTest, RestsWhereAnImuDoesWhateverGoesBy) {
+  for (std::uint32_t i = 0; i < 5; ++i) track(i, pose_at(0.0, 0.0, 0.0, 0.0));
+  const PointCloud around = scene_.cloud;
+  for (std::uint32_t i = 5; i < 60; ++i) {
+    scene_.cloud = around;
+    auto& points = scene_.cloud.landmarks;
+    const double aside = 0.02 * (i - 4.0);
+    for (std::size_t k = 0; k < points.size(); ++k) {
+      // For a while all of it.
+      if (k % 5 != 0 || (i > 30 && i < 36)) points[k].position.x() += aside;
+    }
+    const auto features = scene_.look(pose_at(0.0, 0.0, 0.0, 0.0), i).features;
+    expect_pose(track(i, *features, nullptr, true), pose_at(0.0, 0.0, 0.0, 0.0));
+  }
+}
+
+TEST_F(TrackerTest, IsNotAtRestWhereItGoesStraightOn) {
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    const Rigid3 slide = pose_at(0.02 * i, 0.0, 0.0, 0.0);
+    const auto features = scene_.look(slide, i).features;
+    Tracked outcome = track(i, *features, nullptr, i > 5);
+    if (outcome.message) {
+      scene_.add_keyframe(slide);
+      map_ = scene_.map.freeze();
+    }
+    expect_pose(outcome, slide);
+  }
 }
 
 TEST_F(TrackerTest, FollowsASuddenTurn) {
