@@ -100,8 +100,6 @@ double shown_density(std::span<const ImuSample> samples, Eigen::Vector3d ImuSamp
 
 /// Variance of samples at rest to that of white noise as their second differences show it.
 constexpr double kMaxRestGrowth = 1.7;
-/// What rounding makes of samples without any, in rad/s and m/s^2.
-constexpr double kLeastDeviation = 1e-6;
 
 }  // namespace
 
@@ -122,8 +120,9 @@ bool shows_no_motion(std::span<const ImuSample> samples) {
     mean /= static_cast<double>(samples.size());
     double sum = 0.0;
     for (const ImuSample& sample : samples) sum += (sample.*sensor - mean).squaredNorm();
-    const double white = std::max(density * root_rate, kLeastDeviation);
-    return sum <= kMaxRestGrowth * 3.0 * white * white * static_cast<double>(samples.size());
+    const double white = density * root_rate;
+    return sum > 0.0 &&
+           sum <= kMaxRestGrowth * 3.0 * white * white * static_cast<double>(samples.size());
   };
   return is_noise(&ImuSample::angular_velocity, noise.gyroscope) &&
          is_noise(&ImuSample::acceleration, noise.accelerometer);

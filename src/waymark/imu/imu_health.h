@@ -41,7 +41,8 @@ struct ImuHealth {
 ImuHealth imu_health(std::span<const ImuSample> samples);
 
 /// Whether an IMU shows nothing but noise: it lies still, or goes straight on at a constant speed,
-/// which no device on wheels or in the hand does. At least three samples.
+/// which no device on wheels or in the hand does. Not where they are the same to the bit, as of one
+/// that is not connected. At least three samples.
 bool shows_no_motion(std::span<const ImuSample> samples);
 
 /// For an IMU that nothing is known of: twice the white noise of one as in phones and cheap cameras

@@ -70,7 +70,10 @@ double part_at_rest(const testing::ImuMotion& motion, const ImuNoise& noise) {
 TEST(ImuHealth, ShowsNoMotionAtRestAlone) {
   const ImuNoise usual{1e-4, 2e-3, 1e-5, 1e-4};
   EXPECT_GT(part_at_rest({}, usual), 0.95);
-  EXPECT_EQ(part_at_rest({}, {}), 1.0);  // Without noise.
+  const ImuSample constant{0, {0.01, 0.0, 0.0}, {0.0, 0.0, kStandardGravity}};
+  std::vector<ImuSample> not_connected(80, constant);
+  for (std::size_t i = 0; i < 80; ++i) not_connected[i].timestamp_ns = 5'000'000 * std::int64_t(i);
+  EXPECT_FALSE(shows_no_motion(not_connected));
   Rng rng(3, 0);
   EXPECT_EQ(part_at_rest(testing::hand_held_motion(rng), usual), 0.0);
   EXPECT_LT(part_at_rest(testing::hovering_motion(rng), usual), 0.1);

@@ -275,6 +275,7 @@ bool InertialEstimator::contradicts_turn(std::int64_t begin_ns,
 }
 
 bool InertialEstimator::is_at_rest(std::int64_t timestamp_ns) const {
+  if (report_ && !report_->is_used) return false;
   const double shift_s = found_ ? found_->time_shift_s : told_.time_shift_s.value_or(0.0);
   const std::int64_t end_ns = timestamp_ns + std::llround(1e9 * shift_s);
   const std::int64_t first_ns = samples_.all().front().timestamp_ns;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 
+#include "waymark/base/median.h"
 #include "waymark/track/last_frame.h"
 #include "waymark/track/local_map.h"
 
@@ -38,6 +39,26 @@ double part_in_place(const Features& features,
     num_in_place += (measured.level_pixel_from_bearing * off).norm() < kMaxErrorPx;
   }
   return static_cast<double>(num_in_place) / num_alike;
+}
+
+Eigen::Vector2f median_offset_px(const Features& features,
+                                 const Map& map,
+                                 std::span<const LandmarkId> landmarks,
+                                 const Rigid3& rig_from_world) {
+  const Rigid3 cam_from_world = features.rig->cameras[0].cam_from_rig * rig_from_world;
+  std::vector<float> along_x, along_y;
+  for (std::uint32_t i = 0; i < features.num_corners(); ++i) {
+    if (!landmarks[i].is_valid()) continue;
+    const Eigen::Vector3d point =
+        cam_from_world * map.landmarks().at(landmarks[i]).position_in_world;
+    const Measurement measured = features.measurement(i);
+    const Eigen::Vector3f off = point.normalized().cast<float>() - measured.bearing;
+    const Eigen::Vector2f off_px = measured.level_pixel_from_bearing * off;
+    along_x.push_back(off_px.x());
+    along_y.push_back(off_px.y());
+  }
+  if (along_x.empty()) return Eigen::Vector2f::Zero();
+  return {median(along_x), median(along_y)};
 }
 
 void PoseCheck::begin(const std::optional<Rigid3>& predicted) {

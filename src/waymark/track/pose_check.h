@@ -28,6 +28,13 @@ double part_in_place(const Features& features,
                      std::span<const LandmarkId> alike,
                      const Rigid3& rig_from_world);
 
+/// How far features are from where a pose has their landmarks, in pixels of their level: the median
+/// along each axis of the image. Of ids that live; 0 without any.
+Eigen::Vector2f median_offset_px(const Features& features,
+                                 const Map& map,
+                                 std::span<const LandmarkId> landmarks,
+                                 const Rigid3& rig_from_world);
+
 /// Verifies the poses that are found for a frame. Near a wrong guess things that repeat agree on a
 /// wrong pose, and that ruins the map. So a pose is verified where the motion led there, where most
 /// of what looks alike without doubt is in place, or where two searches end.

@@ -20,7 +20,8 @@ namespace {
 constexpr double kRestRadiusPx = 2.0;
 constexpr double kRestPart = 0.1;
 constexpr double kRestMotion = 0.001;
-constexpr int kMaxUnseen = 10;  // Frames.
+constexpr double kRestOffsetPx = 0.4;
+constexpr int kMaxUnseen = 10;  // Frames; nor more than showed the rest.
 
 /// Around a prediction, and when that fails.
 std::array<double, 2> search_radii_px(const Frame& frame, const PoseSearchOptions& options) {
@@ -133,9 +134,9 @@ std::optional<LocatedFrame> PoseSearch::locate(Frame& frame,
 std::optional<LocatedFrame> PoseSearch::at_rest(Frame& frame, const Context& context) {
   if (!frame.is_at_rest) {
     resting_.reset();
-    num_unseen_ = 0;
+    num_rested_ = num_unseen_ = 0;
   }
-  if (!frame.is_at_rest || num_unseen_ > kMaxUnseen) return std::nullopt;
+  if (!frame.is_at_rest || num_unseen_ > std::min(kMaxUnseen, num_rested_)) return std::nullopt;
   const Map& map = *context.visible.map;
   const Rigid3 rig_from_world = resting_.value_or(context.last.rig_from_world());
   local_map_.refresh(
@@ -149,7 +150,13 @@ std::optional<LocatedFrame> PoseSearch::at_rest(Frame& frame, const Context& con
                                                {.radius_px = kRestRadiusPx},
                                                &visible);
   const double part = static_cast<double>(num_valid(stay)) / static_cast<double>(visible.size());
-  num_unseen_ = num_valid(stay) < settings_.min_inliers ? num_unseen_ + 1 : 0;
+  const bool is_seen = num_valid(stay) >= settings_.min_inliers;
+  if (is_seen &&
+      median_offset_px(*frame.features, map, stay, rig_from_world).norm() > kRestOffsetPx) {
+    num_unseen_ = kMaxUnseen + 1;  // All of it begins to move.
+    return std::nullopt;
+  }
+  num_unseen_ = is_seen ? 0 : num_unseen_ + 1;
   if (!resting_ && num_unseen_ > 0) return std::nullopt;
   LocatedFrame located = locator_.locate(*frame.features, map, rig_from_world, std::move(stay));
   located.rig_from_world = rig_from_world;
@@ -159,6 +166,7 @@ std::optional<LocatedFrame> PoseSearch::at_rest(Frame& frame, const Context& con
   if (!resting_ && !comes_to_rest) return std::nullopt;
   located.visible = std::move(visible);
   resting_ = rig_from_world;
+  num_rested_ += num_unseen_ == 0;
   return located;
 }
 

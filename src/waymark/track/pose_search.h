@@ -95,6 +95,7 @@ class PoseSearch {
   RecentLocalMap local_map_;
   std::string_view found_by_;
   std::optional<Rigid3> resting_;  ///< Where the rig came to rest; none where it moves.
+  int num_rested_ = 0;             ///< Frames at rest that show it.
   int num_unseen_ = 0;  ///< Frames at rest that do not show what is around, the last ones in turn.
 };
 

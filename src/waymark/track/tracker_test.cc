@@ -302,7 +302,7 @@ TEST_F(TrackerTest, RestsWhereAnImuDoesWhateverGoesBy) {
   for (std::uint32_t i = 5; i < 60; ++i) {
     scene_.cloud = around;
     auto& points = scene_.cloud.landmarks;
-    const double aside = 0.02 * (i - 4.0);
+    const double aside = 0.3 + 0.02 * (i - 4.0);
     for (std::size_t k = 0; k < points.size(); ++k) {
       // For a while all of it.
       if (k % 5 != 0 || (i > 30 && i < 36)) points[k].position.x() += aside;
