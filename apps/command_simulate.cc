@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <string>
 #include <thread>
 #include <vector>
@@ -27,36 +28,34 @@
 namespace waymark {
 namespace {
 
-/// Frames that are black but for the sensor's noise.
+/// Makes frames black but for the sensor's noise: of all cameras, or of one.
+void blacken(int first, int count, std::optional<std::size_t> camera, SequenceSpec& spec) {
+  ImageEffects black = spec.effects;
+  black.gain = 0.0;
+  spec.spans.insert(spec.spans.begin(), {first, first + count, black, camera});
+}
+
 void blacken(const std::vector<int>& firsts_and_counts, SequenceSpec& spec) {
   if (firsts_and_counts.size() % 2 != 0) {
     throw InputError("--black", "ends with a first frame, expected FIRST,COUNT,...");
   }
-  ImageEffects black = spec.effects;
-  black.gain = 0.0;
   for (std::size_t i = 0; i < firsts_and_counts.size(); i += 2) {
-    const int first = firsts_and_counts[i];
-    spec.spans.insert(spec.spans.begin(), {first, first + firsts_and_counts[i + 1], black});
+    blacken(firsts_and_counts[i], firsts_and_counts[i + 1], {}, spec);
   }
 }
 
-/// The same of one camera.
 void darken(const std::vector<int>& cameras_firsts_and_counts, SequenceSpec& spec) {
   if (cameras_firsts_and_counts.size() % 3 != 0) {
     throw InputError("--dark", "ends early, expected CAMERA,FIRST,COUNT,...");
   }
-  ImageEffects black = spec.effects;
-  black.gain = 0.0;
+  const std::size_t num_cameras = spec.chain.cameras.size();
   for (std::size_t i = 0; i < cameras_firsts_and_counts.size(); i += 3) {
     const auto camera = static_cast<std::size_t>(cameras_firsts_and_counts[i]);
-    if (camera >= spec.chain.cameras.size()) {
-      throw InputError(
-          "--dark",
-          fmt::format("names camera {}, expected one below {}", camera, spec.chain.cameras.size()));
+    if (camera >= num_cameras) {
+      throw InputError("--dark",
+                       fmt::format("names camera {}, expected one below {}", camera, num_cameras));
     }
-    const int first = cameras_firsts_and_counts[i + 1];
-    spec.spans.insert(spec.spans.begin(),
-                      {first, first + cameras_firsts_and_counts[i + 2], black, camera});
+    blacken(cameras_firsts_and_counts[i + 1], cameras_firsts_and_counts[i + 2], camera, spec);
   }
 }
 

@@ -245,6 +245,7 @@ WindowAdjustment compute_adjustment(const Map& map,
     window_problem.marker_rigs = add_markers(map, keyframes, window_problem.problem);
   }
   if (imu) add_inertial_terms(map, keyframes_of(window), *imu, window_problem.problem);
+  if (imu && window_problem.problem.motion->terms.empty()) return {};
   const BundleResult result = adjust_bundle(window_problem.problem, options);
   if (imu && contradicts_imu(window_problem.problem, result)) return {};
   WindowAdjustment adjustment{moves_of(window, window_problem.problem), {}, std::move(calibration)};

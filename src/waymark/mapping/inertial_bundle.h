@@ -27,8 +27,9 @@ void add_inertial_terms(const Map& map,
                         const InertialEvidence& imu,
                         BundleProblem& problem);
 
-/// Whether the images contradict the samples where the adjustment ended: residuals of samples are
-/// thrice as large as expected, squared, or those of bearings larger than before by a fifth.
+/// Whether the images contradict the samples where the adjustment ended: squared residuals of
+/// samples are more than 3 in the mean (.4 expected, as each keyframe has nine unknowns of its own
+/// for 15 of them), or those of bearings larger than before by a fifth, in px.
 bool contradicts_imu(const BundleProblem& problem, const BundleResult& result);
 
 }  // namespace waymark

@@ -115,7 +115,7 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
   };
   judge(std::numeric_limits<double>::max());
   BundleResult result;
-  result.initial_median_px = median_residual_px(judged);
+  if (problem.motion) result.initial_median_px = median_residual_px(judged);
   for (int round = 0; round < options.num_rounds; ++round) {
     BundleOptions round_options = narrowed(options, judged);
     if (problem.motion) {
@@ -129,7 +129,7 @@ BundleResult adjust_bundle(BundleProblem& problem, const BundleOptions& options)
     result.num_iterations += done.num_iterations;
     judge(options.gate_px * options.gate_px);
   }
-  result.final_median_px = median_residual_px(judged);
+  if (problem.motion) result.final_median_px = median_residual_px(judged);
   result.noise_px = measured_noise_px(judged).value_or(0.0);
   result.is_outlier.resize(num_observations);
   for (std::size_t i = 0; i < num_observations; ++i) {

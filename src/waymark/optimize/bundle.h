@@ -14,7 +14,8 @@ struct BundleResult {
   double initial_cost = 0.0;  ///< Half the robust sum over all observations before the first round.
   double final_cost = 0.0;    ///< That of the last round over its observations, after it.
   int num_iterations = 0;     ///< Of all rounds.
-  /// Median lengths of all residuals before the first round and at the end, outliers included.
+  /// With motion, median lengths of all residuals before the first round and at the end, outliers
+  /// included.
   double initial_median_px = 0.0, final_median_px = 0.0;
   double noise_px = 0.0;  ///< Standard deviation of a residual's component, of what is no outlier.
 };

@@ -14,6 +14,12 @@ namespace {
 /// Of the feature's level: what poses and landmarks that are right may be off by.
 constexpr float kMaxErrorPx = 8.0f;
 
+/// From where a feature is to where a point is seen, in pixels of the feature's level.
+Eigen::Vector2f offset_px(const Measurement& measured, const Eigen::Vector3d& point_in_cam) {
+  return measured.level_pixel_from_bearing *
+         (point_in_cam.normalized().cast<float>() - measured.bearing);
+}
+
 }  // namespace
 
 double distance_from(const Rigid3& other, const Map& map, const LocatedFrame& located) {
@@ -34,9 +40,7 @@ double part_in_place(const Features& features,
   for (std::uint32_t i = 0; i < alike.size(); ++i) {
     if (!alike[i].is_valid()) continue;
     const Eigen::Vector3d point = cam_from_world * map.landmarks().at(alike[i]).position_in_world;
-    const Measurement measured = features.measurement(i);
-    const Eigen::Vector3f off = point.normalized().cast<float>() - measured.bearing;
-    num_in_place += (measured.level_pixel_from_bearing * off).norm() < kMaxErrorPx;
+    num_in_place += offset_px(features.measurement(i), point).norm() < kMaxErrorPx;
   }
   return static_cast<double>(num_in_place) / num_alike;
 }
@@ -51,9 +55,7 @@ Eigen::Vector2f median_offset_px(const Features& features,
     if (!landmarks[i].is_valid()) continue;
     const Eigen::Vector3d point =
         cam_from_world * map.landmarks().at(landmarks[i]).position_in_world;
-    const Measurement measured = features.measurement(i);
-    const Eigen::Vector3f off = point.normalized().cast<float>() - measured.bearing;
-    const Eigen::Vector2f off_px = measured.level_pixel_from_bearing * off;
+    const Eigen::Vector2f off_px = offset_px(features.measurement(i), point);
     along_x.push_back(off_px.x());
     along_y.push_back(off_px.y());
   }
